@@ -43,10 +43,10 @@ def world(
         a = int(generator.integers(0, frames - 1))
         b = int(generator.integers(a + 1, frames if near is None else min(a + near + 1, frames)))
         pairs.append((a, b))
-    return World(poses, [measured(poses, a, b, generator, noise, sigmas) for a, b in pairs])
+    return World(poses, [measured(poses, a, b, generator, noise=noise, sigmas=sigmas) for a, b in pairs])
 
 
-def measured(poses: Transform, a: int, b: int, generator: np.random.Generator, noise: float, sigmas: bool) -> Measurement:
+def measured(poses: Transform, a: int, b: int, generator: np.random.Generator, *, noise: float, sigmas: bool) -> Measurement:
     """Measure b in a: place + d, Exp(turn) R, along the axes of a."""
     true = poses[a].inverse() @ poses[b]
     d = noise * generator.normal(size=6) * ([SIGMA_M] * 3 + [SIGMA_RAD] * 3)

@@ -37,7 +37,7 @@ class Bodies(NamedTuple):
     parent: dict[str, str]
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Return how many bodies there are."""
         return 1 + max(self.number.values())
 
@@ -91,7 +91,7 @@ def _entries(frames: tuple[str, ...], fixed: Fixed) -> dict[str, str]:
 
 def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
     """Raise ValueInvalid, with the frames in their groups, where rows do not join all bodies."""
-    joined = Groups(bodies.count, pairs)
+    joined = Groups(bodies.size, pairs)
     groups: dict[int, list[str]] = {}
     for name in bodies.frames:
         groups.setdefault(joined.of(bodies.number[name]), []).append(name)

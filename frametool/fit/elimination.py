@@ -38,16 +38,16 @@ class Elimination:
         left = set(range(count))
         while left:
             body = min(left, key=lambda each: (len(near[each]), each))
-            seen = near[body]
-            if len(seen) >= DENSE * (len(left) - 1):
+            others = near[body]
+            if len(others) >= DENSE * (len(left) - 1):
                 self.steps.append((np.array(sorted(left)), np.array([], int)))
                 break
             left.discard(body)
-            for other in seen:
-                near[other] |= seen
+            for other in others:
+                near[other] |= others
                 near[other] -= {other, body}
-            self.steps.append((np.array([body]), np.array(sorted(seen), int)))
-        self._slot = np.full((count, count), -1, np.int32)
+            self.steps.append((np.array([body]), np.array(sorted(others), int)))
+        self._slot = np.full((count, count), -1)
         self.size = 0
         for bodies, seen in self.steps:
             self._number(bodies, bodies)
@@ -62,12 +62,14 @@ class Elimination:
 
     def slots(self, rows: Indices, columns: Indices) -> Indices:
         """Return where the blocks of pairs are kept; indices broadcast."""
-        return self._slot[rows, columns]
+        found: Indices = self._slot[rows, columns]
+        return found
 
     def gathered(self, blocks: Array, rows: Indices, columns: Indices) -> Array:
         """Return the blocks of all rows with all columns as one matrix."""
         part = blocks[self._slot[np.ix_(rows, columns)]]
-        return part.swapaxes(1, 2).reshape(SIX * len(rows), SIX * len(columns))
+        whole: Array = part.swapaxes(1, 2).reshape(SIX * len(rows), SIX * len(columns))
+        return whole
 
     def scattered(self, blocks: Array, rows: Indices, columns: Indices, matrix: Array) -> None:
         """Put such a matrix back."""
@@ -77,10 +79,11 @@ class Elimination:
     def factored(self, blocks: Array) -> Factor:
         """Eliminate all bodies of a positive definite matrix."""
         left = blocks.copy()
-        pivots, gains = [], []
+        pivots: list[Array] = []
+        gains: list[Array] = []
         for bodies, seen in self.steps:
             pivot, beside = self.gathered(left, bodies, bodies), self.gathered(left, bodies, seen)
-            gain = np.linalg.solve(pivot, beside)
+            gain: Array = np.linalg.solve(pivot, beside)
             if len(seen):
                 self.scattered(left, seen, seen, self.gathered(left, seen, seen) - beside.T @ gain)
             pivots.append(pivot)

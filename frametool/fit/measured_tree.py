@@ -51,7 +51,7 @@ def solve_tree(
     bodies = bodies_of(measurements, root, fixed)
     rows = _rows(measurements, bodies)
     require_connected(bodies, zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
-    problem = TreeProblem(rows, bodies.count)
+    problem = TreeProblem(rows, bodies.size)
     found, fits = judged(problem, measurements, problem.fitted(robust=robust, told=told))
     told(1.0)
     return TreeSolution(measurements, bodies, problem, found, fits)
@@ -127,7 +127,7 @@ class TreeSolution:
         tree = problem.tree(kept)
         alone = bridges(tree, problem.pairs, kept)
         self.checked = ~np.isin(np.arange(problem.size), list(alone))
-        sure = [True] * bodies.count
+        sure = [True] * bodies.size
         for body in tree.order[1:]:
             sure[body] = sure[tree.above[body]] and tree.row[body] not in alone
         self.frame_checked = {name: sure[bodies.number[name]] for name in self.frames}

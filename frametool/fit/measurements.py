@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Rigid
 
 FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
-TIE = 1e-9  # of u: blunders nearer than this are equally good, the earlier is named
-O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # noqa: E741 - body_from_optical, as papers have it
+ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
+TIE = 1e-9  # of u: what is not nearer than this explains nothing
+O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, as in papers
 
 
 class Measurement(NamedTuple):
@@ -53,18 +54,24 @@ class Measurement(NamedTuple):
         x, y, z, *turn = self.components
         return Transform.of(x * factor, y * factor, z * factor, *turn)
 
-    def reread(self, change: Callable[[float], float], order: int = 1, kinds: tuple[str, ...] = ("rpy", "rotvec")) -> Transform | None:
-        """Return it with the numbers of its rotation changed or backwards; None where it was not written so."""
-        if self.written is None or self.written[0] not in kinds:
+    def reread(self, change: Callable[[float], float]) -> Transform | None:
+        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
+        if self.written is None:
             return None
         kind, angles = self.written
         read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
-        return self.turned(*read([change(angle) for angle in angles[::order]]).components)
+        return self.turned(*read([change(angle) for angle in angles]).components)
 
 
 def _translation_of_inverse(m: Measurement) -> Transform:
     rotation = m.transform.rotation
     return Transform(rotation, -rotation.apply(m.components[:3]))
+
+
+def _yaw_first(m: Measurement) -> Transform | None:
+    if m.written is None or m.written[0] != "rpy":
+        return None
+    return m.turned(*Rotation.from_rpy(m.written[1][::-1]).components)
 
 
 # what a measurement was meant to be, if this blunder was made
@@ -78,7 +85,7 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "metres taken for millimetres": lambda m: m.shifted(1e3),
     "degrees taken for radians": lambda m: m.reread(math.radians),
     "radians taken for degrees": lambda m: m.reread(math.degrees),
-    "yaw, pitch, roll taken for roll, pitch, yaw": lambda m: m.reread(float, order=-1, kinds=("rpy",)),
+    "yaw, pitch, roll taken for roll, pitch, yaw": _yaw_first,
     "optical axes of the child": lambda m: m.transform @ O.inverse(),
     "optical axes of the parent": lambda m: O @ m.transform,
     "body axes of the child": lambda m: m.transform @ O,
@@ -90,15 +97,21 @@ def best_blunder(measurement: Measurement, pose: Poses, information: Array) -> s
     """Name the blunder that best explains a measurement of a pose; None where none does.
 
     pose: where the child is in the parent; information: the inverse covariance (6, 6) of the measurement
-    It must bring the measurement within 4 sigmas, and nearer than it is as it stands.
+    It must bring the measurement within 4 sigmas, and nearer than it is as it stands.  Of blunders that noise cannot
+    tell from the best, the first is named: half a turn is its own inverse.
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
-    tried = [measurement.transform, *meant.values()]
+    tried = [*meant.values(), measurement.transform]
     poses = Poses.of(Transform.of(*map(np.array, zip(*(each.components for each in tried), strict=True))))
     errors = pose.at(None).errors(poses)
-    as_it_stands, *u = np.sqrt(np.einsum("ni,ij,nj->n", errors, information, errors) / 6)
-    best, least = None, min(FITTING, float(as_it_stands)) / (1 - TIE)
-    for words, each in zip(meant, u, strict=True):
-        if each < least * (1 - TIE):
-            best, least = words, each
-    return best
+    u = _sigmas(errors, information)
+    best = int(u[:-1].argmin())
+    if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
+        return None
+    as_good = (_sigmas(errors - errors[best], information) <= ALIKE) & (u <= FITTING)
+    return list(meant)[int(as_good.argmax())]
+
+
+def _sigmas(errors: Array, information: Array) -> Array:
+    squares: Array = np.einsum("ni,ij,nj->n", errors, information, errors)
+    return np.sqrt(np.maximum(squares, 0.0) / 6)

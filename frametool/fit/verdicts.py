@@ -9,6 +9,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, printable
 from frametool.fit.graph import bridges
 from frametool.fit.measurements import best_blunder
+from frametool.fit.robust import KEPT
 from frametool.fit.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
@@ -23,9 +24,14 @@ ONE_LINE = 200  # characters
 
 
 class Verdicts(NamedTuple):
-    """The words for each row, the rows to exchange (left out, rival), and the first loop that stays undecided."""
+    """The words for each row, and what is not settled.
+
+    noise: rows without a blunder that the doubt of the fit explains; swaps: rows to exchange, (left out, rival)
+    undecided: the first row of whose loop nothing tells which is wrong, with its rivals
+    """
 
     fits: list[str | None]
+    noise: list[int]
     swaps: list[tuple[int, int]]
     undecided: tuple[int, list[int]] | None
 
@@ -35,16 +41,18 @@ def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fit
 
     Raises ValueInvalid where none of a row and its rivals, or more than one, has a blunder that fits.
     """
-    tried = set()
+    tried = {found.kept.tobytes()}
     while True:
         case = _Case(problem, measurements, found)
-        fits, swaps, undecided = case.verdicts()
-        tried.add(found.kept.tobytes())
-        kept = found.kept.copy()
-        for row, rival in swaps:
-            kept[row], kept[rival] = True, False
-        if not swaps or kept.tobytes() in tried:
+        fits, noise, swaps, undecided = case.verdicts()
+        for taken, left in ((noise, []), *(([row], [rival]) for row, rival in swaps)):
+            kept = found.kept.copy()
+            kept[taken], kept[left] = True, False
+            if kept.tobytes() not in tried:
+                break
+        else:
             break
+        tried.add(kept.tobytes())
         bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())]).at(0)
         found = problem.selected(bodies, kept, found.noise, robust=True)
     if undecided:
@@ -67,39 +75,40 @@ class _Case:
         self.alone = bridges(self.tree, problem.pairs, kept)
         self.parents, self.children = problem.ends(found.bodies)
         self.poses = self.parents.inverse @ self.children
+        self.errors = self.poses.errors(problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
         self.uncertainty = Uncertainty(problem, found)
 
     def verdicts(self) -> Verdicts:
         """Try the blunders on each row left out, and on its rivals: kept rows that only it checks."""
         fits: list[str | None] = [None] * self.problem.size
-        swaps, undecided = [], None
+        noise, swaps, undecided = [], [], None
         for row in np.flatnonzero(~self.found.kept).tolist():
             rivals = sorted(self.alone.intersection(self.tree.way(*self.problem.pairs[row])))
-            words = {row: self._blunder(row, self.poses.at(row), self.information[row])}
-            if not rivals:
-                fits[row] = words[row] or self._blunder(row, self.poses.at(row), self._doubted(row))
-                continue
+            words = {row: best_blunder(self.measurements[row], self.poses.at(row), self.information[row])}
             for rival in rivals:
-                words[rival] = self._blunder(rival, self._pose_without(rival, row), self.information[rival])
+                pose = self._pose_without(rival, row)
+                words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
-            if blamed == [row]:
+            doubted = self._doubted(row)
+            if not blamed and self.errors[row] @ doubted @ self.errors[row] <= 6 * KEPT**2:
+                noise.append(row)
+            if not rivals:
+                fits[row] = words[row] or best_blunder(self.measurements[row], self.poses.at(row), doubted)
+            elif blamed == [row]:
                 fits[row] = words[row]
             elif len(blamed) == 1:
                 swaps.append((row, blamed[0]))
             else:
                 undecided = undecided or (row, rivals)
-        return Verdicts(fits, swaps, undecided)
-
-    def _blunder(self, row: int, pose: Poses, information: Array) -> str | None:
-        return best_blunder(self.measurements[row], pose, information)
+        return Verdicts(fits, noise, swaps, undecided)
 
     def _doubted(self, row: int) -> Array:
         """Return the information on a row beside the doubt about the pose that the fit has between its frames."""
         parent, child = self.problem.pairs[row]
         doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
-        own = self.information[row]
-        return own if doubt is None else np.linalg.inv(np.linalg.inv(own) + doubt)
+        doubted: Array = self.information[row]
+        return doubted if doubt is None else np.linalg.inv(np.linalg.inv(doubted) + doubt)
 
     def _pose_without(self, rival: int, row: int) -> Poses:
         """Return the pose that a rival would measure, were the bodies that hang by it placed by a row left out."""
@@ -116,7 +125,7 @@ class _Case:
 
     def open_loop(self, row: int, rivals: list[int]) -> str:
         """Say which rows form a loop, and how far it is open, on one line."""
-        error = self.problem.errors(self.found.bodies)[row]
+        error = self.errors[row]
         open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
         places = [place_of(self.measurements, each) for each in sorted([row, *rivals])]
         advice = "measure again or leave one out"
