@@ -79,11 +79,11 @@ class Elimination:
     def factored(self, blocks: Array) -> Factor:
         """Eliminate all bodies of a positive definite matrix."""
         left = blocks.copy()
-        pivots: list[Array] = []
-        gains: list[Array] = []
+        pivots: list[Any] = []
+        gains: list[Any] = []
         for bodies, seen in self.steps:
             pivot, beside = self.gathered(left, bodies, bodies), self.gathered(left, bodies, seen)
-            gain: Array = np.linalg.solve(pivot, beside)
+            gain = np.linalg.solve(pivot, beside)
             if len(seen):
                 self.scattered(left, seen, seen, self.gathered(left, seen, seen) - beside.T @ gain)
             pivots.append(pivot)

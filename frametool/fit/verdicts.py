@@ -107,8 +107,8 @@ class _Case:
         """Return the information on a row beside the doubt about the pose that the fit has between its frames."""
         parent, child = self.problem.pairs[row]
         doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
-        doubted: Array = self.information[row]
-        return doubted if doubt is None else np.linalg.inv(np.linalg.inv(doubted) + doubt)
+        covariance: Array = np.linalg.inv(self.information[row])
+        return self.information[row] if doubt is None else np.asarray(np.linalg.inv(covariance + doubt))
 
     def _pose_without(self, rival: int, row: int) -> Poses:
         """Return the pose that a rival would measure, were the bodies that hang by it placed by a row left out."""
