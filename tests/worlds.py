@@ -40,9 +40,9 @@ class World(NamedTuple):
         metres, radians = np.sqrt((errors**2).mean(0))
         return float(metres), float(radians)
 
-    def spanning_tree(self) -> dict[str, Transform]:
-        """Return the poses that the first rows give which close no loop and are not wrong."""
-        rows = [row for row in range(len(self.measurements)) if row not in self.wrong]
+    def spanning_tree(self, leave_out: tuple[int, ...] = ()) -> dict[str, Transform]:
+        """Return the poses that the first rows give which close no loop."""
+        rows = [row for row in range(len(self.measurements)) if row not in leave_out]
         tree, poses = spanning_tree(len(self.poses), self.pairs, rows), {"f0": Transform.identity()}
         for body in tree.order[1:]:
             row, above = self.measurements[tree.row[body]], poses[f"f{tree.above[body]}"]

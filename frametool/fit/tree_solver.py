@@ -248,10 +248,10 @@ class TreeProblem:
         free, given = looped & ~self.rows.given, looped & self.rows.given
         noise = Noise()
         if given.any():
-            factor = float(np.median(self.u(errors, noise)[given])) / (MEDIAN_OF_SIX * share)
+            factor = float(np.median(_odd(self.u(errors, noise)[given]))) / (MEDIAN_OF_SIX * share)
             noise = noise._replace(factor=max(1.0, factor))
         if free.any():
-            place, turn = (median_sigma(np.linalg.norm(part[free], axis=1), share) for part in _halves(errors))
+            place, turn = (median_sigma(_odd(np.linalg.norm(part[free], axis=1)), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
         return noise
 
@@ -304,3 +304,8 @@ class TreeProblem:
 
 def _halves(errors: Array) -> tuple[Array, Array]:
     return errors[:, :3], errors[:, 3:]
+
+
+def _odd(values: Array) -> Array:
+    """Return an odd number of values, the largest left out if need be: of two rows that disagree one is wrong."""
+    return values if len(values) % 2 else np.sort(values)[:-1]

@@ -63,10 +63,6 @@ def left_out(solution: TreeSolution) -> dict[int, str | None]:
     return {row: solution.fits[row] for row in np.flatnonzero(~solution.used).tolist()}
 
 
-def known(measurements: list[Measurement]) -> list[Measurement]:
-    return [each._replace(covariance=COVARIANCE) for each in measurements]
-
-
 @pytest.mark.parametrize("case", GOLDEN, ids=[case["name"] for case in GOLDEN])
 def test_golden_worlds(case: dict[str, Any]) -> None:
     found = golden(case)
@@ -108,15 +104,14 @@ def test_two_rows_of_a_hundred_may_be_wrong_in_each_of_many_frames() -> None:
 
 def test_loops_are_worth_three_times_a_spanning_tree() -> None:
     ratios = []
-    for seed in range(20):
+    for seed in range(40):
         truth = world(7, 20, seed).with_inverted(1)
         ours, tree = truth.rms(solve_tree(truth.measurements).pose), truth.rms(truth.spanning_tree().__getitem__)
         ratios.append(np.divide(tree, ours))
-    assert (np.median(ratios, 0) > 2.7).all()
+    assert (np.median(ratios, 0) > 2.8).all()
 
 
 O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))
-RPY = (0.4, 0.2, -0.7)
 
 
 def turned(pose: Transform, *xyzw: float) -> Transform:
@@ -196,7 +191,7 @@ def test_covariances_are_those_of_many_draws() -> None:
     generator = np.random.default_rng(0)
     pairs = [("f0", "f3"), ("f3", "f1"), ("f4", "f2"), ("f1", "f0")]
     draws: dict[tuple[str, str], list[np.ndarray]] = {pair: [] for pair in pairs}
-    for _ in range(1500):
+    for _ in range(1000):
         rows = []
         for each in truth.measurements:
             d = generator.normal(size=6) * ([SIGMA_M] * 3 + [SIGMA_RAD] * 3)
@@ -209,7 +204,6 @@ def test_covariances_are_those_of_many_draws() -> None:
     exact = solve_tree(truth.measurements)
     for (target, source), errors in draws.items():
         covariance = exact.covariance(target, source)
-        assert relative(covariance, np.cov(np.array(errors).T)) < 0.2
         assert covariance is not None
         assert (covariance == covariance.T).all()
         assert relative(covariance, np.cov(np.array(errors).T)) < 0.2
@@ -312,14 +306,15 @@ def test_a_single_loop_with_none_that_fits_is_undecided() -> None:
     with pytest.raises(ValueInvalid) as error:
         solve_tree(closing(moved))
     assert str(error.value) == (
-        "undecided: m.yaml:3, m.yaml:5, m.yaml:9 form a loop open by 2038.6 mm 55.0 deg; "
-        "measure again or leave one out (--without m.yaml:9)"
+        "undecided: m.yaml:3, m.yaml:5, m.yaml:9 form a loop open by 909.5 mm 55.4 deg; "
+        "measure again or leave one out (--without m.yaml:3)"
     )
     assert error.value.exit_code == 1
 
 
-def test_a_pose_and_its_inverse_are_undecided() -> None:
-    rows = [TRIANGLE[0], inverted(TRIANGLE[0])._replace(place="")]
+@pytest.mark.parametrize("covariance", [None, COVARIANCE])
+def test_a_pose_and_its_inverse_are_undecided(covariance: Any) -> None:
+    rows = [TRIANGLE[0]._replace(covariance=covariance), inverted(TRIANGLE[0])._replace(place="", covariance=covariance)]
     with pytest.raises(ValueInvalid, match="undecided: m.yaml:3, measurement 2 form a loop open by "):
         solve_tree(rows)
 
