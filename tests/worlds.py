@@ -51,7 +51,8 @@ class World(NamedTuple):
 
     def with_inverted(self, count: int, seed: int = 0) -> World:
         """Turn some rows around, each of which at least two independent loops check."""
-        rows, wrong = list(self.measurements), ()
+        rows = list(self.measurements)
+        wrong: tuple[int, ...] = ()
         for row in np.random.default_rng(seed).permutation(len(rows)).tolist():
             angle = rows[row].transform.rotation.angle()
             if len(wrong) < count and angle < OWN_INVERSE and self._decidable({*wrong, row}):

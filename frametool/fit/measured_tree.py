@@ -49,12 +49,16 @@ def solve_tree(
             raise ValueInvalid(f"{place_of(measurements, row)}: {shown(each.child)} is measured from itself")
     told = progress or (lambda _: None)
     bodies = bodies_of(measurements, root, fixed)
-    rows = _rows(measurements, bodies)
-    require_connected(bodies, zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
-    problem = TreeProblem(rows, bodies.size)
-    found, fits = judged(problem, measurements, problem.fitted(robust=robust, told=told))
-    told(1.0)
-    return TreeSolution(measurements, bodies, problem, found, fits)
+    require_connected(bodies, [(bodies.number[each.parent], bodies.number[each.child]) for each in measurements])
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            problem = TreeProblem(_rows(measurements, bodies), bodies.size)
+            found, fits = judged(problem, measurements, problem.fitted(robust=robust, told=told))
+            told(1.0)
+            return TreeSolution(measurements, bodies, problem, found, fits)
+    except (np.linalg.LinAlgError, FloatingPointError):
+        far = max(abs(part) for each in measurements for part in each.components[:3])
+        raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
 
 
 def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> Rows:

@@ -10,6 +10,7 @@ from frametool.errors import ValueInvalid, printable
 from frametool.fit.graph import bridges
 from frametool.fit.measurements import best_blunder
 from frametool.fit.robust import KEPT
+from frametool.fit.tree_solver import Noise
 from frametool.fit.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ ONE_LINE = 200  # characters
 class Verdicts(NamedTuple):
     """The words for each row, and what is not settled.
 
-    noise: rows without a blunder that the doubt of the fit explains; swaps: rows to exchange, (left out, rival)
+    noise: rows without a blunder that the doubt about the fit explains; swaps: rows to exchange, (left out, rival)
     undecided: the first row of whose loop nothing tells which is wrong, with its rivals
     """
 
@@ -77,6 +78,10 @@ class _Case:
         self.poses = self.parents.inverse @ self.children
         self.errors = self.poses.errors(problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
+        noise = found.noise
+        if len(kept) <= 2 * problem.unknown:  # turns can take up all that places are off: their sigma may be far too small
+            noise = Noise(max(noise.place, Noise().place), max(noise.turn, Noise().turn), noise.factor)
+        self.least_information = problem.information(noise, noise.factor)
         self.uncertainty = Uncertainty(problem, found)
 
     def verdicts(self) -> Verdicts:
@@ -90,10 +95,11 @@ class _Case:
                 pose = self._pose_without(rival, row)
                 words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
-            doubted = self._doubted(row)
-            if not blamed and self.errors[row] @ doubted @ self.errors[row] <= 6 * KEPT**2:
+            unsure = self._beside_doubt(row, self.least_information[row])
+            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
                 noise.append(row)
             if not rivals:
+                doubted = self._beside_doubt(row, self.information[row])
                 fits[row] = words[row] or best_blunder(self.measurements[row], self.poses.at(row), doubted)
             elif blamed == [row]:
                 fits[row] = words[row]
@@ -103,12 +109,11 @@ class _Case:
                 undecided = undecided or (row, rivals)
         return Verdicts(fits, noise, swaps, undecided)
 
-    def _doubted(self, row: int) -> Array:
+    def _beside_doubt(self, row: int, information: Array) -> Array:
         """Return the information on a row beside the doubt about the pose that the fit has between its frames."""
         parent, child = self.problem.pairs[row]
         doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
-        covariance: Array = np.linalg.inv(self.information[row])
-        return self.information[row] if doubt is None else np.asarray(np.linalg.inv(covariance + doubt))
+        return information if doubt is None else np.asarray(np.linalg.inv(np.linalg.inv(information) + doubt))
 
     def _pose_without(self, rival: int, row: int) -> Poses:
         """Return the pose that a rival would measure, were the bodies that hang by it placed by a row left out."""
