@@ -79,7 +79,7 @@ class _Case:
         self.errors = self.poses.errors(problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
         noise = found.noise
-        if len(kept) <= 2 * problem.unknown:  # turns can take up all that places are off: their sigma may be far too small
+        if len(kept) <= 2 * problem.unknown:  # turns can take up all that places are off: their sigma may come out tiny
             noise = Noise(max(noise.place, Noise().place), max(noise.turn, Noise().turn), noise.factor)
         self.least_information = problem.information(noise, noise.factor)
         self.uncertainty = Uncertainty(problem, found)

@@ -24,7 +24,7 @@ from frametool.fit.measured_tree import solve_tree  # noqa: E402
 WORLDS = 60
 KINDS = [(7, 20, False), (7, 20, True), (7, 12, False), (12, 25, False), (30, 60, False), (50, 120, False)]
 SIZES = [(50, 120, 0), (50, 120, 5), (200, 500, 0), (200, 500, 20), (1000, 2500, 0), (1000, 2500, 25)]
-RUNS = 3
+RUNS = 2
 ONE = """
 import resource, sys
 from worlds import world
