@@ -1,0 +1,117 @@
+"""A measurement of one frame in another, and the blunders that people make when they write one down."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.fit.rigid_arrays import Poses
+from frametool.geometry.conventions import axes_change
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frametool.geometry.types import Array, Rigid
+
+FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
+ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
+TIE = 1e-9  # of u: what is not nearer than this explains nothing
+O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, as in papers
+
+
+class Measurement(NamedTuple):
+    """The pose of a child in its parent, as somebody measured it.
+
+    components: tx, ty, tz, x, y, z, w; metres
+    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
+    place: where it stands, `m.yaml:12`
+    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
+    """
+
+    parent: str
+    child: str
+    components: Rigid
+    covariance: tuple[float, ...] | None = None
+    place: str = ""
+    id: str | None = None
+    written: tuple[str, tuple[float, float, float]] | None = None
+
+    @property
+    def transform(self) -> Transform:
+        """Return parent_from_child."""
+        return Transform.of(*self.components)
+
+    def turned(self, x: float, y: float, z: float, w: float) -> Transform:
+        """Return it with another quaternion."""
+        return Transform.of(*self.components[:3], x, y, z, w)
+
+    def shifted(self, factor: float) -> Transform:
+        """Return it with its translation times a factor."""
+        x, y, z, *turn = self.components
+        return Transform.of(x * factor, y * factor, z * factor, *turn)
+
+    def reread(self, change: Callable[[float], float]) -> Transform | None:
+        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
+        if self.written is None:
+            return None
+        kind, angles = self.written
+        read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
+        return self.turned(*read([change(angle) for angle in angles]).components)
+
+
+def _translation_of_inverse(m: Measurement) -> Transform:
+    rotation = m.transform.rotation
+    return Transform(rotation, -rotation.apply(m.components[:3]))
+
+
+def _yaw_first(m: Measurement) -> Transform | None:
+    if m.written is None or m.written[0] != "rpy":
+        return None
+    return m.turned(*Rotation.from_rpy(m.written[1][::-1]).components)
+
+
+# what a measurement was meant to be, if this blunder was made
+BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
+    "inverted": lambda m: m.transform.inverse(),
+    "rotation inverted": lambda m: m.turned(*m.transform.rotation.inverse().components),
+    "translation of the inverse": _translation_of_inverse,
+    "wxyz taken for xyzw": lambda m: m.turned(*m.components[4:], m.components[3]),
+    "xyzw taken for wxyz": lambda m: m.turned(m.components[6], *m.components[3:6]),
+    "millimetres": lambda m: m.shifted(1e-3),
+    "metres taken for millimetres": lambda m: m.shifted(1e3),
+    "degrees taken for radians": lambda m: m.reread(math.radians),
+    "radians taken for degrees": lambda m: m.reread(math.degrees),
+    "yaw, pitch, roll taken for roll, pitch, yaw": _yaw_first,
+    "optical axes of the child": lambda m: m.transform @ O.inverse(),
+    "optical axes of the parent": lambda m: O @ m.transform,
+    "body axes of the child": lambda m: m.transform @ O,
+    "body axes of the parent": lambda m: O.inverse() @ m.transform,
+}
+
+
+def best_blunder(measurement: Measurement, pose: Poses, information: Array) -> str | None:
+    """Name the blunder that best explains a measurement of a pose; None where none does.
+
+    pose: where the child is in the parent; information: the inverse covariance (6, 6) of the measurement
+    It must bring the measurement within 4 sigmas, and nearer than it is as it stands.  Of blunders that noise cannot
+    tell from the best, the first is named: half a turn is its own inverse.
+    """
+    meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
+    tried = [*meant.values(), measurement.transform]
+    poses = Poses.of(Transform.of(*map(np.array, zip(*(each.components for each in tried), strict=True))))
+    errors = pose.at(None).errors(poses)
+    u = _sigmas(errors, information)
+    best = int(u[:-1].argmin())
+    if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
+        return None
+    as_good = (_sigmas(errors - errors[best], information) <= ALIKE) & (u <= FITTING)
+    return list(meant)[int(as_good.argmax())]
+
+
+def _sigmas(errors: Array, information: Array) -> Array:
+    squares: Array = np.einsum("ni,ij,nj->n", errors, information, errors)
+    return np.sqrt(np.maximum(squares, 0.0) / 6)

@@ -1,0 +1,311 @@
+"""Poses of bodies that fit measurements between them best, and which measurements to keep: Gauss-Newton, robust.
+
+Bodies are numbered; body 0 stands still.  A row measures a frame of one body in a frame of another:
+r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.fit.elimination import Elimination
+from frametool.fit.graph import SpanningTree, bridges, spanning_tree
+from frametool.fit.rigid_arrays import Poses, inverse_left_jacobian, skew
+from frametool.fit.robust import KEPT, LEAST, MEDIAN_OF_SIX, first_weights, median_sigma, rms_sigma
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from typing import Any
+
+    from frametool.geometry.types import Array, Indices
+
+TREES = 200
+ROWS_AT_ONCE = 20_000  # of trees that are tried together
+STEPS = 100
+REST = 1e-12  # of the extent, radians, and of a sigma: a smaller step is the last
+STEADY = 1e-4  # of a weight: the first weights are at rest
+FIRST_ROUNDS, ROUNDS = 50, 20
+LEAST_SHARE = 0.04  # of the rows in loops that the unknowns leave over
+
+
+class Noise(NamedTuple):
+    """The sigmas of the measurements that have none of their own, and how much too small given ones are."""
+
+    place: float = 0.01
+    turn: float = math.radians(1.0)
+    factor: float = 1.0
+
+
+class Rows(NamedTuple):
+    """Measurements as arrays.
+
+    parent, child: the bodies; in_parent, in_child: where the measured frames are in them
+    given: which have a covariance; information: its inverse, (n, 6, 6), zeros for the others
+    """
+
+    parent: Indices
+    child: Indices
+    in_parent: Poses
+    in_child: Poses
+    measured: Poses
+    given: Any
+    information: Array
+
+
+class Fitted(NamedTuple):
+    """Bodies that fit the kept rows best; estimated: whether these rows tell their own noise."""
+
+    bodies: Poses
+    kept: Any
+    noise: Noise
+    estimated: bool
+
+
+def identities(count: int) -> Poses:
+    """Return poses that are all at the root."""
+    return Poses(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
+
+
+def jacobians(parent: Poses, child: Poses, turned: Array) -> tuple[Array, Array]:
+    """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
+    back = np.swapaxes(parent.turns, -1, -2)
+    turn = inverse_left_jacobian(turned) @ back
+    by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
+    by_child[..., :3, :3], by_child[..., 3:, 3:] = back, turn
+    by_parent[..., :3, :3], by_parent[..., 3:, 3:] = -back, -turn
+    by_parent[..., :3, 3:] = back @ skew(child.places - parent.places)
+    return by_parent, by_child
+
+
+def of_body(jacobian: Array, body: Poses, frame: Poses) -> Array:
+    """Return the Jacobian by the step of a body from that by the step of a frame in it: the lever arm turns along."""
+    moved = jacobian.copy()
+    moved[..., 3:] -= jacobian[..., :3] @ skew(frame.places - body.places)
+    return moved
+
+
+class TreeProblem:
+    """Rows between bodies, and the poses that fit them."""
+
+    def __init__(self, rows: Rows, count: int) -> None:
+        """Order the unknown poses for elimination."""
+        self.rows, self.count, self.size = rows, count, len(rows.parent)
+        self.unknown = count - 1
+        self.pairs = list(zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
+        joined = [(a - 1, b - 1) for a, b in self.pairs if a and b]
+        self.elimination = Elimination(self.unknown, joined)
+        between = rows.parent != rows.child  # within a body a row moves nothing
+        self._of_parent = np.flatnonzero(between & (rows.parent > 0))
+        self._of_child = np.flatnonzero(between & (rows.child > 0))
+        self._of_both = np.flatnonzero(between & (rows.parent > 0) & (rows.child > 0))
+
+    def ends(self, bodies: Poses) -> tuple[Poses, Poses]:
+        """Return where the frames are that each row is between."""
+        rows = self.rows
+        return bodies.at(rows.parent) @ rows.in_parent, bodies.at(rows.child) @ rows.in_child
+
+    def errors(self, bodies: Poses) -> Array:
+        """Return the residuals, (n, 6)."""
+        parent, child = self.ends(bodies)
+        return (parent.inverse @ child).errors(self.rows.measured)
+
+    def information(self, noise: Noise, factor: float = 1.0) -> Array:
+        """Return the inverse covariances, (n, 6, 6); factor: of given sigmas."""
+        diagonal = [noise.place**-2] * 3 + [noise.turn**-2] * 3
+        return np.where(self.rows.given[:, None, None], self.rows.information / factor**2, np.diag(diagonal))
+
+    def u(self, errors: Array, noise: Noise) -> Array:
+        """Return how many sigmas each row is off: the root mean square of its six numbers."""
+        squares: Array = np.einsum("ni,nij,nj->n", errors, self.information(noise, noise.factor), errors)
+        return np.sqrt(np.maximum(squares, 0.0) / 6)
+
+    def tree(self, rows: Iterable[int]) -> SpanningTree:
+        """Return the spanning tree of the first rows that close no loop."""
+        return spanning_tree(self.count, self.pairs, rows)
+
+    # the start
+
+    def start(self, trees: int) -> Poses:
+        """Place the bodies by the spanning tree that the other rows, wrong ones too, agree with most.
+
+        Tried are the rows in their order, shuffled, and last by how well each ever closed a loop: wrong rows never do.
+        """
+        shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
+        rows = range(self.size)
+        best, least, closest = identities(self.count), math.inf, np.full(self.size, math.inf)
+        orders = [rows, *(sorted(rows, key=[shuffled.random() for _ in rows].__getitem__) for _ in range(trees - 1))]
+        at_once = max(1, ROWS_AT_ONCE // max(self.size, self.count))
+        while orders:
+            some, orders = [self.tree(order) for order in orders[:at_once]], orders[at_once:]
+            placed = self.placed(some)
+            for at, tree in enumerate(some):
+                off = np.log1p(self.u(self.errors(placed.at(at)), Noise()) ** 2)
+                if off.sum() < least:
+                    best, least = placed.at(at), off.sum()
+                off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
+                closest = np.minimum(closest, off)
+            if not orders and trees > 1:
+                orders, trees = [np.argsort(closest, kind="stable").tolist()], 1
+        return best
+
+    def placed(self, trees: list[SpanningTree]) -> Poses:
+        """Return where the rows of trees put the bodies, (trees, bodies): ways to the root by doubling."""
+        rows = self.rows
+        above, row = np.array([tree.above for tree in trees]), np.array([tree.row for tree in trees])
+        across = rows.in_parent @ rows.measured @ rows.in_child.inverse
+        forth, back = across.at(row), across.inverse.at(row)
+        down = rows.child[row] == np.arange(self.count)
+        turns = np.where(down[..., None, None], forth.turns, back.turns)
+        places = np.where(down[..., None], forth.places, back.places)
+        turns[:, 0], places[:, 0] = np.eye(3), 0.0
+        poses = Poses(turns, places)
+        each = np.arange(len(trees))[:, None]
+        while above.any():
+            poses = poses.at((each, above)) @ poses
+            above = above[each, above]
+        return poses
+
+    # Gauss-Newton
+
+    def normal_equations(self, bodies: Poses, information: Array) -> tuple[Array, Array, float]:
+        """Return J'LJ as blocks, J'Lr (unknown, 6) and r'Lr."""
+        rows, (parent, child) = self.rows, self.ends(bodies)
+        errors = (parent.inverse @ child).errors(rows.measured)
+        by_parent, by_child = jacobians(parent, child, errors[:, 3:])
+        by_parent = of_body(by_parent, bodies.at(rows.parent), parent)
+        by_child = of_body(by_child, bodies.at(rows.child), child)
+        weighed = np.einsum("nij,nj->ni", information, errors)
+        blocks, gradient = np.zeros((self.elimination.size, 6, 6)), np.zeros((self.unknown, 6))
+        sides = ((self._of_parent, rows.parent, by_parent), (self._of_child, rows.child, by_child))
+        for chosen, body, by in sides:
+            self._add(blocks, body[chosen], body[chosen], by[chosen], information[chosen], by[chosen])
+            np.add.at(gradient, body[chosen] - 1, np.einsum("nji,nj->ni", by[chosen], weighed[chosen]))
+        both = self._of_both
+        a, b, by_a, by_b = rows.parent[both], rows.child[both], by_parent[both], by_child[both]
+        self._add(blocks, a, b, by_a, information[both], by_b)
+        self._add(blocks, b, a, by_b, information[both], by_a)
+        return blocks, gradient, float((errors * weighed).sum())
+
+    def _add(self, blocks: Array, a: Indices, b: Indices, by_a: Array, information: Array, by_b: Array) -> None:
+        np.add.at(blocks, self.elimination.slots(a - 1, b - 1), by_a.swapaxes(1, 2) @ information @ by_b)
+
+    def improved(self, bodies: Poses, information: Array, damping: float) -> tuple[Poses, float, float]:
+        """Take one step, damped until it helps; returns the bodies, the size of the step and the damping."""
+        blocks, gradient, before = self.normal_equations(bodies, information)
+        every = np.arange(self.unknown)
+        diagonal = self.elimination.slots(every, every)[:, None], np.arange(6), np.arange(6)
+        extent = max(float(np.abs(bodies.places).max()), LEAST)
+        while damping < 1e12:
+            damped = blocks.copy()
+            damped[diagonal] *= 1.0 + damping
+            step = np.zeros((self.count, 6))
+            step[1:] = -self.elimination.factored(damped).solve(gradient[..., None])[..., 0]
+            moved, size = bodies.stepped(step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
+            errors = self.errors(moved)
+            after = float(np.einsum("ni,nij,nj->", errors, information, errors))
+            if size <= REST or after <= before * (1 + 1e-12):
+                return moved, size, damping / 10 if damping > 1e-9 else 0.0
+            damping = max(damping * 10, 1e-6)
+        return bodies, 0.0, 0.0
+
+    def settled(self, bodies: Poses, kept: Any, noise: Noise, *, estimate: bool) -> tuple[Poses, Noise]:
+        """Return the least squares of the kept rows, and their noise, both at rest."""
+        damping = 0.0
+        for _ in range(STEPS):
+            information = self.information(noise) * kept[:, None, None]
+            bodies, size, damping = self.improved(bodies, information, damping)
+            before, noise = noise, self.estimated(self.errors(bodies), kept, estimate=estimate)
+            changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
+            if size <= REST and max(changes) <= REST:
+                break
+        return bodies, noise
+
+    # noise, and which rows to keep
+
+    def estimated(self, errors: Array, kept: Any, *, estimate: bool) -> Noise:
+        """Return the noise of the kept rows: sums of squares over the degrees of freedom that are their share."""
+        dof = 3.0 * (kept.sum() - self.unknown)
+        if dof <= 0:
+            return Noise()
+        free, given = kept & ~self.rows.given, kept & self.rows.given
+        factor = 1.0
+        if given.any():
+            chi2 = 6 * (self.u(errors, Noise())[given] ** 2).sum()
+            factor = max(1.0, math.sqrt(chi2 / (2 * dof * given.sum() / kept.sum())))
+        if not estimate:
+            return Noise(factor=factor)
+        place, turn = (rms_sigma((part[free] ** 2).sum(), dof * free.sum() / kept.sum()) for part in _halves(errors))
+        return Noise(place, turn, factor)
+
+    def medians(self, errors: Array, looped: Any) -> Noise:
+        """Return the noise by the medians of the rows in loops."""
+        unknown = self.unknown - (self.size - looped.sum())  # every row in no loop settles one
+        share = math.sqrt(max(1 - unknown / looped.sum(), LEAST_SHARE))
+        free, given = looped & ~self.rows.given, looped & self.rows.given
+        noise = Noise()
+        if given.any():
+            factor = float(np.median(_odd(self.u(errors, noise)[given]))) / (MEDIAN_OF_SIX * share)
+            noise = noise._replace(factor=max(1.0, factor))
+        if free.any():
+            place, turn = (median_sigma(_odd(np.linalg.norm(part[free], axis=1)), share) for part in _halves(errors))
+            noise = noise._replace(place=place, turn=turn)
+        return noise
+
+    def weighed_down(self, bodies: Poses, looped: Any) -> tuple[Poses, Noise]:
+        """Return the fit with first weights and the noise by medians, both at rest."""
+        noise, weights, damping = self.medians(self.errors(bodies), looped), np.ones(self.size), 0.0
+        for _ in range(FIRST_ROUNDS):
+            before, weights = weights, first_weights(self.u(self.errors(bodies), noise))
+            bodies, _, damping = self.improved(bodies, self.information(noise) * weights[:, None, None], damping)
+            noise = self.medians(self.errors(bodies), looped)
+            if np.abs(weights - before).max() < STEADY:
+                break
+        return bodies, noise
+
+    def fitted(self, *, robust: bool, told: Callable[[float], None]) -> Fitted:
+        """Keep the rows that agree, or all, and fit them by plain least squares."""
+        every = range(self.size)
+        bodies, noise = self.start(TREES if robust and self.size > self.unknown else 1), Noise()
+        told(0.3)
+        kept = np.ones(self.size, bool)
+        looped = kept.copy()
+        looped[list(bridges(self.tree(every), self.pairs, every))] = False
+        if robust and looped.any():
+            bodies, noise = self.weighed_down(bodies, looped)
+            kept = self.u(self.errors(bodies), noise) <= KEPT
+        told(0.6)
+        return self.selected(bodies, kept, noise, robust=robust)
+
+    def selected(self, bodies: Poses, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
+        """Fit the kept rows and test all of them again, until the set stays."""
+        for _ in range(ROUNDS):
+            found = self.refitted(bodies, kept, noise)
+            kept, (bodies, _, noise, _) = self.u(self.errors(found.bodies), found.noise) <= KEPT, found
+            if not robust or (kept == found.kept).all():
+                break
+        return found
+
+    def refitted(self, bodies: Poses, kept: Any, noise: Noise) -> Fitted:
+        """Fit the kept rows, and the nearest of the others where frames would be cut off without."""
+        u = self.u(self.errors(bodies), noise)
+        tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
+        reached = np.isin(np.arange(self.size), tree.row)
+        if (reached & ~kept).any():
+            kept, bodies = kept | reached, self.placed([tree]).at(0)
+        alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
+        estimate = bool((kept & ~alone & ~self.rows.given).any()) and kept.sum() > self.unknown
+        bodies, noise = self.settled(bodies, kept, noise, estimate=estimate)
+        return Fitted(bodies, kept, noise, estimate)
+
+
+def _halves(errors: Array) -> tuple[Array, Array]:
+    return errors[:, :3], errors[:, 3:]
+
+
+def _odd(values: Array) -> Array:
+    """Return an odd number of values, the largest left out if need be: of two rows that disagree one is wrong."""
+    return values if len(values) % 2 else np.sort(values)[:-1]
