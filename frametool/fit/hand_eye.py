@@ -18,10 +18,11 @@ from frametool.fit.rigid_arrays import log as rotvecs_of
 from frametool.fit.robust import KEPT, LEAST, draws, fitted_sigmas, lengths, settled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
+    from frametool.fit.robust import Mask, Rows
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array
+    from frametool.geometry.types import Array, Indices
 
 NAMES = ("base", "gripper", "camera", "target")
 FEWEST = 3  # samples
@@ -53,7 +54,7 @@ class HandEye(NamedTuple):
     covariance_x: Array
     covariance_z: Array
     noise_at: str | None
-    used: Array
+    used: Mask
     u: Array
     residuals: Array
     sigma: tuple[float, float]
@@ -111,7 +112,7 @@ def solve_hand_eye(
     if turns.rms[0] < KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
-    covariance = np.linalg.inv(model.hessian)
+    covariance = np.asarray(np.linalg.inv(model.hessian), float)
     return HandEye(
         model.x.transform.canonical(),
         model.z.transform.canonical(),
@@ -162,7 +163,7 @@ class _Samples(NamedTuple):
     gripper: Poses
     camera: Poses
 
-    def at(self, index: Array | list[int]) -> _Samples:
+    def at(self, index: Rows) -> _Samples:
         return _Samples(self.gripper.at(index), self.camera.at(index))
 
     def residuals(self, model: _Model) -> Array:
@@ -177,7 +178,8 @@ class _Samples(NamedTuple):
         now, gradient = self._linear(model, weights)
         damping = UNDAMPED
         for _ in range(steps):
-            step = -np.linalg.solve(now.hessian + damping * np.diag(np.diag(now.hessian)), gradient)
+            bent = now.hessian + damping * np.diag(np.diag(now.hessian))
+            step = -np.asarray(np.linalg.solve(bent, gradient), float)
             moved = now._replace(x=now.x.stepped(step[:6]), z=now.z.stepped(step[6:]))
             tried, its_gradient = self._linear(moved, weights)
             if tried.misfit <= now.misfit + DONE:
@@ -223,7 +225,8 @@ def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     """Return the best closed form of all samples and of draws of few, with the medians of its errors."""
     count = len(samples.gripper.places)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
-    for few in chain([slice(None)], draws(DRAWS * robust, min(DRAWN, count - 1), count)):
+    fives: Iterable[Rows] = draws(DRAWS * robust, min(DRAWN, count - 1), count)
+    for few in chain([slice(None)], fives):
         chosen = samples.at(few)
         if _turns(chosen.gripper).rms[1] < FLAT:
             continue
@@ -253,7 +256,7 @@ def park_martin(gripper: Poses, camera: Poses) -> Poses:
     return Poses(turn, place)
 
 
-def _pairs(count: int) -> tuple[Array, Array]:
+def _pairs(count: int) -> tuple[Indices, Indices]:
     """Return all pairs of samples, or those of some that are drawn."""
     chosen = np.arange(count) if count <= MOST else np.array(next(draws(1, MOST, count)))
     i, j = np.triu_indices(len(chosen), 1)
@@ -295,10 +298,8 @@ def _slight(turns: _Turns, holder: str) -> list[str]:
     return [f"turns about a second axis are small ({degrees(second):.1f} deg rms beside {axis} in {holder}): turn more"]
 
 
-def _require_this_way(
-    medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool
-) -> None:
-    if (BETTER * others <= medians).all():
+def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool) -> None:
+    if (others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
         raise ValueInvalid(
             f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
             f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"

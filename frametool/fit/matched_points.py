@@ -16,12 +16,16 @@ from frametool.geometry import validation
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frametool.fit.robust import Mask, Rows
     from frametool.geometry.types import Array, Numbers
 
 FEWEST = 3
 FEWEST_ROBUST = 5  # three always fit, so that four cannot say which of them is wrong
 TRIPLES = 500
 MOST = 2000  # points that a triple is tried on
+ROUNDING = 1e-12  # of the largest coordinate: no distance is known better
 BETTER = 5.0  # times: a scale or a mirror that fits so much better is what happened
 UNITS = {1000.0: "millimetres?", 100.0: "centimetres?"}
 ABOUT = 0.05  # of a scale: still that of a unit
@@ -41,8 +45,8 @@ class PointsFit(NamedTuple):
     scale: float
     scale_sigma: float | None
     covariance: Array
-    used: Array
-    left_out: Array
+    used: Mask
+    left_out: Mask
     residuals: Array
     u: Array
     sigma: float
@@ -120,7 +124,7 @@ class _Pairs(NamedTuple):
     source: Array
     mass: Array
 
-    def at(self, index: Array | list[int]) -> _Pairs:
+    def at(self, index: Rows) -> _Pairs:
         return _Pairs(*(part[index] for part in self))
 
     def fitted(self, *, with_scale: bool, weights: Array | float = 1.0) -> Fit:
@@ -139,14 +143,15 @@ class _Pairs(NamedTuple):
         seen = self.at(next(draws(1, MOST, count))) if count > MOST else self
         middle = min(max(len(seen.mass) // 2, 3), len(seen.mass) - 1)
         best = (np.inf, Fit(IDENTITY))
-        for few in chain([slice(None)], draws(TRIPLES * robust, 3, count)):
+        triples: Iterable[Rows] = draws(TRIPLES * robust, 3, count)
+        for few in chain([slice(None)], triples):
             chosen = self.at(few)
-            if few != slice(None) and chosen.is_line():
+            if chosen.is_line():
                 continue
             fit = chosen.fitted(with_scale=with_scale)
             off = (seen.weighted_residuals(fit) ** 2).sum(1)
             best = min(best, (float(np.partition(off, middle)[middle]), fit), key=lambda each: each[0])
-        return best[1], max(sqrt(best[0]), STILL * (1.0 + np.abs(self.target).max()))
+        return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
 
     def is_line(self) -> bool:
         """Say whether target or source lie on a line, or in one place."""

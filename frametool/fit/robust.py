@@ -13,8 +13,14 @@ import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
 
     from frametool.geometry.types import Array
+
+    Mask: TypeAlias = NDArray[np.bool_]
+    Rows: TypeAlias = slice | list[int] | Mask
 
 Model = TypeVar("Model")
 
@@ -45,7 +51,7 @@ class Settled(NamedTuple, Generic[Model]):
     """A fit of the rows kept: residuals of all (n, 3 or 6), a sigma for each three of them, and u of all."""
 
     model: Model
-    kept: Array
+    kept: Mask
     residuals: Array
     sigmas: Array
     u: Array
@@ -101,7 +107,7 @@ def deviations(residuals: Array, sigmas: Array) -> Array:
     return found
 
 
-def fitted_sigmas(residuals: Array, weights: Array, unknown: int) -> Array:
+def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:
     """Return the sigma of each three numbers of weighted rows that share so many unknown ones."""
     dof = max(3.0 * weights.sum() - unknown, 1.0)
     return np.array([rms_sigma(squares, dof) for squares in weights @ lengths(residuals) ** 2])

@@ -12,6 +12,7 @@ from frametool.geometry import validation
 from frametool.geometry.spread import Spread, mean_and_spread
 
 if TYPE_CHECKING:
+    from frametool.fit.robust import Mask
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Numbers
 
@@ -24,17 +25,16 @@ class MeanFit(NamedTuple):
 
     used: which were kept; left_out: which were not, though they have a weight; u: how many sigmas each is off
     residuals: [t_i - t, Log(R_i R')], (n, 6); sigma: of each axis of a pose of weight 1, metres and radians
-    count: of those used; dof: 3 n - 3 for each sigma; covariance: of one pose, 6x6 as ROS has it, None of one alone
+    dof: 3 n - 3 of those used, for each sigma; covariance: of one pose, 6x6 as ROS has it, None of one alone
     """
 
     transform: Transform
     spread: Spread
-    used: Array
-    left_out: Array
+    used: Mask
+    left_out: Mask
     u: Array
     residuals: Array
     sigma: tuple[float, float]
-    count: int
     dof: int
     covariance: Array | None
 
@@ -49,7 +49,7 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
     counts = mass > 0.0
     heavy, rows, roots = poses[counts], Poses.of(poses[counts]), np.sqrt(mass[counts])[:, None]
 
-    def mean(kept: Array) -> tuple[Transform, Spread]:
+    def mean(kept: Array | Mask) -> tuple[Transform, Spread]:
         chosen = kept > 0.0
         return mean_and_spread(heavy[chosen], None if weights is None else mass[counts][chosen])
 
@@ -78,7 +78,6 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
         np.sqrt(mass / 6.0) * np.sqrt((lengths(off) ** 2 / found.sigmas**2).sum(1)),
         off,
         (s_t, s_r),
-        count,
         3 * count - 3,
         kept.T @ kept / mass[used].mean() / (count - 1) if count > 1 else None,
     )
