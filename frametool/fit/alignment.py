@@ -78,6 +78,7 @@ def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale:
     r, e = ref - ref_mean, est - est_mean
     u, d, v = np.linalg.svd(r.T * mass @ e / mass.sum())
     s = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(v))])
+    e = e - np.average(e, 0, weights)  # what rounding left of the mean
     scale = float(d @ s / np.average(e**2, 0, weights).sum()) if with_scale else 1.0
     rotation = Rotation.from_matrix(u * s @ v, normalize=True)
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
