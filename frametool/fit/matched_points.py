@@ -113,7 +113,7 @@ def solve_points(
         sigma,
         3 * int(kept.sum()) - 6 - scale,
         float(np.sqrt((residuals[used] ** 2).sum(1).mean())),
-        hints + pairs.at(kept).line_hints(sigma),
+        hints + pairs.at(kept).line_hints(sigma, covariance),
     )
 
 
@@ -180,12 +180,12 @@ class _Pairs(NamedTuple):
         unit = next((unit for unit in UNITS if abs(ratio / unit - 1.0) < ABOUT), ratio)
         return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
 
-    def line_hints(self, sigma: float) -> list[str]:
+    def line_hints(self, sigma: float, covariance: Array) -> list[str]:
         """Say of points that lie nearly on a line that the turn about it is uncertain."""
-        first, second, _ = principal_axes(self.source)
+        first, second, _ = principal_axes(self.target)
         if not second < KEPT * sigma < first:
             return []
-        turn = degrees(sigma / (second * sqrt(len(self.mass))))
+        turn = degrees(sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
         return [f"the points lie nearly on a line: the turn about it is uncertain (sigma {turn:.1f} deg)"]
 
     def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
