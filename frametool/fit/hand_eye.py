@@ -15,7 +15,7 @@ import numpy as np
 from frametool.errors import ValueInvalid
 from frametool.fit.rigid_arrays import Poses, inverse_left_jacobian, skew
 from frametool.fit.rigid_arrays import log as rotvecs_of
-from frametool.fit.robust import KEPT, LEAST, draws, fitted_sigmas, lengths, settled
+from frametool.fit.robust import KEPT, LEAST, draws, fitted_sigmas, lengths, require_near, settled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -28,12 +28,13 @@ NAMES = ("base", "gripper", "camera", "target")
 FEWEST = 3  # samples
 FEWEST_ROBUST = 5  # fewer cannot say which of them is wrong
 DRAWS, DRAWN = 60, 5
-MOST = 150  # samples whose pairs are all looked at
+MOST = 10_000  # pairs that are looked at, or one of each sample
 STEPS, ROUGH_STEPS = 100, 4
 DONE = 1e-12  # of the extent, and radians
 STUCK = 1e9  # damping
 UNDAMPED = 1e-12
 BETTER = 5.0  # times: what fits so much better is what was meant
+CLEARLY = 2.0  # times, that both metres and radians must be better
 FLAT, FLAT_SHARE = radians(0.5), 0.02  # turns about the second axis: none, also as a part of those about the first
 SLIGHT = radians(5.0)
 CLEAR = (radians(1.0), radians(175.0))  # turns of a pair whose axis is certain
@@ -83,6 +84,8 @@ def solve_hand_eye(
     if (count := len(gripper)) < FEWEST:
         raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
     given, camera = Poses.of(gripper), Poses.of(target)
+    require_near(given.places, "gripper")
+    require_near(camera.places, "target")
     hand = given.inverse if eye_to_hand else given
     samples, other = _Samples(hand, camera), _Samples(hand.inverse, camera)
     holder = names[0] if eye_to_hand else names[1]
@@ -127,7 +130,7 @@ def solve_hand_eye(
         float(rms[0]),
         float(rms[1]),
         turns.rms,
-        _slight(turns, holder),
+        _slight(turns, holder) + _scale_warnings(samples.at(found.kept), model.x),
     )
 
 
@@ -243,31 +246,53 @@ def park_martin(gripper: Poses, camera: Poses) -> Poses:
     A and B are the motions of gripper and camera between two samples: R_X turns the rotation vectors of B onto those
     of A, and (R_A - I) t_X = R_X t_B - t_A.
     """
-    i, j = _pairs(len(gripper.places))
-    a, b = gripper.at(i).inverse @ gripper.at(j), camera.at(i) @ camera.at(j).inverse
+    a, b = _motions(gripper, camera)
     alpha, beta = rotvecs_of(a.turns), rotvecs_of(b.turns)
     angle = np.linalg.norm(alpha, axis=1)
     if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
         a, b, alpha, beta = a.at(clear), b.at(clear), alpha[clear], beta[clear]
     u, _, v = np.linalg.svd(alpha.T @ beta)
     turn = u * [1.0, 1.0, np.sign(np.linalg.det(u @ v))] @ v
-    wanted = b.places @ turn.T - a.places
-    place = np.linalg.lstsq((a.turns - np.eye(3)).reshape(-1, 3), wanted.reshape(-1), rcond=None)[0]
+    place, _ = _least_squares((a.turns - np.eye(3)).reshape(-1, 3), (b.places @ turn.T - a.places).reshape(-1))
     return Poses(turn, place)
 
 
+def _motions(gripper: Poses, camera: Poses) -> tuple[Poses, Poses]:
+    i, j = _pairs(len(gripper.places))
+    return gripper.at(i).inverse @ gripper.at(j), camera.at(i) @ camera.at(j).inverse
+
+
+def _scale_warnings(samples: _Samples, x: Poses) -> list[str]:
+    """Say of a factor on the target's places that would fit much better which: (R_A - I) t_X - s R_X t_B = -t_A."""
+    a, b = _motions(*samples)
+    lever, turned = (a.turns - np.eye(3)).reshape(-1, 3), (b.places @ x.turns.T).reshape(-1)
+    place, plain = _least_squares(lever, turned - a.places.reshape(-1))
+    place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.places.reshape(-1))
+    if place[3] <= 0.0 or plain <= max(BETTER * scaled, LEAST):
+        return []
+    return [f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"]
+
+
+def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
+    """Return the least-squares solution, and how long what it leaves is."""
+    found: Array = np.linalg.lstsq(slopes, wanted, rcond=None)[0]
+    return found, float(np.linalg.norm(slopes @ found - wanted))
+
+
 def _pairs(count: int) -> tuple[Indices, Indices]:
-    """Return all pairs of samples, or those of some that are drawn."""
-    chosen = np.arange(count) if count <= MOST else np.array(next(draws(1, MOST, count)))
-    i, j = np.triu_indices(len(chosen), 1)
-    return chosen[i], chosen[j]
+    """Return all pairs of samples; of many each with those that follow it at some distances that are drawn."""
+    if count * count <= 2 * MOST:
+        return np.triu_indices(count, 1)
+    lags = np.array(next(draws(1, max(MOST // count, 1), count - 1))) + 1
+    i = np.tile(np.arange(count), len(lags))
+    return i, (i + np.repeat(lags, count)) % count
 
 
 class _Turns(NamedTuple):
-    """Turns of pairs of samples: rms about their first and second axis, radians, and the first axis."""
+    """Turns of pairs of samples: rms about their first and second axis, radians, and the first axis as text."""
 
     rms: tuple[float, float]
-    axis: Array
+    axis: str
 
 
 def _turns(gripper: Poses) -> _Turns:
@@ -276,7 +301,7 @@ def _turns(gripper: Poses) -> _Turns:
     squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))
     axis = axes[:, 2] * np.sign(axes[np.abs(axes[:, 2]).argmax(), 2])
     _, second, first = np.sqrt(np.maximum(squares, 0.0)).tolist()
-    return _Turns((first, second), axis)
+    return _Turns((first, second), " ".join(f"{part:.3f}" for part in np.round(axis, 3) + 0.0))
 
 
 def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> None:
@@ -284,9 +309,8 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
     if first < FLAT:
         raise ValueInvalid(f"{holder} does not turn ({degrees(first):.2f} deg); hand-eye needs turns about two axes")
     if second < max(FLAT, FLAT_SHARE * first, KEPT * s_r * sqrt(2.0)):
-        axis = " ".join(f"{part + 0.0:.3f}" for part in np.round(turns.axis, 3))
         raise ValueInvalid(
-            f"all turns are about one axis ({axis} in {holder}): where {camera} is along it cannot be known; "
+            f"all turns are about one axis ({turns.axis} in {holder}): where {camera} is along it cannot be known; "
             "turn about a second one"
         )
 
@@ -294,12 +318,12 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
 def _slight(turns: _Turns, holder: str) -> list[str]:
     if (second := turns.rms[1]) >= SLIGHT:
         return []
-    axis = " ".join(f"{part + 0.0:.3f}" for part in np.round(turns.axis, 3))
-    return [f"turns about a second axis are small ({degrees(second):.1f} deg rms beside {axis} in {holder}): turn more"]
+    small = f"{degrees(second):.1f} deg rms beside {turns.axis} in {holder}"
+    return [f"turns about a second axis are small ({small}): turn more"]
 
 
 def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool) -> None:
-    if (others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
+    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
         raise ValueInvalid(
             f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
             f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"

@@ -11,7 +11,7 @@ import numpy as np
 from frametool.errors import ValueInvalid
 from frametool.fit.alignment import STILL, THIN, Fit, principal_axes, umeyama
 from frametool.fit.rigid_arrays import skew
-from frametool.fit.robust import KEPT, draws, settled
+from frametool.fit.robust import KEPT, draws, require_near, settled
 from frametool.geometry import validation
 from frametool.geometry.transform import Transform
 
@@ -214,5 +214,8 @@ def _residuals(fit: Fit, target: Array, source: Array) -> Array:
 
 def _points(given: Numbers, name: str) -> Array:
     xyz = np.stack(np.atleast_1d(*validation.columns(given, 3, name)), -1)
+    if xyz.ndim != 2:
+        raise ValueInvalid(f"{name}: expected shape (n, 3), got {xyz.shape}")
     validation.all_finite((xyz,), name)
+    require_near(xyz, name)
     return xyz

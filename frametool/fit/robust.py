@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from frametool.errors import ValueInvalid
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import TypeAlias
@@ -29,9 +31,16 @@ CERTAIN = 2.5  # sigmas: up to here a first weight is 1
 MEDIAN_OF_THREE = 1.538  # the median of |r| of three numbers of deviation 1: the root of that of chi2 with 3 degrees
 MEDIAN_OF_SIX = 0.944  # the median of u of six numbers: the root of that of chi2 with 6 degrees, over 6
 LEAST = 1e-9  # metres, radians: no sigma is below
+FARTHEST = 1e100  # metres: sums of squares stay finite
 STEADY = 1e-3  # change of a first weight that is rest
 FIRST_ROUNDS = 30
 ROUNDS = 20  # of leaving out and taking back; in the second half nothing more is left out, so that they end
+
+
+def require_near(places: Array, name: str) -> None:
+    """Refuse places whose squares would overflow."""
+    if (farthest := np.abs(places).max(initial=0.0)) > FARTHEST:
+        raise ValueInvalid(f"{name}: a place at {farthest:.3g} m; at most {FARTHEST:.0e} m can be fitted")
 
 
 def draws(count: int, size: int, among: int) -> Iterator[list[int]]:

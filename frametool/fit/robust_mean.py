@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.errors import ValueInvalid
 from frametool.fit.rigid_arrays import Poses
-from frametool.fit.robust import LEAST, draws, lengths, settled
+from frametool.fit.robust import LEAST, draws, lengths, require_near, settled
 from frametool.geometry import validation
 from frametool.geometry.spread import Spread, mean_and_spread
 
@@ -45,6 +46,9 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
     weights: (n,), in proportion to 1 / variance; a pose of weight 0 counts for nothing
     Raises ValueInvalid where there is no pose, or no mean.
     """
+    if len(poses.shape) != 1:
+        raise ValueInvalid(f"poses: expected shape (n,), got {poses.shape}")
+    require_near(poses.xyz, "poses")
     mass = validation.masses(weights, poses.shape)
     counts = mass > 0.0
     heavy, rows, roots = poses[counts], Poses.of(poses[counts]), np.sqrt(mass[counts])[:, None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -267,3 +268,28 @@ def test_samples_the_other_way_round(inverted: str, turn: float, wrong: int) -> 
 def test_samples_that_do_not_belong_together(count: int) -> None:
     with pytest.raises(ValueInvalid, match=r"^the samples do not fit \(.* mm .* deg\); does each row of GRIPPER belong to that of TARGET\?$"):
         solve_hand_eye(Transform.random(count, seed=1), Transform.random(count, seed=2))
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1000.0, "0.001"), (0.001, "1000"), (1.1, "0.909")])
+def test_places_in_another_unit_are_told(factor: float, told: str) -> None:
+    made = rig("target", seed=3, noise=(1e-4, 2e-4))
+    found = solve_hand_eye(made.gripper, Transform(made.target.rotation, factor * made.target.xyz))
+    (warning,) = found.warnings
+    assert re.fullmatch(r"TARGET fits better with its places times [\d.]+: another unit, or the size of a marker\?", warning)
+    assert float(warning.split()[7].rstrip(":")) == pytest.approx(float(told), rel=2e-3)
+
+
+@pytest.mark.parametrize("eye_to_hand", [False, True])
+def test_a_world_far_away_costs_no_digits_that_floats_have(eye_to_hand: bool) -> None:  # noqa: FBT001
+    made = rig("target", seed=1, wrong=2)
+    far = Transform(Rotation.identity(), [690_000.0, 5_330_000.0, 500.0]) @ made.gripper
+    plain = solved(made)
+    found = solve_hand_eye(far.inverse() if eye_to_hand else far, made.target, eye_to_hand=eye_to_hand)
+    assert found.x.is_close(plain.x, angle=1e-7, distance=1e-7)
+    assert (found.used == plain.used).all()
+
+
+def test_places_whose_squares_overflow() -> None:
+    made = rig(None, seed=0)
+    with pytest.raises(ValueInvalid, match=r"^target: a place at .*e\+20\d m; at most 1e\+100 m can be fitted$"):
+        solve_hand_eye(made.gripper, Transform(made.target.rotation, 1e202 * made.target.xyz))

@@ -242,6 +242,8 @@ def test_the_hint_has_the_names_of_the_sets() -> None:
     [
         ({"source": np.ones((11, 3))}, "target has 12 points, source 11"),
         ({"source": np.ones((12, 2))}, "source: expected shape (..., 3), got (12, 2)"),
+        ({"target": np.ones((2, 6, 3))}, "target: expected shape (n, 3), got (2, 6, 3)"),
+        ({"target": np.full((12, 3), 1e200)}, "target: a place at 1e+200 m; at most 1e+100 m can be fitted"),
         ({"weights": np.ones(11)}, "weights: expected shape (12,), got (11,)"),
         ({"weights": -np.ones(12)}, "weights: expected none negative and not all 0"),
     ],
