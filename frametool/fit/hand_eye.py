@@ -15,7 +15,7 @@ import numpy as np
 from frametool.errors import ValueInvalid
 from frametool.fit.rigid_arrays import Poses, inverse_left_jacobian, skew
 from frametool.fit.rigid_arrays import log as rotvecs_of
-from frametool.fit.robust import KEPT, LEAST, draws, fitted_sigmas, lengths, require_near, settled
+from frametool.fit.robust import KEPT, LEAST, deviations, draws, fitted_sigmas, lengths, require_near, settled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 NAMES = ("base", "gripper", "camera", "target")
 FEWEST = 3  # samples
 FEWEST_ROBUST = 5  # fewer cannot say which of them is wrong
+FEWEST_APART = 4  # of three the turns alone can fit all places: metres count beside radians as in the closed form
+FEWEST_CERTAIN = 6  # fewer leave the sigmas rough: at 8 they are within a few per cent on average
 DRAWS, DRAWN = 60, 5
 MOST = 10_000  # pairs that are looked at, or one of each sample
 STEPS, ROUGH_STEPS = 100, 4
@@ -98,8 +100,10 @@ def solve_hand_eye(
         if (kept := weights > 0.0).sum() < FEWEST:
             raise _unfitting(medians)
         _require_two_axes(_turns(hand.at(kept)), 0.0, holder, names[2])
-        fits = (samples.fitted(model._replace(cut=cut), weights, STEPS) for cut in CUTS)
-        return min(fits, key=lambda fit: fit.misfit)
+        models = (model._replace(cut=cut) for cut in CUTS)
+        if kept.sum() < FEWEST_APART:
+            models = (start._replace(cut=cut, ratio=samples.sigmas(start._replace(cut=cut), weights)) for cut in CUTS)
+        return min((samples.fitted(each, weights, STEPS) for each in models), key=lambda fit: fit.misfit)
 
     found = settled(
         start,
@@ -109,13 +113,15 @@ def solve_hand_eye(
         unknown=6,
         robust=robust,
     )
-    model, s_t, s_r = found.model, *map(float, found.sigmas)
+    model = found.model
+    s_t, s_r = model.sigmas.tolist()
     rms = np.sqrt((lengths(found.residuals[found.kept]) ** 2).mean(0))
     turns = _turns(hand.at(found.kept))
     if turns.rms[0] < KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = np.asarray(np.linalg.inv(model.hessian), float)
+    count = int(found.kept.sum())
     return HandEye(
         model.x.transform.canonical(),
         model.z.transform.canonical(),
@@ -123,23 +129,28 @@ def solve_hand_eye(
         covariance[6:, 6:],
         None if s_t == s_r == LEAST else "base" if eye_to_hand and model.cut == "gripper" else model.cut,
         found.kept,
-        found.u,
+        deviations(found.residuals, model.sigmas),
         found.residuals,
         (s_t, s_r),
-        3 * int(found.kept.sum()) - 6,
+        3 * count - 6,
         float(rms[0]),
         float(rms[1]),
         turns.rms,
-        _slight(turns, holder) + _scale_warnings(samples.at(found.kept), model.x),
+        _warnings(turns, count, holder) + _scale_warnings(samples.at(found.kept), model.x),
     )
 
 
 class _Model(NamedTuple):
-    """X and Z, where the noise is, and what a fit with it knows: its Hessian (12, 12) and 2 ln s_t + 2 ln s_r."""
+    """X and Z, where the noise is, and what a fit with it knows: sigmas, its Hessian (12, 12) and 2 ln s_t + 2 ln s_r.
+
+    ratio: sigmas that the fit may only scale
+    """
 
     x: Poses
     z: Poses
     cut: str = "target"
+    ratio: Array | None = None
+    sigmas: Array = np.ones(2)
     hessian: Array = np.eye(12)
     misfit: float = 0.0
 
@@ -174,6 +185,10 @@ class _Samples(NamedTuple):
         loop = CUTS[model.cut](*self, model.x, model.z)
         return _errors(loop, model.x)
 
+    def sigmas(self, model: _Model, weights: Array) -> Array:
+        """Return s_t and s_r of the errors of a model."""
+        return fitted_sigmas(self.residuals(model), weights, 6)
+
     def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
         """Minimise ln S_t + ln S_r by Gauss-Newton steps with sigmas that follow, damped where one does not help."""
         extent = max(np.abs(poses.places).max() for poses in self)
@@ -198,11 +213,13 @@ class _Samples(NamedTuple):
         loop = CUTS[model.cut](*self, model.x, model.z)
         errors = _errors(loop, model.x)
         sigmas = fitted_sigmas(errors, weights, 6)
+        if model.ratio is not None:
+            sigmas = model.ratio * np.sqrt(((sigmas / model.ratio) ** 2).mean())
         shares = (np.repeat(sigmas, 3) ** -2 * weights[:, None]).reshape(-1)
         slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
         weighted = slopes.T * shares
         misfit = 2.0 * float(np.log(sigmas).sum())
-        return model._replace(hessian=weighted @ slopes, misfit=misfit), weighted @ errors.reshape(-1)
+        return model._replace(sigmas=sigmas, hessian=weighted @ slopes, misfit=misfit), weighted @ errors.reshape(-1)
 
 
 def _errors(loop: _Loop, x: Poses) -> Array:
@@ -275,7 +292,7 @@ def _scale_warnings(samples: _Samples, x: Poses) -> list[str]:
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
     """Return the least-squares solution, and how long what it leaves is."""
-    found: Array = np.linalg.lstsq(slopes, wanted, rcond=None)[0]
+    found = np.asarray(np.linalg.lstsq(slopes, wanted, rcond=None)[0], float)
     return found, float(np.linalg.norm(slopes @ found - wanted))
 
 
@@ -315,11 +332,14 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
         )
 
 
-def _slight(turns: _Turns, holder: str) -> list[str]:
-    if (second := turns.rms[1]) >= SLIGHT:
-        return []
-    small = f"{degrees(second):.1f} deg rms beside {turns.axis} in {holder}"
-    return [f"turns about a second axis are small ({small}): turn more"]
+def _warnings(turns: _Turns, count: int, holder: str) -> list[str]:
+    told = []
+    if turns.rms[1] < SLIGHT:
+        small = f"{degrees(turns.rms[1]):.1f} deg rms beside {turns.axis} in {holder}"
+        told.append(f"turns about a second axis are small ({small}): turn more")
+    if count < FEWEST_CERTAIN:
+        told.append(f"{count} samples say little of their own noise: the sigmas are rough; take 8 or more")
+    return told
 
 
 def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool) -> None:

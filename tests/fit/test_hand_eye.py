@@ -293,3 +293,14 @@ def test_places_whose_squares_overflow() -> None:
     made = rig(None, seed=0)
     with pytest.raises(ValueInvalid, match=r"^target: a place at .*e\+20\d m; at most 1e\+100 m can be fitted$"):
         solve_hand_eye(made.gripper, Transform(made.target.rotation, 1e202 * made.target.xyz))
+
+
+def test_three_samples_do_not_look_certain() -> None:
+    sizes = []
+    for seed in range(15):
+        made = rig("target", seed=seed, count=3)
+        found = solved(made)
+        off = np.array([*(found.x.xyz - made.x.xyz), *(found.x.rotation @ made.x.rotation.inverse()).as_rotvec()])
+        sizes.append(off @ np.linalg.solve(found.covariance_x, off) / 6)
+        assert found.warnings[-1] == "3 samples say little of their own noise: the sigmas are rough; take 8 or more"
+    assert 0.2 < np.median(sizes) < 5.0
