@@ -120,7 +120,8 @@ def solve_hand_eye(
     if turns.rms[0] < KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
-    covariance = np.asarray(np.linalg.inv(model.hessian), float)
+    inverse = np.asarray(np.linalg.inv(model.hessian), float)
+    covariance = (inverse + inverse.T) / 2.0
     count = int(found.kept.sum())
     return HandEye(
         model.x.transform.canonical(),

@@ -204,7 +204,7 @@ class _Pairs(NamedTuple):
         levers[:3, 3:] = skew(fit.scale * lever)
         found = levers[:, 3:] @ of_turn @ levers[:, 3:].T
         found[:3, :3] += np.eye(3) / mass.sum() + of_scale * np.outer(lever, lever)
-        return sigma**2 * found, sigma * sqrt(of_scale) if with_scale else None
+        return sigma**2 / 2.0 * (found + found.T), sigma * sqrt(of_scale) if with_scale else None
 
 
 def _residuals(fit: Fit, target: Array, source: Array) -> Array:

@@ -49,6 +49,7 @@ def test_least_squares_are_those_of_scipy(name: str) -> None:
     assert found.rms_distance == pytest.approx(case["rms_distance"], abs=3e-8)
     assert found.rms_angle == pytest.approx(case["rms_angle"], abs=3e-8)
     for side, covariance in (("x", found.covariance_x), ("z", found.covariance_z)):
+        assert (covariance == covariance.T).all()
         wanted = case[side]
         assert getattr(found, side).is_close(Transform.from_arrays(wanted["xyz"], wanted["xyzw"], normalize=True), angle=3e-8, distance=3e-8)
         if wanted["covariance"] is not None:

@@ -47,6 +47,7 @@ def test_least_squares_are_those_of_scipy(name: str) -> None:
     there = np.array(case["pose"]["covariance"]).reshape(6, 6)
     deviations = np.outer(np.sqrt(np.diag(there)), np.sqrt(np.diag(there)))
     np.testing.assert_allclose(found.covariance / deviations, there / deviations, atol=1e-9)
+    assert (found.covariance == found.covariance.T).all()
     assert found.hints == []
 
 
