@@ -52,7 +52,7 @@ def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[
         return _yaw(ref.xyz, est.xyz, up, names)
     for name, each in zip(names, (ref, est), strict=True):
         _require_plane(kind, each.xyz, name)
-    return _umeyama(ref.xyz, est.xyz, with_scale=kind == "sim3")
+    return umeyama(ref.xyz, est.xyz, with_scale=kind == "sim3")
 
 
 def principal_axes(xyz: Array) -> Array:
@@ -71,12 +71,15 @@ def _require_plane(kind: str, xyz: Array, name: str) -> None:
         raise Unaligned(f"{name} lies on a line: the turn about it is free; --align yaw, origin or none")
 
 
-def _umeyama(ref: Array, est: Array, *, with_scale: bool) -> Fit:
-    """Minimise the sum of |c R e + t - r|^2; source: Umeyama 1991, equations 38 to 43."""
-    ref_mean, est_mean = ref.mean(0), est.mean(0)
-    u, d, v = np.linalg.svd((ref - ref_mean).T @ (est - est_mean) / len(ref))
+def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool) -> Fit:
+    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991, equations 38 to 43."""
+    mass = np.ones(len(ref)) if weights is None else weights
+    ref_mean, est_mean = np.average(ref, 0, weights), np.average(est, 0, weights)
+    r, e = ref - ref_mean, est - est_mean
+    u, d, v = np.linalg.svd(r.T * mass @ e / mass.sum())
     s = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(v))])
-    scale = float(d @ s / (est - est_mean).var(0).sum()) if with_scale else 1.0
+    e = e - np.average(e, 0, weights)  # what rounding left of the mean
+    scale = float(d @ s / np.average(e**2, 0, weights).sum()) if with_scale else 1.0
     rotation = Rotation.from_matrix(u * s @ v, normalize=True)
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
 

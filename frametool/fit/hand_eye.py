@@ -1,0 +1,359 @@
+"""Where a camera is on a hand, or beside a robot: G X C = Z solved for X and Z from pairs of poses.
+
+G: base_from_gripper, C: camera_from_target, X: gripper_from_camera, Z: base_from_target.  With the camera beside the
+robot inv(G) stands for G, so that X is base_from_camera and Z gripper_from_target.
+"""
+
+from __future__ import annotations
+
+from itertools import chain
+from math import degrees, log, radians, sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid
+from frametool.fit.rigid_arrays import Poses, inverse_left_jacobian, skew
+from frametool.fit.rigid_arrays import log as rotvecs_of
+from frametool.fit.robust import KEPT, LEAST, deviations, draws, fitted_sigmas, lengths, require_near, settled
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from frametool.fit.robust import Mask, Rows
+    from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Array, Indices
+
+NAMES = ("base", "gripper", "camera", "target")
+FEWEST = 3  # samples
+FEWEST_ROBUST = 5  # fewer cannot say which of them is wrong
+FEWEST_APART = 4  # of three the turns alone can fit all places: metres count beside radians as in the closed form
+FEWEST_CERTAIN = 6  # fewer leave the sigmas rough: at 8 they are within a few per cent on average
+DRAWS, DRAWN = 60, 5
+MOST = 10_000  # pairs that are looked at, or one of each sample
+STEPS, ROUGH_STEPS = 100, 4
+DONE = 1e-12  # of the extent, and radians
+STUCK = 1e9  # damping
+UNDAMPED = 1e-12
+BETTER = 5.0  # times: what fits so much better is what was meant
+CLEARLY = 2.0  # times, that both metres and radians must be better
+FLAT, FLAT_SHARE = radians(0.5), 0.02  # turns about the second axis: none, also as a part of those about the first
+SLIGHT = radians(5.0)
+CLEAR = (radians(1.0), radians(175.0))  # turns of a pair whose axis is certain
+ONE = Poses(np.eye(3), np.zeros(3))
+
+
+class HandEye(NamedTuple):
+    """X and Z with their covariances (6x6, as ROS has them), and how the samples fit.
+
+    noise_at: the frame at which errors are alike, None where there are none
+    used: which samples were kept; u: how many sigmas each is off; residuals: (n, 6), metres and radians
+    sigma: of each axis, metres and radians; dof: 3 n - 6 for each of them; rms_distance, rms_angle: of those used
+    turns: rms about the two main axes of the pairs of samples used, radians; warnings: sentences
+    """
+
+    x: Transform
+    z: Transform
+    covariance_x: Array
+    covariance_z: Array
+    noise_at: str | None
+    used: Mask
+    u: Array
+    residuals: Array
+    sigma: tuple[float, float]
+    dof: int
+    rms_distance: float
+    rms_angle: float
+    turns: tuple[float, float]
+    warnings: list[str]
+
+
+def solve_hand_eye(
+    gripper: Transform,
+    target: Transform,
+    *,
+    eye_to_hand: bool = False,
+    robust: bool = True,
+    names: tuple[str, str, str, str] = NAMES,
+) -> HandEye:
+    """Solve for X and Z by least squares, the noise being where it is likeliest; wrong samples are left out.
+
+    gripper: base_from_gripper; target: camera_from_target; as many, (n,)
+    Raises ValueInvalid where the samples are too few, turn about one axis only, or fit the other way round.
+    """
+    if len(gripper) != len(target):
+        raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
+    if (count := len(gripper)) < FEWEST:
+        raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
+    given, camera = Poses.of(gripper), Poses.of(target)
+    require_near(given.places, "gripper")
+    require_near(camera.places, "target")
+    hand = given.inverse if eye_to_hand else given
+    samples, other = _Samples(hand, camera), _Samples(hand.inverse, camera)
+    holder = names[0] if eye_to_hand else names[1]
+    robust = robust and count >= FEWEST_ROBUST
+    _require_two_axes(_turns(hand), 0.0, holder, names[2])
+    start, medians = _start(samples, robust=robust)
+    _require_this_way(medians, _start(other, robust=robust)[1], names, eye_to_hand=eye_to_hand)
+
+    def likeliest(model: _Model, weights: Array) -> _Model:
+        if (kept := weights > 0.0).sum() < FEWEST:
+            raise _unfitting(medians)
+        _require_two_axes(_turns(hand.at(kept)), 0.0, holder, names[2])
+        models = (model._replace(cut=cut) for cut in CUTS)
+        if kept.sum() < FEWEST_APART:
+            models = (start._replace(cut=cut, ratio=samples.sigmas(start._replace(cut=cut), weights)) for cut in CUTS)
+        return min((samples.fitted(each, weights, STEPS) for each in models), key=lambda fit: fit.misfit)
+
+    found = settled(
+        start,
+        samples.residuals,
+        lambda model, weights: samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS),
+        likeliest,
+        unknown=6,
+        robust=robust,
+    )
+    model = found.model
+    s_t, s_r = model.sigmas.tolist()
+    rms = np.sqrt((lengths(found.residuals[found.kept]) ** 2).mean(0))
+    turns = _turns(hand.at(found.kept))
+    if turns.rms[0] < KEPT * s_r * sqrt(2.0):
+        raise _unfitting(rms)
+    _require_two_axes(turns, s_r, holder, names[2])
+    inverse = np.asarray(np.linalg.inv(model.hessian), float)
+    covariance = (inverse + inverse.T) / 2.0
+    count = int(found.kept.sum())
+    return HandEye(
+        model.x.transform.canonical(),
+        model.z.transform.canonical(),
+        covariance[:6, :6],
+        covariance[6:, 6:],
+        None if s_t == s_r == LEAST else "base" if eye_to_hand and model.cut == "gripper" else model.cut,
+        found.kept,
+        deviations(found.residuals, model.sigmas),
+        found.residuals,
+        (s_t, s_r),
+        3 * count - 6,
+        float(rms[0]),
+        float(rms[1]),
+        turns.rms,
+        _warnings(turns, count, holder) + _scale_warnings(samples.at(found.kept), model.x),
+    )
+
+
+class _Model(NamedTuple):
+    """X and Z, where the noise is, and what a fit with it knows: sigmas, its Hessian (12, 12) and 2 ln s_t + 2 ln s_r.
+
+    ratio: sigmas that the fit may only scale
+    """
+
+    x: Poses
+    z: Poses
+    cut: str = "target"
+    ratio: Array | None = None
+    sigmas: Array = np.ones(2)
+    hessian: Array = np.eye(12)
+    misfit: float = 0.0
+
+
+class _Loop(NamedTuple):
+    """The same errors E = left X right = before inv(Z) after: how X and how Z stand in them."""
+
+    left: Poses
+    right: Poses
+    before: Poses
+    after: Poses
+
+
+CUTS: dict[str, Callable[[Poses, Poses, Poses, Poses], _Loop]] = {
+    "target": lambda g, c, x, z: _Loop(z.inverse @ g, c, ONE, g @ x @ c),
+    "camera": lambda g, c, x, z: _Loop(c @ z.inverse @ g, ONE, c, g @ x),
+    "gripper": lambda g, c, x, z: _Loop(ONE, c @ z.inverse @ g, x @ c, g),
+}
+
+
+class _Samples(NamedTuple):
+    """Pairs of poses: of the gripper, and of the target in the camera."""
+
+    gripper: Poses
+    camera: Poses
+
+    def at(self, index: Rows) -> _Samples:
+        return _Samples(self.gripper.at(index), self.camera.at(index))
+
+    def residuals(self, model: _Model) -> Array:
+        """Return [t(E), Log R(E)] of a model."""
+        loop = CUTS[model.cut](*self, model.x, model.z)
+        return _errors(loop, model.x)
+
+    def sigmas(self, model: _Model, weights: Array) -> Array:
+        """Return s_t and s_r of the errors of a model."""
+        return fitted_sigmas(self.residuals(model), weights, 6)
+
+    def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
+        """Minimise ln S_t + ln S_r by Gauss-Newton steps with sigmas that follow, damped where one does not help."""
+        extent = max(np.abs(poses.places).max() for poses in self)
+        units = np.repeat([extent or 1.0, 1.0, extent or 1.0, 1.0], 3)
+        now, gradient = self._linear(model, weights)
+        damping = UNDAMPED
+        for _ in range(steps):
+            bent = now.hessian + damping * np.diag(np.diag(now.hessian))
+            step = -np.asarray(np.linalg.solve(bent, gradient), float)
+            moved = now._replace(x=now.x.stepped(step[:6]), z=now.z.stepped(step[6:]))
+            tried, its_gradient = self._linear(moved, weights)
+            if tried.misfit <= now.misfit + DONE:
+                now, gradient, damping = tried, its_gradient, max(damping / 10.0, UNDAMPED)
+                if (np.abs(step) <= DONE * units).all():
+                    break
+            elif (damping := max(10.0 * damping, 1e-6)) > STUCK:
+                break
+        return now
+
+    def _linear(self, model: _Model, weights: Array) -> tuple[_Model, Array]:
+        """Return a model with its Hessian and its misfit, and the gradient."""
+        loop = CUTS[model.cut](*self, model.x, model.z)
+        errors = _errors(loop, model.x)
+        sigmas = fitted_sigmas(errors, weights, 6)
+        if model.ratio is not None:
+            sigmas = model.ratio * np.sqrt(((sigmas / model.ratio) ** 2).mean())
+        shares = (np.repeat(sigmas, 3) ** -2 * weights[:, None]).reshape(-1)
+        slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
+        weighted = slopes.T * shares
+        misfit = 2.0 * float(np.log(sigmas).sum())
+        return model._replace(sigmas=sigmas, hessian=weighted @ slopes, misfit=misfit), weighted @ errors.reshape(-1)
+
+
+def _errors(loop: _Loop, x: Poses) -> Array:
+    off = loop.left @ x @ loop.right
+    return np.concatenate([off.places, rotvecs_of(off.turns)], 1)
+
+
+def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
+    """Return how errors (n, 6) move with steps of X and of Z: (n, 6, 12)."""
+    left, back = loop.left.turns, loop.before.turns @ model.z.turns.T
+    bent = inverse_left_jacobian(turned)
+    slopes = np.zeros((len(turned), 6, 12))
+    slopes[:, :3, :3] = left
+    slopes[:, :3, 3:6] = -left @ skew(loop.right.places @ model.x.turns.T)
+    slopes[:, 3:, 3:6] = bent @ left
+    slopes[:, :3, 6:9] = -back
+    slopes[:, :3, 9:] = back @ skew(loop.after.places - model.z.places)
+    slopes[:, 3:, 9:] = -bent @ back
+    return slopes
+
+
+def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
+    """Return the best closed form of all samples and of draws of few, with the medians of its errors."""
+    count = len(samples.gripper.places)
+    best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
+    fives: Iterable[Rows] = draws(DRAWS * robust, min(DRAWN, count - 1), count)
+    for few in chain([slice(None)], fives):
+        chosen = samples.at(few)
+        if _turns(chosen.gripper).rms[1] < FLAT:
+            continue
+        x = park_martin(*chosen)
+        z = Poses.of((chosen.gripper @ x @ chosen.camera).transform.mean())
+        medians = np.maximum(np.median(lengths(samples.residuals(_Model(x, z))), axis=0), LEAST)
+        best = min(best, (log(medians[0]) + log(medians[1]), _Model(x, z), medians), key=lambda each: each[0])
+    return best[1:]
+
+
+def park_martin(gripper: Poses, camera: Poses) -> Poses:
+    """Return the X of A X = X B, in closed form: first the rotation, then the place; source: Park and Martin 1994.
+
+    A and B are the motions of gripper and camera between two samples: R_X turns the rotation vectors of B onto those
+    of A, and (R_A - I) t_X = R_X t_B - t_A.
+    """
+    a, b = _motions(gripper, camera)
+    alpha, beta = rotvecs_of(a.turns), rotvecs_of(b.turns)
+    angle = np.linalg.norm(alpha, axis=1)
+    if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
+        a, b, alpha, beta = a.at(clear), b.at(clear), alpha[clear], beta[clear]
+    u, _, v = np.linalg.svd(alpha.T @ beta)
+    turn = u * [1.0, 1.0, np.sign(np.linalg.det(u @ v))] @ v
+    place, _ = _least_squares((a.turns - np.eye(3)).reshape(-1, 3), (b.places @ turn.T - a.places).reshape(-1))
+    return Poses(turn, place)
+
+
+def _motions(gripper: Poses, camera: Poses) -> tuple[Poses, Poses]:
+    i, j = _pairs(len(gripper.places))
+    return gripper.at(i).inverse @ gripper.at(j), camera.at(i) @ camera.at(j).inverse
+
+
+def _scale_warnings(samples: _Samples, x: Poses) -> list[str]:
+    """Say of a factor on the target's places that would fit much better which: (R_A - I) t_X - s R_X t_B = -t_A."""
+    a, b = _motions(*samples)
+    lever, turned = (a.turns - np.eye(3)).reshape(-1, 3), (b.places @ x.turns.T).reshape(-1)
+    place, plain = _least_squares(lever, turned - a.places.reshape(-1))
+    place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.places.reshape(-1))
+    if place[3] <= 0.0 or plain <= max(BETTER * scaled, LEAST):
+        return []
+    return [f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"]
+
+
+def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
+    """Return the least-squares solution, and how long what it leaves is."""
+    found = np.asarray(np.linalg.lstsq(slopes, wanted, rcond=None)[0], float)
+    return found, float(np.linalg.norm(slopes @ found - wanted))
+
+
+def _pairs(count: int) -> tuple[Indices, Indices]:
+    """Return all pairs of samples; of many each with those that follow it at some distances that are drawn."""
+    if count * count <= 2 * MOST:
+        return np.triu_indices(count, 1)
+    lags = np.array(next(draws(1, max(MOST // count, 1), count - 1))) + 1
+    i = np.tile(np.arange(count), len(lags))
+    return i, (i + np.repeat(lags, count)) % count
+
+
+class _Turns(NamedTuple):
+    """Turns of pairs of samples: rms about their first and second axis, radians, and the first axis as text."""
+
+    rms: tuple[float, float]
+    axis: str
+
+
+def _turns(gripper: Poses) -> _Turns:
+    i, j = _pairs(len(gripper.places))
+    turns = rotvecs_of(np.swapaxes(gripper.turns[i], 1, 2) @ gripper.turns[j])
+    squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))
+    axis = axes[:, 2] * np.sign(axes[np.abs(axes[:, 2]).argmax(), 2])
+    _, second, first = np.sqrt(np.maximum(squares, 0.0)).tolist()
+    return _Turns((first, second), " ".join(f"{part:.3f}" for part in np.round(axis, 3) + 0.0))
+
+
+def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> None:
+    first, second = turns.rms
+    if first < FLAT:
+        raise ValueInvalid(f"{holder} does not turn ({degrees(first):.2f} deg); hand-eye needs turns about two axes")
+    if second < max(FLAT, FLAT_SHARE * first, KEPT * s_r * sqrt(2.0)):
+        raise ValueInvalid(
+            f"all turns are about one axis ({turns.axis} in {holder}): where {camera} is along it cannot be known; "
+            "turn about a second one"
+        )
+
+
+def _warnings(turns: _Turns, count: int, holder: str) -> list[str]:
+    told = []
+    if turns.rms[1] < SLIGHT:
+        small = f"{degrees(turns.rms[1]):.1f} deg rms beside {turns.axis} in {holder}"
+        told.append(f"turns about a second axis are small ({small}): turn more")
+    if count < FEWEST_CERTAIN:
+        told.append(f"{count} samples say little of their own noise: the sigmas are rough; take 8 or more")
+    return told
+
+
+def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool) -> None:
+    if (CLEARLY * others <= medians).all() and BETTER**2 * others.prod() <= medians.prod():
+        raise ValueInvalid(
+            f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
+            f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
+        )
+
+
+def _unfitting(off: Array) -> ValueInvalid:
+    return ValueInvalid(f"the samples do not fit ({_off(off)}); does each row of GRIPPER belong to that of TARGET?")
+
+
+def _off(parts: Array) -> str:
+    return f"{1000.0 * parts[0]:.1f} mm {degrees(parts[1]):.1f} deg"

@@ -1,0 +1,221 @@
+"""The transform, and the scale, between two sets of matched points: a = c R b + t, with its covariance."""
+
+from __future__ import annotations
+
+from itertools import chain
+from math import degrees, sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid
+from frametool.fit.alignment import STILL, THIN, Fit, principal_axes, umeyama
+from frametool.fit.rigid_arrays import skew
+from frametool.fit.robust import KEPT, draws, require_near, settled
+from frametool.geometry import validation
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frametool.fit.robust import Mask, Rows
+    from frametool.geometry.types import Array, Numbers
+
+FEWEST = 3
+FEWEST_ROBUST = 5  # three always fit, so that four cannot say which of them is wrong
+TRIPLES = 500
+MOST = 2000  # points that a triple is tried on
+ROUNDING = 1e-12  # of the largest coordinate: no distance is known better
+BETTER = 5.0  # times: a scale or a mirror that fits so much better is what happened
+UNITS = {1000.0: "millimetres?", 100.0: "centimetres?"}
+ABOUT = 0.05  # of a scale: still that of a unit
+IDENTITY = Transform.identity()
+MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+class PointsFit(NamedTuple):
+    """target_from_source and the scale c, with their covariance (6x6, as ROS has it) and the scale's sigma.
+
+    used: which pairs were kept; left_out: which were not, though they have a weight
+    residuals: target - (c R source + t), (n, 3); u: how many sigmas each is off; sigma: of each axis where weight is 1
+    dof: 3 n - 6, with a scale 3 n - 7; rms_distance: of those used; hints: sentences
+    """
+
+    transform: Transform
+    scale: float
+    scale_sigma: float | None
+    covariance: Array
+    used: Mask
+    left_out: Mask
+    residuals: Array
+    u: Array
+    sigma: float
+    dof: int
+    rms_distance: float
+    hints: list[str]
+
+
+def solve_points(
+    target: Numbers,
+    source: Numbers,
+    *,
+    weights: Numbers | None = None,
+    scale: bool = False,
+    robust: bool = True,
+    names: tuple[str, str] = ("A", "B"),
+) -> PointsFit:
+    """Fit matched points (n, 3) by weighted least squares; wrong pairs are left out.
+
+    weights: (n,), in proportion to 1 / variance; a pair of weight 0 counts for nothing
+    names: what messages call target and source
+    Raises ValueInvalid where the points are too few, lie on a line, or are mirrored.
+    """
+    a, b = _points(target, "target"), _points(source, "source")
+    if len(a) != len(b):
+        raise ValueInvalid(f"target has {len(a)} points, source {len(b)}")
+    mass = np.ones(len(a)) if weights is None or not len(a) else validation.weights(weights, a.shape[:1])
+    if (count := int((mass > 0.0).sum())) < FEWEST:
+        raise ValueInvalid(f"{count} matched point{'s'[: count != 1]}; {FEWEST} are needed, not on a line")
+    pairs = _Pairs(a[mass > 0.0], b[mass > 0.0], mass[mass > 0.0])
+    pairs.require_plane()
+    robust = robust and count >= FEWEST_ROBUST
+    start, typical = pairs.start(with_scale=scale, robust=robust)
+    pairs.require_same_hand(typical, with_scale=scale, robust=robust)
+
+    def fit(_: Fit, kept: Array) -> Fit:
+        chosen = pairs.at(kept > 0.0)
+        chosen.require_plane()
+        return chosen.fitted(with_scale=scale, weights=kept[kept > 0.0])
+
+    found = settled(
+        start,
+        pairs.weighted_residuals,
+        lambda _, first: pairs.fitted(with_scale=scale, weights=first),
+        fit,
+        unknown=6 + scale,
+        robust=robust,
+    )
+    best, sigma, kept = found.model, float(found.sigmas[0]), found.kept
+    covariance, scale_sigma = pairs.at(kept).covariance(best, sigma, with_scale=scale)
+    used = mass > 0.0
+    used[used] = kept
+    residuals = _residuals(best, a, b)
+    hints = [] if scale else pairs.scale_hints(typical, names, robust=robust)
+    return PointsFit(
+        best.transform.canonical(),
+        best.scale,
+        scale_sigma,
+        covariance,
+        used,
+        (mass > 0.0) & ~used,
+        residuals,
+        np.sqrt(mass / 3.0) * np.linalg.norm(residuals, axis=1) / sigma,
+        sigma,
+        3 * int(kept.sum()) - 6 - scale,
+        float(np.sqrt((residuals[used] ** 2).sum(1).mean())),
+        hints + pairs.at(kept).line_hints(sigma, covariance),
+    )
+
+
+class _Pairs(NamedTuple):
+    """Matched points (n, 3) and what each weighs."""
+
+    target: Array
+    source: Array
+    mass: Array
+
+    def at(self, index: Rows) -> _Pairs:
+        return _Pairs(*(part[index] for part in self))
+
+    def fitted(self, *, with_scale: bool, weights: Array | float = 1.0) -> Fit:
+        return umeyama(self.target, self.source, self.mass * weights, with_scale=with_scale)
+
+    def weighted_residuals(self, fit: Fit) -> Array:
+        found: Array = np.sqrt(self.mass)[:, None] * _residuals(fit, self.target, self.source)
+        return found
+
+    def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
+        """Return the fit of all or of a triple with the least typical distance, and that distance.
+
+        The typical one is in the middle, but at least the fourth: three always fit.  It is never below rounding.
+        """
+        count = len(self.mass)
+        seen = self.at(next(draws(1, MOST, count))) if count > MOST else self
+        middle = min(max(len(seen.mass) // 2, 3), len(seen.mass) - 1)
+        best = (np.inf, Fit(IDENTITY))
+        triples: Iterable[Rows] = draws(TRIPLES * robust, 3, count)
+        for few in chain([slice(None)], triples):
+            chosen = self.at(few)
+            if chosen.is_line():
+                continue
+            fit = chosen.fitted(with_scale=with_scale)
+            off = (seen.weighted_residuals(fit) ** 2).sum(1)
+            best = min(best, (float(np.partition(off, middle)[middle]), fit), key=lambda each: each[0])
+        return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
+
+    def is_line(self) -> bool:
+        """Say whether target or source lie on a line, or in one place."""
+        for xyz in self[:2]:
+            first, second, _ = principal_axes(xyz)
+            if second <= max(THIN * first, STILL * np.abs(xyz).max()):
+                return True
+        return False
+
+    def require_plane(self) -> None:
+        if len(self.mass) < FEWEST or self.is_line():
+            raise ValueInvalid("the points lie on a line: the turn about it cannot be known")
+
+    def require_same_hand(self, typical: float, *, with_scale: bool, robust: bool) -> None:
+        mirrored = self._replace(source=self.source * MIRROR).start(with_scale=with_scale, robust=robust)[1]
+        if BETTER * mirrored <= typical:
+            off = f"{1000.0 * mirrored:.1f} mm, not {1000.0 * typical:.1f} mm"
+            raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
+
+    def scale_hints(self, typical: float, names: tuple[str, str], *, robust: bool) -> list[str]:
+        """Say of a scale that would fit much better how much greater one set is."""
+        fit, scaled = self.start(with_scale=True, robust=robust)
+        if BETTER * scaled > typical or fit.scale <= 0.0:
+            return []
+        (great, small), ratio = (names, fit.scale) if fit.scale > 1.0 else (names[::-1], 1.0 / fit.scale)
+        unit = next((unit for unit in UNITS if abs(ratio / unit - 1.0) < ABOUT), ratio)
+        return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
+
+    def line_hints(self, sigma: float, covariance: Array) -> list[str]:
+        """Say of points that lie nearly on a line that the turn about it is uncertain."""
+        first, second, _ = principal_axes(self.target)
+        if not second < KEPT * sigma < first:
+            return []
+        turn = degrees(sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+        return [f"the points lie nearly on a line: the turn about it is uncertain (sigma {turn:.1f} deg)"]
+
+    def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
+        """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is fitted.
+
+        At the points' centre place, turn and scale do not mix; the lever arm carries this to the source's origin.
+        """
+        centre = np.average(self.source, 0, self.mass)
+        arms = fit.transform.rotation.apply(self.source - centre)
+        mass = self.mass[:, None]
+        crossed = skew(fit.scale * arms).reshape(-1, 3)
+        of_turn = np.linalg.inv(crossed.T @ (np.repeat(mass, 3, 0) * crossed))
+        of_scale = with_scale / float((mass * arms**2).sum())
+        lever = fit.transform.rotation.apply(centre)
+        levers = np.eye(6)
+        levers[:3, 3:] = skew(fit.scale * lever)
+        found = levers[:, 3:] @ of_turn @ levers[:, 3:].T
+        found[:3, :3] += np.eye(3) / mass.sum() + of_scale * np.outer(lever, lever)
+        return sigma**2 / 2.0 * (found + found.T), sigma * sqrt(of_scale) if with_scale else None
+
+
+def _residuals(fit: Fit, target: Array, source: Array) -> Array:
+    placed: Array = fit.transform.rotation.apply(fit.scale * source) + fit.transform.xyz
+    return target - placed
+
+
+def _points(given: Numbers, name: str) -> Array:
+    xyz = np.stack(np.atleast_1d(*validation.columns(given, 3, name)), -1)
+    if xyz.ndim != 2:
+        raise ValueInvalid(f"{name}: expected shape (n, 3), got {xyz.shape}")
+    validation.all_finite((xyz,), name)
+    require_near(xyz, name)
+    return xyz
