@@ -74,11 +74,6 @@ def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tupl
     return whole or tuple(places), tuple(found.get(axis, (-1, "")) for axis in AXES) if found else ()
 
 
-def is_sigma(name: str) -> bool:
-    """Tell whether a column is called as a sigma is: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
-    return name.startswith("sigma_") and re.match(_SIGMA_COLUMN + r"\s*(?:[\[(]|$)", name) is not None
-
-
 def in_unit(number: Any, unit: str) -> Any:
     """Return sigmas in metres or radians."""
     if UNITS_OF_ANGLE.get(unit):
@@ -148,7 +143,8 @@ def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
     if len(texts) not in sizes:
         each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
         wanted = " or ".join(each)
-        raise NotARotation(f"covariance has {len(texts)} numbers; {wanted}")
+        found = f"{len(texts)} number{'s' * (len(texts) != 1)}"
+        raise NotARotation(f"covariance has {found}; {wanted}")
     return [(path, within(path, _entry, text)) for path, text in texts]
 
 
