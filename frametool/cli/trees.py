@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from frametool.formats.load import Place, Recording, Rules
     from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames, FrameTree
+    from frametool.grammar.result import Result
 
     Value = TypeVar("Value")
 
@@ -137,6 +138,46 @@ def _loaded(
     tree = load_sources(files, rules, places)
     state(files, whole=places is None)
     return tree
+
+
+def tell_unused_sigmas(tree: Frames) -> None:
+    """Say once that edges have covariances, where a command that could carry them was not asked to."""
+    if tree.covariances and not settings().quiet:
+        say(f"sigmas of {tree.name} not used (--covariance)")
+
+
+class CarriedSigmas:
+    """What a command that carries covariances along a tree tells once, at its end."""
+
+    def __init__(self, tree: Frames) -> None:
+        """Begin before the first result."""
+        self.tree = tree
+        self.edges: set[str] = set()  # by their children
+        self.widest: Sequence[float] = ()
+        self.width = 0.0
+
+    def noted(self, result: Result) -> Result:
+        """Take a result of a lookup in."""
+        from frametool.geometry.uncertainty import widest_turn
+
+        target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
+        new = {track.child for track in self.tree.way(target, source, result.extras.get("stamp_ns"))} - self.edges
+        self.edges |= new
+        for each in (found, *(self.tree.covariances.get(edge, ()) for edge in new)):
+            if (width := widest_turn(each)) > self.width:
+                self.widest, self.width = each, width
+        return result
+
+    def tell(self) -> None:
+        """Say what was taken for granted, and warn of turns too wide for the first order."""
+        from frametool.geometry.uncertainty import warn_if_wide
+
+        warn_if_wide([self.widest])
+        exact = len(self.edges - self.tree.covariances.keys())
+        count = f"{exact} of {len(self.edges)}"
+        none = f"{count} has no sigma and counts" if exact == 1 else f"{count} have no sigma and count"
+        if self.edges and not settings().quiet:
+            say(f"edges count as independent{f'; {none} as exact' * bool(exact)}")
 
 
 OPEN_IN_TREES = ("frames", "direction", "dh", "stamps")  # what forms of files of frames may leave open

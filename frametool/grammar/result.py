@@ -14,7 +14,7 @@ from frametool.grammar.pose import NAMES, Pose
 from frametool.grammar.rotation_spelling import spelled
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
@@ -107,6 +107,17 @@ class Result:
         return entry | self.extras
 
 
+def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return what is said beside poses or points as a table has it: a covariance as c11 .. c66, or c11 .. c33."""
+    entries = extras.get("covariance")
+    if not (isinstance(entries, list) and len(entries) in (36, 9)):
+        return extras
+    from frametool.grammar.covariance import columns
+
+    found = {key: value for key, value in extras.items() if key != "covariance"}
+    return found | dict(zip(columns(len(entries)), entries, strict=True))
+
+
 class NoResult(Result):
     """What stands for a bad row that is kept: its frames and what else it says, with null in the place of its pose."""
 
@@ -134,10 +145,21 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     """Yield a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
     yield from ({"name": root} for root in tree.roots)
     for track in tree.tracks():
+        beside = uncertain(tree.covariances.get(track.child))
         if track.standing:
-            yield Result(Pose.of(track.components, track.child, track.parent)).mapping(style)
+            yield Result(Pose.of(track.components, track.child, track.parent), beside).mapping(style)
         else:
-            yield {"name": track.child, "parent": track.parent, "samples": list(_samples(track, style))}
+            samples = {"samples": list(_samples(track, style))}
+            yield {"name": track.child, "parent": track.parent} | beside | samples
+
+
+def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
+    """Return what a result says of its covariance: nothing where it is exact."""
+    if entries is None:
+        return {}
+    from frametool.grammar.covariance import COVARIANCE, Whole
+
+    return {COVARIANCE: [Whole(entry + 0.0) for entry in entries]}
 
 
 def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:
