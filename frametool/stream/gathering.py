@@ -23,7 +23,7 @@ class Gathered:
 
     def __init__(self) -> None:
         """Begin with none."""
-        self.placed = self.turned = False
+        self.placed = self.turned = self.uncertain = False
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
 
@@ -31,6 +31,7 @@ class Gathered:
         """Add the rows of a block that are kept: components of a pose, and what stands beside them."""
         self.placed |= shape.whole or shape.unit is not None
         self.turned |= shape.notation is not None
+        self.uncertain |= bool(shape.covariance)
         rows = np.stack([np.broadcast_to(np.asarray(part, np.float64), len(kept)) for part in pose[:7]], axis=-1)
         self._poses.append(rows[kept])
         if beside is not None:
@@ -40,6 +41,7 @@ class Gathered:
         """Add poses that were read one by one."""
         self.placed |= any(pose.position is not None for pose in poses)
         self.turned |= any(pose.rotation is not None for pose in poses)
+        self.uncertain |= any(pose.covariance is not None for pose in poses)
         self._poses.append(np.array([pose.components for pose in poses], np.float64).reshape(-1, 7))
 
     @property

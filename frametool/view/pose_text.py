@@ -129,15 +129,25 @@ def _sigmas(key: str, value: Any) -> list[str]:
     if key != "covariance" or not isinstance(value, list) or len(value) not in (36, 9):
         return []
     roots = [math.sqrt(max(entry, 0.0)) for entry in value[:: round(len(value) ** 0.5) + 1]]
-    return [_two_digits(root * 1000.0, "mm") for root in roots[:3]] + [
-        _two_digits(math.degrees(root), "deg") for root in roots[3:]
-    ]
+    return [*map(_length, roots[:3]), *map(_angle, roots[3:])]
+
+
+def largest_sigmas(entries: Sequence[float]) -> str:
+    """Say how uncertain a pose is along its worst axis and about it: `sigma 10 mm 1.0 deg`."""
+    roots = [math.sqrt(max(entry, 0.0)) for entry in entries[::7]]
+    return f"sigma {_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
+
+
+def _length(metres: float) -> str:
+    return _two_digits(metres * 1000.0, "mm") if metres < 1.0 else _two_digits(metres, "m")
+
+
+def _angle(radians: float) -> str:
+    return _two_digits(math.degrees(radians), "deg")
 
 
 def _two_digits(value: float, unit: str) -> str:
     """Write a sigma with its unit: `2.1 mm`, `12 m`; what is tiny with an exponent."""
-    if unit == "mm" and value >= 1000.0:
-        value, unit = value / 1000.0, "m"
     if value and not 0.001 <= value < ENDLESS:
         return f"{value:.1e} {unit}"
     decimals = max(1 - math.floor(math.log10(value)), 0) if value else 0

@@ -60,8 +60,8 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @stream_options
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
-    source_at: int | str | None, fixed: str | None, covariance: bool, times: str | None, moving: bool, cache: int | None,
-    tf2: str | None, **options: Any,
+    source_at: int | str | None, fixed: str | None, covariance: bool, times: str | None, moving: bool,
+    cache: int | None, tf2: str | None, **options: Any,
 ) -> int:  # fmt: skip
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
@@ -135,7 +135,7 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
     if derives:
         raise click.UsageError("--explain derives poses; leave --covariance out")
     if fixed is not None:
-        raise click.UsageError("--covariance is of one time; across two the same edge counts twice, and not independently")
+        raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
     form = output.told if by_row else output.style.form
     if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
