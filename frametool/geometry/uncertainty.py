@@ -205,8 +205,11 @@ def _is_positive(entries: Sequence[float], size: int) -> bool:
 
 
 def short(value: float) -> str:
-    """Write a number for a message: six digits, and 1e-5 rather than 1e-05."""
-    return f"{value:g}".replace("e-0", "e-").replace("e+0", "e+")
+    """Write a number for a message: six digits, and 1e-4 rather than 0.0001 or 1e-04."""
+    if 1e-3 <= abs(value) < 1e6 or not value:
+        return f"{value:g}"
+    digits, _, exponent = f"{value:.5e}".partition("e")
+    return f"{digits.rstrip('0').rstrip('.')}e{int(exponent)}"
 
 
 def widest_turn(entries: Sequence[float]) -> float:

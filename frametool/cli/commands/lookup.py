@@ -48,7 +48,7 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest]")
 @click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, with --fixed; --at: at TARGET")
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="what stands still between the two times: map")
-@click.option("--covariance", is_flag=True, help="of the results too, from the sigmas of the edges (help covariance)")
+@click.option("--covariance", is_flag=True, help="how sure it is, by the edges' sigmas (help covariance)")
 @times_option
 @rules_options
 @reading_options(streams=True)
@@ -72,8 +72,8 @@ def command(
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp.
-    Trajectories (-f tum ..) hold all samples. Options of rows need --target-column or --source-column.
+    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along lines, rotations by slerp.
+    Trajectories (-f tum ..) hold all samples.
     """
     by_row, task = RowFrames(options), PoseTask(options)
     stream, output = task.stream, task.output
