@@ -109,7 +109,8 @@ def _are_many(given: Any, side: int) -> bool:
     if hasattr(given, "shape"):
         return len(given.shape) > 1 and given.shape != (side, side)
     first = given[0] if isinstance(given, (list, tuple)) and given else None
-    return len(getattr(first, "shape", ())) > 1 or (isinstance(first, (list, tuple)) and first and hasattr(first[0], "__len__"))
+    inner = first[0] if isinstance(first, (list, tuple)) and first else None
+    return len(getattr(first, "shape", ())) > 1 or hasattr(inner, "__len__")
 
 
 def _check_each(rows: Any, side: int) -> None:

@@ -149,13 +149,15 @@ def _rows(nine: Entries) -> Rows:
 
 def taken(given: Any, size: int = POSE) -> Components:
     """Return the entries of a covariance that Python gives, checked: numbers or rows of them, of numpy or not."""
-    rows = given.tolist() if hasattr(given, "tolist") else given
+    rows, side = given.tolist() if hasattr(given, "tolist") else given, round(size**0.5)
     try:
         listed = [row if hasattr(row, "__iter__") else (row,) for row in rows]
         entries = tuple(float(entry) for row in listed for entry in row)
     except (TypeError, ValueError):
-        raise ValueInvalid(f"covariance is {size} numbers, or {size**0.5:g} rows of them") from None
-    if len(entries) != size or not {len(row) for row in listed} <= {1, int(size**0.5)}:
+        entries, listed = (), [()]
+    if not {len(row) for row in listed} <= {1, side}:
+        raise ValueInvalid(f"covariance must be {size} numbers or {side} rows of {side}")
+    if len(entries) != size:
         raise ValueInvalid(wrong_count(len(entries), (size,)))
     if bad := [entry for entry in entries if not -INFINITE < entry < INFINITE]:
         raise ValueInvalid(f"covariance has {bad[0]} in it; every number must be finite")

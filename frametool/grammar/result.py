@@ -96,7 +96,7 @@ class Result:
         pose = self.pose
         entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
         if pose.rotation is None:
-            return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | self.extras
+            return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | out_of_columns(self.extras)
         if pose.position is not None and not any(carries_position(each) for each in style.notations):
             entry["xyz"] = list(pose.position)
         for each in style.notations:
@@ -104,7 +104,7 @@ class Result:
             _add(entry, key, value)
         if any(is_locked(pose, each) for each in style.notations):
             entry["gimbal_lock"] = True
-        return entry | self.extras
+        return entry | out_of_columns(self.extras)
 
 
 def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -116,6 +116,20 @@ def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
 
     found = {key: value for key, value in extras.items() if key != "covariance"}
     return found | dict(zip(columns(len(entries)), entries, strict=True))
+
+
+def out_of_columns(extras: dict[str, Any]) -> dict[str, Any]:
+    """Return what is said beside a pose as a mapping has it: columns c11 .. c66 as its covariance."""
+    if "c66" not in extras:
+        return extras
+    from frametool.grammar.covariance import columns
+
+    names = columns()
+    if not extras.keys() >= {*names}:
+        return extras
+    entries = [extras[name] for name in names]
+    found = {key: value for key, value in extras.items() if key not in names}
+    return found | {"covariance": None if entries[0] is None else entries}
 
 
 class NoResult(Result):
