@@ -142,7 +142,7 @@ class NoResult(Result):
         if self.pose == Pose():
             return dict(self.extras)
         entry = Result(self.pose).mapping(style)
-        return {key: value if key in NAMES else None for key, value in entry.items()} | self.extras
+        return {key: value if key in NAMES else None for key, value in entry.items()} | out_of_columns(self.extras)
 
 
 def _add(entry: dict[str, Any], key: str, value: Any) -> None:

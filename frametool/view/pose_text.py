@@ -133,9 +133,9 @@ def _sigmas(key: str, value: Any) -> list[str]:
 
 
 def largest_sigmas(entries: Sequence[float]) -> str:
-    """Say how uncertain a pose is along its worst axis and about it: `sigma 10 mm 1.0 deg`."""
+    """Say how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
     roots = [math.sqrt(max(entry, 0.0)) for entry in entries[::7]]
-    return f"sigma {_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
+    return f"±{_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
 
 
 def _length(metres: float) -> str:
