@@ -128,7 +128,13 @@ def _sigmas(key: str, value: Any) -> list[str]:
     """Write the roots of the diagonal of a covariance, two digits each; nothing of any other value."""
     if key != "covariance" or not isinstance(value, list) or len(value) not in (36, 9):
         return []
-    roots = [math.sqrt(max(entry, 0.0)) for entry in value[:: round(len(value) ** 0.5) + 1]]
+    try:
+        variances = [float(entry) for entry in value[:: round(len(value) ** 0.5) + 1]]
+    except (TypeError, ValueError):
+        return []
+    if variances[0] == -1.0:
+        return ["unknown"]  # as ROS has it
+    roots = [math.sqrt(max(each, 0.0)) for each in variances]
     return [*map(_length, roots[:3]), *map(_angle, roots[3:])]
 
 
