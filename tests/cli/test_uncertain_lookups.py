@@ -188,6 +188,8 @@ def test_sigmas_that_are_not_used_are_told_once(run: Run) -> None:
     assert run("lookup", "robot.yaml", "map", "--source-column", "s", stdin="s\nbox\ntool\n").err == told
     assert run("lookup", "robot.yaml", "map", "tool", "--quiet").err == ""
     assert run("lookup", "exact.yaml", "a", "c").err == ""
+    assert run("apply", "robot.yaml", "map", "tool", "1", "2", "3").err == told
+    assert run("apply", "robot.yaml", "map", "tool", stdin="x,y,z\n1,2,3\n4,5,6\n").err.count(told) == 1
 
 
 @pytest.mark.parametrize("name", ["robot.yaml", "drive.yaml"])

@@ -25,7 +25,7 @@ from frametool.cli.options import (
 )
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.text.numbers import NotFinite, parse_number
@@ -202,6 +202,7 @@ def _way_by_tree(
     named = arguments[2:3] if len(arguments) > 2 and not _is_record(arguments[2]) else ()
     rest = arguments[2 + len(named) :]
     tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
+    tell_unused_sigmas(tree)
     target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
     source = next(iter(sources), None)
 
