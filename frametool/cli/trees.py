@@ -18,7 +18,7 @@ from frametool.cli.options import Text, input_forms, refuse_not_needed
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
-from frametool.errors import FrametoolError, listing, shown, warn
+from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.grammar.edges import Answers
 
@@ -143,7 +143,7 @@ def _loaded(
 def tell_unused_sigmas(tree: Frames) -> None:
     """Say once that edges have covariances, where a command that could carry them was not asked to."""
     if tree.covariances and not settings().quiet:
-        say(f"sigmas of {tree.name} not used (--covariance)")
+        say(f"sigmas of {bare(tree.name)} not used (--covariance)")
 
 
 class CarriedSigmas:

@@ -283,6 +283,7 @@ class Assembly:
         except Refused as refused:  # in the words that tf2 logs when it drops a transform
             for line in refused.lines:
                 warn(line, kind=Tf2Warning)
+            return
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
         if place.edge.covariance is not None or child in self.covariances:

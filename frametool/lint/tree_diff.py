@@ -351,7 +351,7 @@ def _covariances(a: Frames, b: Frames) -> Iterator[str]:
     known = dict.fromkeys([*a.covariances, *b.covariances])
     both = [child for child in known if a.track(child) and b.track(child)]
     if others := [child for child in both if a.covariances.get(child) != b.covariances.get(child)]:
-        yield f"covariances are not compared; they differ of {listing(others, 8)}"
+        yield f"covariances are not compared; those of {listing(others, 8)} differ"
 
 
 def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:

@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 
 from frametool.cli.commands.lookup import WITH_COVARIANCE
+from frametool.formats.rows import csv as csv_form
 from frametool.formats.table import holds_arrays, writers
 from frametool.grammar.covariance import columns
+from frametool.grammar.result import Style
+from frametool.view import pose_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -243,7 +246,7 @@ def test_commands_that_carry_none_say_so_once(run: Run) -> None:
 def test_trees_that_differ_in_covariances_only_are_the_same_and_that_is_told(run: Run) -> None:
     other = STANDING.replace("xyz_mm: [2.1", "xyz_mm: [2.2")
     done = run("diff", "robot.yaml", "other.yaml", files=FILES | {"other.yaml": other})
-    assert (done.status, done.err) == (0, "frametool: covariances are not compared; they differ of tool\n")
+    assert (done.status, done.err) == (0, "frametool: covariances are not compared; those of tool differ\n")
     assert run("diff", "robot.yaml", "robot.yaml").err == ""
 
 
@@ -267,3 +270,32 @@ def test_a_lookup_without_covariances_loads_nothing_of_them(tmp_path: Path) -> N
         loaded.append({*done.stdout.splitlines()[-1].split()})
     assert not {name for name in loaded[0] if "uncertain" in name or "covariance" in name or "placed" in name}
     assert "numpy" not in loaded[0] | loaded[1]
+
+
+def test_the_covariance_of_a_point_is_three_sigmas_and_nine_columns() -> None:
+    record = {"frame": "map", "point": [1.0, 2.0, 3.0], "covariance": [4.41e-6, 0.0, 0.0, 0.0, 9e-6, 0.0, 0.0, 0.0, 1.21e-6]}
+    text = pose_text.write_points([record], Style("text"))
+    assert text == "1.0  2.0  3.0  m in map  sigma 2.1 mm 3.0 mm 1.1 mm\n"
+    head, row = csv_form.write_points([record], Style("csv")).splitlines()
+    assert head.split(",") == ["frame", *"xyz", *columns(9)]
+    assert row.startswith("map,1.0,2.0,3.0,4.41e-06,0.0,")
+    unknown = pose_text.write_points([record | {"covariance": [-1.0] + [0.0] * 8}], Style("text"))
+    assert unknown == "1.0  2.0  3.0  m in map  sigma unknown\n"
+
+
+@pytest.mark.parametrize("policy", ["ros1", "ros2"])
+def test_a_buffer_with_the_rules_of_tf2_keeps_covariances(policy: str, run: Run) -> None:
+    ours = run("lookup", "drive.yaml", "map", "cart", "--at", "0.5", "--covariance", "-f", "json", files=FILES)
+    theirs = run("lookup", "drive.yaml", "map", "cart", "--at", "0.5", "--covariance", "-f", "json", "--tf2", policy)
+    assert entries_of(theirs.out) == entries_of(ours.out)
+
+
+def test_a_sigma_reaches_lookups_of_a_batch_and_of_merged_trees(run: Run) -> None:
+    tree = "{name: cam, parent: tool, xyz: [0, 0, 1], sigma: {xyz: 0.5}}"
+    done = run("lookup", "robot.yaml", "map", "cam", "--with", tree, "--covariance", "-f", "json", files=FILES)
+    assert done.err == f"{INDEPENDENT}; 1 of 4 has no sigma and counts as exact\n"
+    assert entries_of(done.out)[0] > 0.25
+    lines = "lookup robot.yaml map tool --covariance -f json\n" * 2
+    done = run("batch", stdin=lines)
+    first, second = map(entries_of, done.out.splitlines())
+    assert first == second == entries_of(run("lookup", "robot.yaml", "map", "tool", "--covariance", "-f", "json").out)
