@@ -136,6 +136,8 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
         raise click.UsageError("--explain derives poses; leave --covariance out")
     if fixed is not None:
         raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
+    if by_row:
+        refuse_unused("is not for --covariance: the edges that are taken for exact are counted in one process", "jobs")
     form = output.told if by_row else output.style.form
     if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
