@@ -96,7 +96,8 @@ def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
     names = [f"{prefix}c{i}{j}" for i in axes for j in axes]
     if not extras.keys() >= {*names}:
         return extras
-    whole = {prefix + "covariance": [extras[name] for name in names]}
+    entries = [extras[name] for name in names]
+    whole = {f"{prefix}covariance": None if entries[0] is None else entries}
     return {name: value for name, value in extras.items() if name not in names} | whole
 
 

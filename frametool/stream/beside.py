@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, warn
-from frametool.grammar.covariance import COVARIANCE, SIGMA, UNKNOWN, check, entries_of, find_columns, read_covariance
+from frametool.geometry.uncertainty import UNKNOWN
+from frametool.grammar.covariance import COVARIANCE, SIGMA, check, entries_of, find_columns, read_covariance
 from frametool.grammar.pose import SCALE, read_angle_unit, read_scale, refuse_scale
 from frametool.grammar.readers import Misfit, NotARotation, within
 from frametool.ros.messages import whole_list
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 PLACED = (POSE, POINT, VECTOR)
-LEFT_OUT = "covariances left out: {} has none"
+LEFT_OUT = "covariances left out: calc has none"
 
 
 def with_covariances(
@@ -41,9 +42,12 @@ def with_covariances(
     there = [key for key in place.covariances if key in holder]
     has_sigma = SIGMA in holder and shape.kind in PLACED and around == path
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
-    if request.gathered is not None or is_left_out:
+    if is_left_out:
         reading.here = (*above, *path)
-        reading.note(LEFT_OUT.format("calc" if is_left_out else "mean"), rule="left-out")
+        reading.note(LEFT_OUT, rule="left-out")
+    if request.gathered is not None:
+        request.gathered.uncertain = True
+    if request.gathered is not None or is_left_out:
         return record._replace(others=(*record.others, *there, *[SIGMA] * has_sigma))
     if operation.keeps_frames:
         return record
@@ -123,11 +127,11 @@ def covariance_columns(
         places, sigma = find_columns(table.names or (), 36 if POSE in kinds else 9)
     except NotARotation as error:
         raise FormatError(str(error), source=source, line=1) from None
-    has_formula = request.operation.formula is not None
-    if places and (request.gathered is not None or has_formula):
-        warn(f"{source}: {LEFT_OUT.format('calc' if has_formula else 'mean')}", rule="left-out")
-        return (), shapes
-    if not places:
+    if places and request.operation.formula is not None:
+        warn(f"{source}: {LEFT_OUT}", rule="left-out")
+    if places and request.gathered is not None:
+        request.gathered.uncertain = True
+    if not places or request.gathered is not None or request.operation.formula is not None:
         return (), shapes
     if len(shapes) != 1:
         message = "a covariance beside several poses in a row: whose it is nobody can tell"

@@ -23,7 +23,7 @@ class Gathered:
 
     def __init__(self) -> None:
         """Begin with none."""
-        self.placed = self.turned = False
+        self.placed = self.turned = self.uncertain = False
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
 
@@ -40,6 +40,7 @@ class Gathered:
         """Add poses that were read one by one."""
         self.placed |= any(pose.position is not None for pose in poses)
         self.turned |= any(pose.rotation is not None for pose in poses)
+        self.uncertain |= any(pose.covariance is not None for pose in poses)
         self._poses.append(np.array([pose.components for pose in poses], np.float64).reshape(-1, 7))
 
     @property

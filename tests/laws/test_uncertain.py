@@ -22,9 +22,9 @@ ROOT = np.random.default_rng(5).normal(size=(6, 6)) * 0.1
 WHOLE = [float(entry) for entry in ((ROOT @ ROOT.T + (ROOT @ ROOT.T).T) / 2.0).ravel()]
 SIGMAS = [0.01, 0.02, 0.03, 0.1, 0.2, 0.3]
 DIAGONAL = [SIGMAS[i] ** 2 if i == j else 0.0 for i in range(6) for j in range(6)]
-POSE = {"xyz": [1.0, 2.0, 3.5], "quaternion": {"x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5}}
+POSE: dict[str, Any] = {"xyz": [1.0, 2.0, 3.5], "quaternion": {"x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5}}
 CELLS = {"x": 1.0, "y": 2.0, "z": 3.5, "qx": 0.5, "qy": -0.5, "qz": 0.5, "qw": 0.5}
-OTHER = {"xyz": [0.5, -1.0, 0.25], "quaternion": {"x": 0.0, "y": 0.6, "z": 0.0, "w": 0.8}}
+OTHER: dict[str, Any] = {"xyz": [0.5, -1.0, 0.25], "quaternion": {"x": 0.0, "y": 0.6, "z": 0.0, "w": 0.8}}
 ROW, B = (Transform.from_arrays(each["xyz"], list(each["quaternion"].values())) for each in (POSE, OTHER))
 NAMES = [f"c{i}{j}" for i in range(1, 7) for j in range(1, 7)]
 SIGMA_CELLS = dict(zip(("sigma_x", "sigma_y", "sigma_z", "sigma_roll", "sigma_pitch", "sigma_yaw"), SIGMAS, strict=True))
@@ -125,7 +125,10 @@ def test_scale_is_carried(run: Run, form: str) -> None:
 
 def test_a_similarity_moves_points_vectors_and_poses(run: Run) -> None:
     pose = json.dumps(OTHER | {"scale": 2.0})
-    by = lambda record: json.loads(run("apply", "--transform", pose, json.dumps(record), "-f", "json").out)  # noqa: E731
+
+    def by(record: Any) -> Any:
+        return json.loads(run("apply", "--transform", pose, json.dumps(record), "-f", "json").out)
+
     turned = B.apply_vector([1.0, 2.0, 3.5])
     assert by({"point": [1.0, 2.0, 3.5]})["point"] == pytest.approx((2.0 * turned + np.array(OTHER["xyz"])).tolist(), rel=1e-15)
     assert by({"vector": [1.0, 2.0, 3.5]})["vector"] == pytest.approx((2.0 * turned).tolist(), rel=1e-15)
@@ -138,7 +141,7 @@ def test_a_similarity_moves_points_vectors_and_poses(run: Run) -> None:
         assert "cannot be carried through a scale" in done.err
 
 
-BAD = {
+BAD: dict[str, Any] = {
     "sigma and covariance in one entry; give one": {"sigma": {"xyz": 1}, "covariance": WHOLE},
     "covariance has 21 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)": {"covariance": WHOLE[:21]},
     "covariance[0] is -1: 'unknown' in ROS; leave the covariance out": {"covariance": [-1.0, *WHOLE[1:]]},

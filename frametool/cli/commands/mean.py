@@ -10,7 +10,7 @@ import click
 from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_pasted, poses_from
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, warn
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -58,6 +58,8 @@ def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
         given = None if weights is None else _numbers(weights)
         if given is not None and len(given) != len(gathered.transforms):
             raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
+    if gathered.uncertain:
+        warn("covariances left out: mean has none")
     task.output.poses([_mean(gathered, given)])
     return status
 
