@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from conftest import Outcome
     from ways import Run
 
-ROOT = np.random.default_rng(5).normal(size=(6, 6)) * 0.1
+ROOT = np.random.default_rng(5).normal(size=(6, 6)) * 0.03
 WHOLE = [float(entry) for entry in ((ROOT @ ROOT.T + (ROOT @ ROOT.T).T) / 2.0).ravel()]
-SIGMAS = [0.01, 0.02, 0.03, 0.1, 0.2, 0.3]
+SIGMAS = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06]
 DIAGONAL = [SIGMAS[i] ** 2 if i == j else 0.0 for i in range(6) for j in range(6)]
 POSE: dict[str, Any] = {"xyz": [1.0, 2.0, 3.5], "quaternion": {"x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5}}
 CELLS = {"x": 1.0, "y": 2.0, "z": 3.5, "qx": 0.5, "qy": -0.5, "qz": 0.5, "qw": 0.5}
@@ -72,6 +72,8 @@ def wanted(command: str, own: list[float]) -> Any:
 def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str, spelling: str, form: str) -> None:
     arguments, _ = COMMANDS[command]
     beside, cells, own = SPELLINGS[spelling]
+    if form == "file" and command.startswith("apply"):
+        return  # its files are those of -i, as streams
     if (spelling == "none" and "UNSURE" not in repr(arguments) and UNSURE not in arguments) or (form == "table" and spelling == "rows"):
         return
     expected = wanted(command, own)
@@ -93,7 +95,7 @@ def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str
         assert len(bits) == 1
 
 
-@pytest.mark.parametrize("form", ["argument", "file", *STREAMS])
+@pytest.mark.parametrize("form", ["argument", *STREAMS])
 @pytest.mark.parametrize(("size", "own"), [(0, None), (9, [4.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 9.0])])
 def test_points_too(run: Run, form: str, size: int, own: list[float] | None) -> None:
     record = {"point": [1.0, 2.0, 3.5]} | ({"covariance": own} if own else {})
