@@ -168,7 +168,7 @@ def taken(given: Any, size: int = POSE) -> Components:
 def wrong_count(count: int, sizes: Sequence[int]) -> str:
     """Say how many numbers there are and how many it takes."""
     each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
-    return f"covariance has {count} numbers; {' or '.join(each)}"
+    return f"covariance has {count} number{'s' * (count != 1)}; {' or '.join(each)}"
 
 
 def check(entries: Sequence[float]) -> None:

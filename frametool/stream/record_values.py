@@ -17,10 +17,10 @@ from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry import floats
-from frametool.grammar.names import in_nanoseconds, stamp_column, with_entries
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Note, tell
-from frametool.grammar.result import NoResult, Result
+from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
-MOST_EXACT = 16  # numbers of a result without a covariance
+SIX_BY_SIX = 36  # entries of the covariance of a pose
 WIDE_RULE = "wide"
 MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
@@ -199,7 +199,7 @@ def _answer(
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
         raise placed(bad, source) from bad
-    if found is not None and len(found.parts) > MOST_EXACT and not own.counts[WIDE_RULE]:
+    if found is not None and len(asked.operation.carried(record.shape)) == SIX_BY_SIX and not own.counts[WIDE_RULE]:
         own.tell(source, [Note(WIDE_RULE, message, record.path) for message in too_wide(found.parts[-36:])])
     return found
 

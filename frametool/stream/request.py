@@ -113,7 +113,8 @@ class Operation(NamedTuple):
         sizes = {len(each) for each in (self.left, *self.right, self.fixed) if each is not None}
         if SCALED in sizes or 1 in shape.covariance or shape.multiple:
             return () if self.moves else (SCALE,)
-        if not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
+        of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
+        if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
             return ()
         from frametool.grammar.covariance import columns
 

@@ -95,6 +95,21 @@ def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str
         assert len(bits) == 1
 
 
+@pytest.mark.parametrize("form", ["argument", "file", *STREAMS[:-1]])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_that_of_a_message_stays_where_it_stands(run: Run, command: str, form: str) -> None:
+    if form == "file" and command.startswith("apply"):
+        return
+    body = {"position": dict(zip("xyz", POSE["xyz"], strict=True)), "orientation": POSE["quaternion"]}
+    message = {"header": {"stamp": {"sec": 1, "nanosec": 5}, "frame_id": "base"}, "pose": {"pose": body, "covariance": WHOLE}}
+    for way in ways(form, message):
+        done = given(run, (*COMMANDS[command][0], "-f", "json"), way)
+        assert done.status == 0, done.err
+        for each in flat(values(done.out)):
+            found = each.get("covariance", each.get("pose", {}).get("covariance"))
+            assert np.allclose(found, wanted(command, WHOLE), rtol=1e-14, atol=1e-17)
+
+
 @pytest.mark.parametrize("form", ["argument", *STREAMS])
 @pytest.mark.parametrize(("size", "own"), [(0, None), (9, [4.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 9.0])])
 def test_points_too(run: Run, form: str, size: int, own: list[float] | None) -> None:
