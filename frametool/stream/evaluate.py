@@ -179,7 +179,7 @@ class Run:
         """Tell of the first row whose turn is too uncertain for the first order."""
         operation = self.plan.operation
         for shape, parts in zip(self.plan.shapes or (Shape(POSE),), moved, strict=False):
-            if len(operation.carried(shape)) < 36 or not self.count:
+            if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
                 continue
             entries = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
             for row in np.flatnonzero(entries[21] + entries[28] + entries[35] > WIDE * WIDE)[:1].tolist():

@@ -199,7 +199,8 @@ def _answer(
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
         raise placed(bad, source) from bad
-    if found is not None and len(asked.operation.carried(record.shape)) == SIX_BY_SIX and not own.counts[WIDE_RULE]:
+    is_new = not (own.counts[WIDE_RULE] or asked.operation.uncertain)  # of what moves others that is told elsewhere
+    if found is not None and is_new and len(asked.operation.carried(record.shape)) == SIX_BY_SIX:
         own.tell(source, [Note(WIDE_RULE, message, record.path) for message in too_wide(found.parts[-36:])])
     return found
 
