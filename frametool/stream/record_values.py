@@ -152,7 +152,7 @@ def results(
     memory: of the records before this text; teller: of what was told before.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
-    own, memory = teller or Teller(), memory or Memory()
+    own, memory, request = teller or Teller(), memory or Memory(), request._replace(canonical=True)
     nodes: list[Node] = []
     spliced = _Spliced(source, request)
     units: dict[Path, tuple[Document, list[Answer]]] = {}

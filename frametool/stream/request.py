@@ -107,7 +107,8 @@ class Operation(NamedTuple):
 
     def carried(self, shape: Shape) -> tuple[str, ...]:
         """Name the entries of the covariance, or the scale, that the results of rows of a shape have."""
-        passes = self.formula is not None or (self.keeps_frames and not self.uncertain)
+        stays = self.keeps_frames and not (self.uncertain or shape.inverse or shape.rewritten)
+        passes = self.formula is not None or stays
         if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
         sizes = {len(each) for each in (self.left, *self.right, self.fixed) if each is not None}
@@ -300,6 +301,7 @@ class Request(NamedTuple):
     extra_column: the column or key of a stamp or weight that is read beside the pose; "" is the usual stamp
     gathered: takes the poses, nothing is written then
     all_numbers: all numbers of a result are wanted, also those that do not change
+    canonical: results are written anew rather than in the text of their records
     """
 
     operation: Operation = Operation()
@@ -328,6 +330,7 @@ class Request(NamedTuple):
     gathered: Gathered | None = None
     on_error: str = STOP
     all_numbers: bool = False
+    canonical: bool = False
 
     @property
     def in_order(self) -> bool:

@@ -236,3 +236,24 @@ def test_a_matrix_is_a_similarity_where_it_is_asked_for(run: Run) -> None:
     off = json.dumps({"matrix": [[2, 0, 0.5], [0, 2, 0], [0, 0, 2]]})
     assert run("invert", "--scale", off).status == 1
     assert "--scale is about the matrix of --transform" in run("apply", "--scale", "tree.yaml", "a", "b", "1", "1", "1", files={"tree.yaml": "frames: {a: {b: {}}}"}).err
+
+
+@pytest.mark.parametrize("form", ["argument", "file", *STREAMS[:-1]])
+@pytest.mark.parametrize("spelling", ["entries", "rows", "sigmas"])
+def test_inverse_true_is_that_of_the_pose_as_it_is_written(run: Run, spelling: str, form: str) -> None:
+    beside, _, own = SPELLINGS[spelling]
+    for way in ways(form, POSE | {"inverse": True} | beside):
+        for command, expected in (
+            (("convert", "--to", "quaternion"), invert(ROW, own)), (("invert",), own), (("compose", EXACT), compose(B, None, ROW.inverse(), invert(ROW, own))),
+        ):  # fmt: skip
+            done = given(run, (*command, "-f", "json"), way)
+            assert done.status == 0, done.err
+            for each in flat(values(done.out)):
+                assert "inverse" not in each
+                assert np.allclose(np.ravel(each["covariance"]), expected, rtol=1e-13, atol=1e-17)
+
+
+def test_the_same_pose_twice_counts_as_two_and_that_is_told(run: Run) -> None:
+    done = run("compose", "a.json", "inv(a.json)", files={"a.json": json.dumps(POSE | {"covariance": WHOLE})})
+    assert done.err == "frametool: warning: 'a.json' stands twice: the two count as independent, as all poses do\n"
+    assert run("compose", "a.json", "inv(a.json)", files={"a.json": json.dumps(POSE)}).err == ""
