@@ -173,6 +173,14 @@ def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory
     return found, name, any(bad.count for bad in made)
 
 
+def forms_of(files: int) -> list[str]:
+    """Return the form of each of several files as --in says, the last for the rest; "" where it says none."""
+    forms = list(settings().input_forms)
+    if len(forms) > files:
+        raise click.UsageError(f"--in is given {len(forms)} times for {files} files")
+    return forms + (forms[-1:] * (files - len(forms)) or [""] * files)
+
+
 def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple[list[Comparison], bool]:
     """Compare estimates with a reference as the options say; tell what is worth it. Also: whether rows were skipped."""
     from frametool.fit.comparison import compare
@@ -180,10 +188,7 @@ def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple
     if [ref, *ests].count("-") > 1:
         raise click.UsageError("standard input can be read once; only one trajectory may be -")
     on_error = options.pop("on_error")
-    forms = list(settings().input_forms)
-    if len(forms) > 1 + len(ests):
-        raise click.UsageError(f"--in is given {len(forms)} times for {1 + len(ests)} files")
-    forms += forms[-1:] * (1 + len(ests) - len(forms)) or [""] * (1 + len(ests))
+    forms = forms_of(1 + len(ests))
     chosen = _settings(options)
     reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
     found = []

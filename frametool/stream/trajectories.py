@@ -116,11 +116,15 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Traj
     converter = FormatConverter(form, request, Style("tum"), file.name, own)
     numbers: list[Any] = []
     stamps: list[Any] = []
+    lines: list[Any] = []
+    before = [int(converter.is_table)]  # what lists poses says itself where they stand
     named: set[tuple[str | None, str | None]] = set()
 
     def gathered() -> Iterator[Outcome]:
         for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
+            before.append(before[-1] + outcome.lines)
             if len(poses.numbers):
+                lines.append(poses.lines + before[-2])
                 numbers.append(poses.numbers)
                 stamps.append(poses.stamps_ns)
                 named.update(zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True))
@@ -139,7 +143,8 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Traj
     parent, name = named.pop()
     times: Any = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
-    return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body)
+    at = None if "arrays" in FORMATS[form].reads else np.concatenate(lines)
+    return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
 
 
 def _of_records(file: InputFile, form: str, bad: BadRows) -> Trajectory:

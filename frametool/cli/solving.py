@@ -1,0 +1,250 @@
+"""What `solve` does with each kind of input: read it, solve, and put the result into one shape."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from frametool.cli.group import settings
+from frametool.cli.stderr import say, say_error
+from frametool.errors import ValueInvalid, shown, warn
+from frametool.stream.faults import STOP
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from frametool.fit.hand_eye import HandEye
+    from frametool.fit.measured_tree import TreeSolution
+    from frametool.fit.measurements import Measurement
+    from frametool.geometry.types import Array, Components
+    from frametool.stream.faults import BadRows
+    from frametool.stream.samples import Samples
+    from frametool.view.solution_text import Solution, SolvedFrame, SolvedRow
+
+NAMES = ("base", "gripper", "camera", "target")
+SHARES = 1000  # of the way, as progress counts it
+UNSURE = 1.2  # times too small: given sigmas of which it is told
+
+
+def tell_taken(text: str) -> None:
+    """Say how an input was taken, unless --quiet."""
+    if not settings().quiet:
+        say(text)
+
+
+def solved_tree(
+    files: Sequence[str], *, root: str | None, fix: Sequence[str], without: Sequence[str], robust: bool
+) -> Solution:
+    """Solve the tree that the measurements of files mean, beside what is fixed."""
+    from frametool.fit.measured_tree import solve_tree
+    from frametool.view.progress import ProgressBar
+
+    fixed = _fixed_edges(fix) if fix else []
+    measurements = _measurements(files, without)
+    with ProgressBar(SHARES, quiet=settings().quiet, rows=False) as bar:
+        found = solve_tree(
+            measurements,
+            root=root,
+            fixed=[edge[:3] for edge in fixed],
+            robust=robust,
+            progress=lambda share: bar.advance(0, round(SHARES * share) - bar.size),
+        )
+    if found.sigma_factor > UNSURE:
+        warn(f"the given sigmas are {found.sigma_factor:.2g} times too small for what the used rows are off")
+    return _tree_solution(found, {(parent, child): covariance for parent, child, _, covariance in fixed})
+
+
+def _fixed_edges(files: Sequence[str]) -> list[tuple[str, str, Any, Components | None]]:
+    """Return the edges of --fix trees: parent, child, components, covariance."""
+    from frametool.cli.trees import load_tree
+
+    tree = load_tree(files[0], files[1:])
+    if moving := next((track.child for track in tree.tracks() if not track.standing), None):
+        raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; what is fixed stands still (tree --at TIME)")
+    return [
+        (track.parent, track.child, track.components, tree.covariances.get(track.child)) for track in tree.tracks()
+    ]
+
+
+def _measurements(files: Sequence[str], places: Sequence[str]) -> list[Measurement]:
+    from frametool.cli.trees import opened, state
+    from frametool.stream.measurements import read_measurements, without
+
+    recordings = opened(files)
+    found = read_measurements(recordings)
+    state(recordings)
+    for each in recordings:
+        own = [row for row in found if row.place.rpartition(":")[0] == each.name]
+        first = f", the first {own[0].parent}<-{own[0].child}" if own else ""
+        tell_taken(f"{each.name}: {len(own)} measurements parent<-child, the pose of child in parent{first}")
+    return without(found, places)
+
+
+def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], Components | None]) -> Solution:
+    from frametool.view.solution_text import Solution
+
+    parents = found.parents
+    frames = [
+        _frame(name, parents.get(name), found.pose(name, parents.get(name)).components,
+               fixed.get((parents[name], name)) if name in found.fixed else _listed(found.marginal(name))
+               if name in parents else None,
+               found.rows[name], checked=found.frame_checked[name])
+        for name in found.frames
+    ]  # fmt: skip
+    unknown = [each.name for each in frames if each.parent and each.name not in found.fixed and not each.covariance]
+    if unknown:
+        warn(f"no covariance: no loop and no sigma says how sure {_some(unknown)} are")
+    if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
+        tell_taken(f"in no loop, so that nothing checks them: {_some(alone)}")
+    rows = [
+        _row(m.place, at, m.id, m.parent, m.child, found.residuals[at], float(found.u[at]),
+             used=bool(found.used[at]), checked=bool(found.checked[at]), fits=found.fits[at])
+        for at, m in enumerate(found.measurements)
+    ]  # fmt: skip
+    return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
+
+
+def _some(names: Sequence[str], most: int = 5) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def _listed(covariance: Array | None) -> Components | None:
+    return None if covariance is None else tuple(covariance.ravel().tolist())
+
+
+def _frame(
+    name: str, parent: str | None, components: Iterable[Any], covariance: Components | None, rows: int,
+    *, checked: bool = True,
+) -> SolvedFrame:  # fmt: skip
+    from frametool.view.solution_text import SolvedFrame
+
+    numbers: Any = tuple(float(part) + 0.0 for part in components)
+    return SolvedFrame(name, parent, numbers, covariance, rows, checked)
+
+
+def _row(
+    place: str, at: int, name: str | None, parent: str, child: str, residual: Array, u: float, **said: Any
+) -> SolvedRow:
+    """Return a row of a report: how far it is off in metres, and in radians where it has turned."""
+    from math import hypot
+
+    from frametool.view.solution_text import SolvedRow
+
+    parts = residual.tolist()
+    angle = hypot(*parts[3:]) if len(parts) > 3 else None
+    return SolvedRow(place, at + 1, name, parent, child, hypot(*parts[:3]), angle, u, **said)
+
+
+def solved_hand_eye(
+    files: Sequence[str], *, eye_to_hand: bool, max_gap_ns: int | None, names: Sequence[str] | None, robust: bool
+) -> Solution:
+    """Solve where a camera is on a hand, or beside a robot: two files of poses, or one of samples."""
+    from frametool.stream.samples import read_samples
+
+    if len(files) == 1:
+        if settings().input_forms:
+            raise click.UsageError("--in is not used: SAMPLES are YAML or JSON")
+        samples = read_samples(files[0], eye_to_hand=eye_to_hand)
+    else:
+        samples = _paired(files, max_gap_ns)
+    called = _hand_eye_names(names, samples.names)
+    base, gripper, camera, target = called
+    holder, other = (base, gripper) if eye_to_hand else (gripper, base)
+    tell_taken(f"{files[0]}: {base}<-{gripper}; {files[-1]}: {camera}<-{target}; {len(samples.places)} samples")
+    tell_taken(f"solved for {holder}<-{camera} and {other}<-{target}")
+    for each in samples.told:
+        say(each)
+    from frametool.fit.hand_eye import solve_hand_eye
+
+    found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
+    for each in found.warnings:
+        warn(each)
+    return _hand_eye_solution(found, samples, (holder, other, camera, target))
+
+
+def _paired(files: Sequence[str], max_gap_ns: int | None) -> Samples:
+    from frametool.cli.comparing import forms_of, trajectory
+    from frametool.stream.samples import paired
+
+    read = [trajectory(file, STOP, form)[:2] for file, form in zip(files, forms_of(2), strict=True)]
+    (gripper, first), (target, second) = read
+    if max_gap_ns is not None:
+        for each, name in read:
+            if each.stamps_ns is None:
+                raise click.UsageError(f"--max-gap is not used: {name} has no stamps")
+    return paired(gripper, target, (first, second), max_gap_ns)
+
+
+def _hand_eye_names(said: Sequence[str] | None, found: Sequence[str | None]) -> tuple[str, str, str, str]:
+    """Choose the names of base, gripper, camera, target: those asked for, else of the rows, else these words."""
+    base, gripper, camera, target = said or [each or name for each, name in zip(found, NAMES, strict=True)]
+    if len({base, gripper, camera, target}) < len(NAMES):
+        raise ValueInvalid(f"two of the frames {base}, {gripper}, {camera}, {target} are called alike; give --names")
+    return base, gripper, camera, target
+
+
+def _hand_eye_solution(found: HandEye, samples: Samples, names: tuple[str, str, str, str]) -> Solution:
+    from frametool.view.solution_text import Solution
+
+    holder, other, camera, target = names
+    count = int(found.used.sum())
+    frames = [
+        *(_frame(name, None, (0, 0, 0, 0, 0, 0, 1), None, count) for name in (holder, other)),
+        _frame(camera, holder, found.x.components, _listed(found.covariance_x), count),
+        _frame(target, other, found.z.components, _listed(found.covariance_z), count),
+    ]
+    rows = [
+        _row(place, at, None, camera, target, found.residuals[at], float(found.u[at]),
+             used=bool(found.used[at]), checked=found.dof > 0)
+        for at, place in enumerate(samples.places)
+    ]  # fmt: skip
+    return Solution(
+        "hand-eye", None, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows,
+        noise_at=found.noise_at, turns=found.turns,
+    )  # fmt: skip
+
+
+def solved_points(files: Sequence[str], *, names: Sequence[str] | None, scale: bool, robust: bool) -> Solution:
+    """Solve the transform between two files of matched points."""
+    from frametool.cli.comparing import forms_of
+    from frametool.cli.trees import answers
+    from frametool.fit.matched_points import solve_points
+    from frametool.stream.faults import BadRows
+    from frametool.stream.samples import matched, read_points
+    from frametool.view.solution_text import Solution
+
+    def policy(name: str) -> BadRows:
+        return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
+
+    a, b = (
+        read_points(file, form=form, answers=answers(), policy=policy)
+        for file, form in zip(files, forms_of(2), strict=True)
+    )
+    found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else (None, None)
+    target, source = names or [each or name for each, name in zip(found_names, ("A", "B"), strict=True)]
+    pairs = matched(a, b)
+    how = "by row" if pairs.ids is None or a.ids is None or b.ids is None else "by id"
+    tell_taken(f"{a.file}: points in {target}; {b.file}: points in {source}; {len(pairs.places)} matched {how}")
+    for each in pairs.told:
+        say(each)
+    found = solve_points(
+        pairs.target, pairs.source, weights=pairs.weights, scale=scale, robust=robust, names=(target, source)
+    )
+    for each in found.hints:
+        warn(each)
+    count = int(found.used.sum())
+    frames = [
+        _frame(target, None, (0, 0, 0, 0, 0, 0, 1), None, count),
+        _frame(source, target, found.transform.components, _listed(found.covariance), count),
+    ]
+    rows = [
+        _row(place, at, pairs.ids[at] if pairs.ids else None, target, source, found.residuals[at], float(found.u[at]),
+             used=bool(found.used[at]), checked=found.dof > 0, counted=bool(found.used[at] or found.left_out[at]))
+        for at, place in enumerate(pairs.places)
+    ]  # fmt: skip
+    return Solution(
+        "points", target, found.dof, found.rms_distance, None, (found.sigma, None), frames, rows,
+        scale=found.scale, scale_sigma=found.scale_sigma,
+    )  # fmt: skip
