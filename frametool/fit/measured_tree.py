@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.fit.bodies import Bodies, Fixed
-    from frametool.fit.measurements import Measurement
     from frametool.geometry.types import Array
+    from frametool.stream.measurements import Measurement
 
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance has
 

@@ -1,9 +1,9 @@
-"""A measurement of one frame in another, and the blunders that people make when they write one down."""
+"""The blunders that people make when they write down a measurement, and which of them explains one."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,52 +15,13 @@ from frametool.geometry.transform import Transform
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.geometry.types import Array, Rigid
+    from frametool.geometry.types import Array
+    from frametool.stream.measurements import Measurement
 
 FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
 ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
 TIE = 1e-9  # of u: what is not nearer than this explains nothing
 O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, as in papers
-
-
-class Measurement(NamedTuple):
-    """The pose of a child in its parent, as somebody measured it.
-
-    components: tx, ty, tz, x, y, z, w; metres
-    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
-    place: where it stands, `m.yaml:12`
-    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
-    """
-
-    parent: str
-    child: str
-    components: Rigid
-    covariance: tuple[float, ...] | None = None
-    place: str = ""
-    id: str | None = None
-    written: tuple[str, tuple[float, float, float]] | None = None
-
-    @property
-    def transform(self) -> Transform:
-        """Return parent_from_child."""
-        return Transform.of(*self.components)
-
-    def turned(self, x: float, y: float, z: float, w: float) -> Transform:
-        """Return it with another quaternion."""
-        return Transform.of(*self.components[:3], x, y, z, w)
-
-    def shifted(self, factor: float) -> Transform:
-        """Return it with its translation times a factor."""
-        x, y, z, *turn = self.components
-        return Transform.of(x * factor, y * factor, z * factor, *turn)
-
-    def reread(self, change: Callable[[float], float]) -> Transform | None:
-        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
-        if self.written is None:
-            return None
-        kind, angles = self.written
-        read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
-        return self.turned(*read([change(angle) for angle in angles]).components)
 
 
 def _translation_of_inverse(m: Measurement) -> Transform:
