@@ -152,7 +152,8 @@ def solved_hand_eye(
     called = _hand_eye_names(names, samples.names)
     base, gripper, camera, target = called
     holder, other = (base, gripper) if eye_to_hand else (gripper, base)
-    tell_taken(f"{files[0]}: {base}<-{gripper}; {files[-1]}: {camera}<-{target}; {len(samples.places)} samples")
+    second = f"; {files[1]}:" if len(files) > 1 else ","
+    tell_taken(f"{files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {len(samples.places)} samples")
     tell_taken(f"solved for {holder}<-{camera} and {other}<-{target}")
     for each in samples.told:
         say(each)

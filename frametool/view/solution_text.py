@@ -155,11 +155,21 @@ def _mm(metres: float) -> str:
 
 
 def _deg(radians: float) -> str:
-    return f"{math.degrees(radians):.2f} deg"
+    return f"{_degrees(math.degrees(radians))} deg"
+
+
+def _degrees(value: float) -> str:
+    """Write a sigma in at most five characters."""
+    return f"{value:.2f}" if not value or 0.005 <= value < 100 else f"{value:.0e}"
 
 
 def _fixed(value: float, decimals: int) -> str:
-    return f"{value + 0.0:.{decimals}f}" if abs(value) < LARGE else f"{value:.3e}"
+    is_plain = not value or 0.5 * 10.0**-decimals <= abs(value) < LARGE
+    return f"{value + 0.0:.{decimals}f}" if is_plain else f"{value:.1e}"
+
+
+def _metres(value: float) -> str:
+    return f"{value:.4f}" if abs(value) < 100 else f"{value:.2f}" if abs(value) < 10_000 else f"{value:.1e}"
 
 
 def _pair(each: SolvedFrame, root: str | None) -> str:
@@ -176,9 +186,9 @@ def _frames(found: Solution) -> Iterator[str]:
         if each.parent is None:
             yield from _aligned(_pair(each, root), width, f"{each.rows:>49}  root")
             continue
-        place = "".join(f" {_fixed(part, 4):>8}" for part in each.components[:3])
+        place = "".join(f" {_metres(part):>8}" for part in each.components[:3])
         sigmas = _sigmas(each)
-        worst = ("-", "-") if sigmas is None else (_fixed(1e3 * max(sigmas["xyz"]), 1), f"{max(sigmas['rpy_deg']):.2f}")
+        worst = ("-", "-") if sigmas is None else (_fixed(1e3 * max(sigmas["xyz"]), 1), _degrees(max(sigmas["rpy_deg"])))
         numbers = f"{place} {worst[0]:>9} {worst[1]:>5} {each.rows:>5}"
         yield from _aligned(_pair(each, root), width, numbers + ("" if each.checked else "  unchecked"))
     if (more := len(found.frames) - len(shown)) > 0 and found.shape == "tree":
