@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.group import settings
 from frametool.cli.stderr import say, say_error
 from frametool.errors import ValueInvalid, shown, warn
+from frametool.geometry.rigid import IDENTITY
 from frametool.stream.faults import STOP
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Iterable, Sequence
 
     from frametool.fit.hand_eye import HandEye
     from frametool.fit.measured_tree import TreeSolution
-    from frametool.fit.measurements import Measurement
+    from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Components
-    from frametool.stream.faults import BadRows
+    from frametool.stream.measurements import Measurement
     from frametool.stream.samples import Samples
     from frametool.view.solution_text import Solution, SolvedFrame, SolvedRow
 
@@ -84,14 +85,7 @@ def _measurements(files: Sequence[str], places: Sequence[str]) -> list[Measureme
 def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], Components | None]) -> Solution:
     from frametool.view.solution_text import Solution
 
-    parents = found.parents
-    frames = [
-        _frame(name, parents.get(name), found.pose(name, parents.get(name)).components,
-               fixed.get((parents[name], name)) if name in found.fixed else _listed(found.marginal(name))
-               if name in parents else None,
-               found.rows[name], checked=found.frame_checked[name])
-        for name in found.frames
-    ]  # fmt: skip
+    frames = [_solved_frame(found, name, fixed) for name in sorted(found.frames, key=lambda name: name != found.root)]
     unknown = [each.name for each in frames if each.parent and each.name not in found.fixed and not each.covariance]
     if unknown:
         warn(f"no covariance: no loop and no sigma says how sure {_some(unknown)} are")
@@ -105,6 +99,18 @@ def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], Components 
     return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
 
 
+def _solved_frame(found: TreeSolution, name: str, fixed: dict[tuple[str, str], Components | None]) -> SolvedFrame:
+    """Return the entry of a frame: in the root, or as --fix has it."""
+    from frametool.view.solution_text import SolvedFrame
+
+    parent, is_fixed = found.parents.get(name), name in found.fixed
+    covariance = None
+    if parent is not None:
+        covariance = fixed.get((parent, name)) if is_fixed else _listed(found.marginal(name))
+    pose = _numbers(found.pose(name, parent).components)
+    return SolvedFrame(name, parent, pose, covariance, found.rows[name], found.frame_checked[name], is_fixed)
+
+
 def _some(names: Sequence[str], most: int = 5) -> str:
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
@@ -114,14 +120,17 @@ def _listed(covariance: Array | None) -> Components | None:
     return None if covariance is None else tuple(covariance.ravel().tolist())
 
 
-def _frame(
-    name: str, parent: str | None, components: Iterable[Any], covariance: Components | None, rows: int,
-    *, checked: bool = True,
-) -> SolvedFrame:  # fmt: skip
+def _numbers(components: Iterable[Any]) -> Any:
+    """Return components as floats; none is -0.0."""
+    return tuple(float(part) + 0.0 for part in components)
+
+
+def _side(parent: str, name: str, pose: Transform, covariance: Array, rows: int) -> list[SolvedFrame]:
+    """Return a root and the one frame in it."""
     from frametool.view.solution_text import SolvedFrame
 
-    numbers: Any = tuple(float(part) + 0.0 for part in components)
-    return SolvedFrame(name, parent, numbers, covariance, rows, checked)
+    root = SolvedFrame(parent, None, IDENTITY, None, rows, checked=True)
+    return [root, SolvedFrame(name, parent, _numbers(pose.components), _listed(covariance), rows, checked=True)]
 
 
 def _row(
@@ -192,9 +201,8 @@ def _hand_eye_solution(found: HandEye, samples: Samples, names: tuple[str, str, 
     holder, other, camera, target = names
     count = int(found.used.sum())
     frames = [
-        *(_frame(name, None, (0, 0, 0, 0, 0, 0, 1), None, count) for name in (holder, other)),
-        _frame(camera, holder, found.x.components, _listed(found.covariance_x), count),
-        _frame(target, other, found.z.components, _listed(found.covariance_z), count),
+        *_side(holder, camera, found.x, found.covariance_x, count),
+        *_side(other, target, found.z, found.covariance_z, count),
     ]
     rows = [
         _row(place, at, None, camera, target, found.residuals[at], float(found.u[at]),
@@ -236,10 +244,7 @@ def solved_points(files: Sequence[str], *, names: Sequence[str] | None, scale: b
     for each in found.hints:
         warn(each)
     count = int(found.used.sum())
-    frames = [
-        _frame(target, None, (0, 0, 0, 0, 0, 0, 1), None, count),
-        _frame(source, target, found.transform.components, _listed(found.covariance), count),
-    ]
+    frames = _side(target, source, found.transform, found.covariance, count)
     rows = [
         _row(place, at, pairs.ids[at] if pairs.ids else None, target, source, found.residuals[at], float(found.u[at]),
              used=bool(found.used[at]), checked=found.dof > 0, counted=bool(found.used[at] or found.left_out[at]))

@@ -1,21 +1,20 @@
 """What hand-eye and matched points are solved from: pairs of poses, and points with their ids and weights.
 
-    - {gripper: {xyz: [..], rpy: [..]}, target: {..}}                      samples as one writes them
-    - {effector_wrt_world: [16 numbers], object_wrt_sensor: [..]}          of moveit_calibration
-    samples: [{robot: {translation: .., rotation: ..}, tracking: {..}}]    of easy_handeye2 (`optical` in the first)
-    id,x,y,z,weight                                                        points, in any form that holds such
+- {gripper: {xyz: [..], rpy: [..]}, target: {..}}                      samples as one writes them
+- {effector_wrt_world: [16 numbers], object_wrt_sensor: [..]}          of moveit_calibration
+samples: [{robot: {translation: .., rotation: ..}, tracking: {..}}]    of easy_handeye2 (`optical` in the first)
+id,x,y,z,weight                                                        points, in any form that holds such
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile
-from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
+from frametool.errors import FormatError, ValueInvalid, bare, shown
 from frametool.fit.pairs import between
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
@@ -35,7 +34,6 @@ from frametool.stream.trajectories import TREE
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    import re
     from collections.abc import Callable, Iterator, Sequence
     from io import BufferedReader
 
@@ -97,7 +95,7 @@ def read_samples(argument: str, *, eye_to_hand: bool) -> Samples:
     places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
     sides = [[*each] for each in zip(*found, strict=True)]
     names = [_one_name(each, places) for side in sides for each in ([p.parent for p in side], [p.name for p in side])]
-    return Samples(*map(_batch, sides), places, tuple(names), [])
+    return Samples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), [])
 
 
 def _listed(value: Any) -> Iterator[tuple[Path, Any]]:
@@ -187,10 +185,11 @@ def paired(gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_
     kept = np.flatnonzero(is_between | near)
     gap = f"{gap_ns / 1e6:g} ms"
     if not len(kept):
-        clock = f"by their stamps {float(off.min()) / 1e9:.3f} s apart at least"
-        raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}, {clock}; the clocks? --max-gap")
-    alone = target.size - len(kept)
-    told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"] if alone else []
+        apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
+        raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
+    told = []
+    if alone := target.size - len(kept):
+        told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
     sides = chosen.at(kept).poses, target.at(kept).poses
     return Samples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), told)
 
@@ -252,11 +251,11 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Poin
                 numbers.append(poses.numbers[:, :3])
                 lines.extend((poses.lines + first).tolist())
                 frames.update(poses.parents)
-                given = poses.extras | ({} if poses.names[0] is None else {IDS[1]: poses.names})
+                given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in beside}
+                if poses.names[0] is not None:
+                    given[IDS[1]] = [*poses.names] if len(poses.names) == size else [*poses.names] * size
                 for key, cells in beside.items():
-                    there = given.get(key, [None] * size)
-                    found = there if isinstance(there, list) else plain_cells(there)
-                    cells.extend(found if len(found) == size else found * size)
+                    cells.extend(given.get(key, [None] * size))
             first += outcome.lines
             yield outcome
 

@@ -24,6 +24,7 @@ class SolvedFrame(NamedTuple):
 
     parent: None for a root; components: its pose there; covariance: 36 numbers, None where they are not known
     rows: how many measurements of it are used; checked: whether its pose rests on loops only
+    fixed: whether its entry is one of --fix
     """
 
     name: str
@@ -32,6 +33,7 @@ class SolvedFrame(NamedTuple):
     covariance: Components | None
     rows: int
     checked: bool
+    fixed: bool = False
 
 
 class SolvedRow(NamedTuple):
@@ -188,9 +190,12 @@ def _frames(found: Solution) -> Iterator[str]:
             continue
         place = "".join(f" {_metres(part):>8}" for part in each.components[:3])
         sigmas = _sigmas(each)
-        worst = ("-", "-") if sigmas is None else (_fixed(1e3 * max(sigmas["xyz"]), 1), _degrees(max(sigmas["rpy_deg"])))
+        worst = ("-", "-")
+        if sigmas is not None:
+            worst = _fixed(1e3 * max(sigmas["xyz"]), 1), _degrees(max(sigmas["rpy_deg"]))
+        mark = "  fixed" if each.fixed else "" if each.checked else "  unchecked"
         numbers = f"{place} {worst[0]:>9} {worst[1]:>5} {each.rows:>5}"
-        yield from _aligned(_pair(each, root), width, numbers + ("" if each.checked else "  unchecked"))
+        yield from _aligned(_pair(each, root), width, numbers + mark)
     if (more := len(found.frames) - len(shown)) > 0 and found.shape == "tree":
         yield f"  .. and {more} more; --report FILE.json has all"
 
@@ -209,7 +214,8 @@ def _left_out(found: Solution) -> Iterator[str]:
         lines = [*_aligned(name, width, numbers)]
         if each.fits:
             words = f"fits when {each.fits}"
-            lines = [*lines[:-1], f"{lines[-1]}  {words}"] if len(lines[-1]) + 2 + len(words) <= WIDTH else [*lines, f"    {words}"]
+            fits_beside = len(lines[-1]) + 2 + len(words) <= WIDTH
+            lines = [*lines[:-1], f"{lines[-1]}  {words}"] if fits_beside else [*lines, f"    {words}"]
         yield from lines
 
 
