@@ -8,12 +8,12 @@ import click
 
 from frametool.cli.group import settings
 from frametool.cli.stderr import say, say_error
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import ValueInvalid, alternatives, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.stream.faults import STOP
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from frametool.fit.hand_eye import HandEye
     from frametool.fit.measured_tree import TreeSolution
@@ -41,8 +41,8 @@ def solved_tree(
     from frametool.fit.measured_tree import solve_tree
     from frametool.view.progress import ProgressBar
 
-    fixed = _fixed_edges(fix) if fix else []
     measurements = _measurements(files, without)
+    fixed = _fixed_edges(fix, dict.fromkeys(name for each in measurements for name in each[:2])) if fix else []
     with ProgressBar(SHARES, quiet=settings().quiet, rows=False) as bar:
         found = solve_tree(
             measurements,
@@ -56,16 +56,17 @@ def solved_tree(
     return _tree_solution(found, {(parent, child): covariance for parent, child, _, covariance in fixed})
 
 
-def _fixed_edges(files: Sequence[str]) -> list[tuple[str, str, Any, Components | None]]:
+def _fixed_edges(files: Sequence[str], measured: Collection[str]) -> list[tuple[str, str, Any, Components | None]]:
     """Return the edges of --fix trees: parent, child, components, covariance."""
     from frametool.cli.trees import load_tree
 
     tree = load_tree(files[0], files[1:])
     if moving := next((track.child for track in tree.tracks() if not track.standing), None):
         raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; what is fixed stands still (tree --at TIME)")
-    return [
-        (track.parent, track.child, track.components, tree.covariances.get(track.child)) for track in tree.tracks()
-    ]
+    if not {*tree.frames} & {*measured}:
+        one = tree.frames[0]
+        raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{alternatives(one, measured, 'frames')}")
+    return [(track.parent, track.child, track.components, tree.covariances.get(track.child)) for track in tree.tracks()]
 
 
 def _measurements(files: Sequence[str], places: Sequence[str]) -> list[Measurement]:
@@ -161,9 +162,11 @@ def solved_hand_eye(
     called = _hand_eye_names(names, samples.names)
     base, gripper, camera, target = called
     holder, other = (base, gripper) if eye_to_hand else (gripper, base)
-    second = f"; {files[1]}:" if len(files) > 1 else ","
-    tell_taken(f"{files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {len(samples.places)} samples")
-    tell_taken(f"solved for {holder}<-{camera} and {other}<-{target}")
+    second = f"; {samples.files[1]}:" if len(files) > 1 else ","
+    tell_taken(f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {len(samples.places)} samples")
+    if samples.taken:
+        tell_taken(samples.taken)
+    tell_taken(f"solving for {holder}<-{camera} and {other}<-{target}")
     for each in samples.told:
         say(each)
     from frametool.fit.hand_eye import solve_hand_eye

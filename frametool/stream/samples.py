@@ -57,14 +57,16 @@ class Samples(NamedTuple):
     """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
 
     places: where each stands; names: of base, gripper, camera and target, None where nothing says one
-    told: sentences on what has no partner
+    files: what they are called; taken: how a form's own words were taken; told: sentences on what has no partner
     """
 
     gripper: Transform
     target: Transform
     places: list[str]
     names: tuple[str | None, ...]
-    told: list[str]
+    files: tuple[str, ...]
+    taken: str = ""
+    told: Sequence[str] = ()
 
 
 def read_samples(argument: str, *, eye_to_hand: bool) -> Samples:
@@ -81,9 +83,11 @@ def read_samples(argument: str, *, eye_to_hand: bool) -> Samples:
     reading = Reading(source)
     found: list[tuple[Pose, Pose]] = []
     paths: list[Path] = []
+    values: list[Any] = []
     for document in parse_documents(source.text, source.name):
         try:
             for path, value in _listed(document.value):
+                values.append(value)
                 reading.here = (document.index, *path)
                 found.append(within(path, _sample, value, reading, eye_to_hand=eye_to_hand))
                 paths.append(reading.here)
@@ -95,7 +99,11 @@ def read_samples(argument: str, *, eye_to_hand: bool) -> Samples:
     places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
     sides = [[*each] for each in zip(*found, strict=True)]
     names = [_one_name(each, places) for side in sides for each in ([p.parent for p in side], [p.name for p in side])]
-    return Samples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), [])
+    taken = ""
+    if any(ROBOT in value for value in values):
+        ways = ("gripper<-base, inverted", "with") if eye_to_hand else ("base<-gripper", "without")
+        taken = f"robot is taken for {ways[0]}, as easy_handeye has it {ways[1]} --eye-to-hand"
+    return Samples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), (source.name,), taken)
 
 
 def _listed(value: Any) -> Iterator[tuple[Path, Any]]:
@@ -174,7 +182,7 @@ def paired(gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_
         if gripper.size != target.size:
             counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
             raise ValueInvalid(f"{counts}, and no stamps to pair them")
-        return Samples(gripper.poses, target.poses, _places(files[1], target, range(target.size)), tuple(names), [])
+        return Samples(gripper.poses, target.poses, _places(files[1], target, range(target.size)), tuple(names), files)
     gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
     made, is_between = between(dense, target.stamps_ns, gap_ns)
     index = np.searchsorted(dense.stamps_ns, target.stamps_ns).clip(1, max(dense.size - 1, 1))
@@ -191,7 +199,7 @@ def paired(gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_
     if alone := target.size - len(kept):
         told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
     sides = chosen.at(kept).poses, target.at(kept).poses
-    return Samples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), told)
+    return Samples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", told)
 
 
 def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:

@@ -91,9 +91,10 @@ class Solution(NamedTuple):
         return [each for each in self.rows if each.is_left_out]
 
 
-def row_report(each: SolvedRow) -> dict[str, Any]:
-    """Return a measurement for programs."""
-    return {key: value for key, value in each._asdict().items() if key != "counted"}
+def row_report(each: SolvedRow, *, in_cells: bool = False) -> dict[str, Any]:
+    """Return a measurement for programs; in_cells: as a row of a table."""
+    row = {key: value for key, value in each._asdict().items() if key != "counted"}
+    return {key: str(value).lower() if in_cells and isinstance(value, bool) else value for key, value in row.items()}
 
 
 def report(found: Solution) -> dict[str, Any]:
@@ -171,7 +172,8 @@ def _fixed(value: float, decimals: int) -> str:
 
 
 def _metres(value: float) -> str:
-    return f"{value:.4f}" if abs(value) < 100 else f"{value:.2f}" if abs(value) < 10_000 else f"{value:.1e}"
+    decimals = 4 if abs(value) < 100 else 2
+    return f"{round(value, decimals) + 0.0:.{decimals}f}" if abs(value) < 10_000 else f"{value:.1e}"
 
 
 def _pair(each: SolvedFrame, root: str | None) -> str:

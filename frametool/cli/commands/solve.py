@@ -144,33 +144,31 @@ def _refuse_misuse(files: Sequence[str], shape: str, names: Sequence[str] | None
 
 
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
-    """Write the result: a tree, or one entry where there is a scale; as hand-eye calibration only the camera."""
-    from frametool.frames.lookups import FrameTree
-    from frametool.geometry.transform import Transform
-
-    tree = FrameTree("the result")
+    """Write the result: a tree, or entries where there is a scale; as hand-eye calibration only the camera."""
     entries = [each for each in found.frames if each.parent is not None]
-    if found.scale_sigma is not None:
+    if output.style.form == "csv" or found.scale_sigma is not None:
         from frametool.grammar.pose import Pose
         from frametool.grammar.result import Result, uncertain
 
-        (each,) = entries
-        pose = Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale)
-        output.poses([Result(pose, uncertain(each.covariance))])
-        return
-    if output.style.form == "handeye" and found.shape == "hand-eye":
+        poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
+        output.poses([Result(*each) for each in zip(poses, (uncertain(each.covariance) for each in entries), strict=True)])
+    elif output.style.form == "handeye" and found.shape == "hand-eye":
         from frametool.formats.trees.handeye import write_mount
 
         camera, target = entries
         warn(f"handeye: {shown(target.name)} in {shown(str(target.parent))} and covariances left out")
         output.text(write_mount(str(camera.parent), camera.name, camera.components, output.style, on_hand=on_hand))
-        return
-    for each in found.frames:
-        if each.parent is None:
-            tree.add_root(each.name)
-    for each in entries:
-        tree.add(str(each.parent), each.name, Transform.of(*each.components), each.covariance)
-    output.tree(tree)
+    else:
+        from frametool.frames.lookups import FrameTree
+        from frametool.geometry.transform import Transform
+
+        tree = FrameTree("the result")
+        for each in found.frames:
+            if each.parent is None:
+                tree.add_root(each.name)
+            else:
+                tree.add(each.parent, each.name, Transform.of(*each.components), each.covariance)
+        output.tree(tree)
 
 
 def _write_report(found: Solution, path: str, *, force: bool) -> None:
@@ -181,7 +179,7 @@ def _write_report(found: Solution, path: str, *, force: bool) -> None:
         from frametool.formats.rows.csv import write_points
         from frametool.grammar.result import Style
 
-        text = write_points([row_report(each) for each in found.rows], Style("csv"))
+        text = write_points([row_report(each, in_cells=True) for each in found.rows], Style("csv"))
     else:
         from frametool.documents.json import dump
 
