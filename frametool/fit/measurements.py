@@ -7,17 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frametool.errors import NotConnected, printable
 from frametool.fit.rigid_arrays import Poses
+from frametool.fit.robust import KEPT
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.lint.findings import Finding
+from frametool.lint.tree_diff import Tolerance
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Array
     from frametool.stream.measurements import Measurement
 
+NEAR = Tolerance(0.01, math.radians(1.0))  # where nothing says how sure a measurement is
+LEAST = 1e-9  # metres, radians
 FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
 ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
 TIE = 1e-9  # of u: what is not nearer than this explains nothing
@@ -71,6 +78,46 @@ def best_blunder(measurement: Measurement, pose: Poses, information: Array) -> s
         return None
     as_good = (_sigmas(errors - errors[best], information) <= ALIKE) & (u <= FITTING)
     return list(meant)[int(as_good.argmax())]
+
+
+def loops(
+    tree: FrameTree, measurements: Sequence[Measurement], tolerance: Tolerance | None
+) -> tuple[list[Finding], list[str], int]:
+    """Compare measurements with a tree: findings of those that are off, frames it lacks, how many have no way in it.
+
+    tolerance: what still agrees; None: 3 sigmas where a measurement has a covariance, else 10 mm and 1 deg
+    """
+    findings, lacking, apart = [], dict[str, None](), 0
+    for each in measurements:
+        unknown = [name for name in each[:2] if name not in tree.frames]
+        lacking |= dict.fromkeys(unknown)
+        if unknown:
+            continue
+        try:
+            pose = Poses.of(tree.lookup(each.parent, each.child))
+        except NotConnected:
+            apart += 1
+            continue
+        error = pose.errors(Poses.of(each.transform))
+        metres, radians = (float(np.linalg.norm(half)) for half in (error[:3], error[3:]))
+        if tolerance is None and each.covariance is not None:
+            information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
+            u = _sigmas(error[None], information)[0]
+            agrees, sigmas = u <= KEPT, f" ({u:.1f} sigmas)"
+        else:
+            near = tolerance or NEAR
+            agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
+            # so that what is within `FITTING` sigmas is within the tolerance
+            halves = np.maximum(np.repeat([near.metres, near.radians], 3), LEAST) / FITTING / 6**0.5
+            information = np.diag(halves**-2.0)
+        if not agrees:
+            words = best_blunder(each, pose, information)
+            off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg{sigmas} off the tree"
+            names = f"{printable(each.parent)}<-{printable(each.child)}"
+            file, _, line = each.place.rpartition(":")
+            place = (file, int(line)) if line.isdecimal() else (each.place,)
+            findings.append(Finding("loop", f"{names} is {off}{f'; fits when {words}' if words else ''}", *place))
+    return findings, [*lacking], apart
 
 
 def _sigmas(errors: Array, information: Array) -> Array:

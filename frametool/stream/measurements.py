@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
-from frametool.formats.load import Place, lines_of
+from frametool.formats.load import Place, close_all, lines_of
 from frametool.formats.trees.tree_reader import read_edges, shown_keys
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -108,18 +108,18 @@ def read_measurements(
     """
     request = Request(kind=POSE, degrees=degrees, normalize=normalize)
     found: list[Measurement] = []
-    for file in files:
-        try:
-            rows = [*_reader(file)(file, request)]
-        finally:
-            file.close()
-        if not rows:
-            raise FormatError(f"no measurements in it; {LIKE}", source=file.name)
-        first: dict[tuple[str, str], Row] = {}
-        for row in rows:
-            if problem := _problem(row, first):
-                raise FormatError(problem, source=file.name, line=row.line)
-            found.append(row.measurement._replace(place=f"{file.name}:{row.line}" if row.line else file.name))
+    try:
+        for file in files:
+            first: dict[tuple[str, str], Row] = {}
+            before = len(found)
+            for row in _reader(file)(file, request):
+                if problem := _problem(row, first):
+                    raise FormatError(problem, source=file.name, line=row.line)
+                found.append(row.measurement._replace(place=f"{file.name}:{row.line}" if row.line else file.name))
+            if len(found) == before:
+                raise FormatError(f"no measurements in it; {LIKE}", source=file.name)
+    finally:
+        close_all(files)
     return found
 
 
