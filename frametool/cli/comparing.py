@@ -154,7 +154,9 @@ trajectory_options = together(
 )  # fmt: skip
 
 
-def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory, str, bool]:
+def trajectory(
+    argument: str, on_error: str, form: str = "", *, normalize: bool = False
+) -> tuple[Trajectory, str, bool]:
     """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
     from os.path import basename
 
@@ -167,7 +169,9 @@ def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory
         made.append(BadRows(name, on_error, most=MOST, tell=partial(say_error, in_json=False)))
         return made[-1]
 
-    found = read_trajectory(argument, form=form, topics=settings().topics, answers=answers(), policy=policy)
+    found = read_trajectory(
+        argument, form=form, topics=settings().topics, answers=answers(), policy=policy, normalize=normalize
+    )
     file, inside = split_name(argument)
     name = ":".join(["stdin" if file == "-" else basename(file), *inside])
     return found, name, any(bad.count for bad in made)

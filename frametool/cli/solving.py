@@ -35,14 +35,16 @@ def tell_taken(text: str) -> None:
 
 
 def solved_tree(
-    files: Sequence[str], *, root: str | None, fix: Sequence[str], without: Sequence[str], robust: bool
+    files: Sequence[str], *, root: str | None, fix: Sequence[str], without: Sequence[str], robust: bool,
+    normalize: bool,
 ) -> Solution:
     """Solve the tree that the measurements of files mean, beside what is fixed."""
     from frametool.fit.measured_tree import solve_tree
     from frametool.view.progress import ProgressBar
 
-    measurements = _measurements(files, without)
-    fixed = _fixed_edges(fix, dict.fromkeys(name for each in measurements for name in each[:2])) if fix else []
+    measurements = _measurements(files, without, normalize=normalize)
+    measured = dict.fromkeys(name for each in measurements for name in each[:2])
+    fixed = _fixed_edges(fix, measured, normalize=normalize) if fix else []
     with ProgressBar(SHARES, quiet=settings().quiet, rows=False) as bar:
         found = solve_tree(
             measurements,
@@ -53,43 +55,46 @@ def solved_tree(
         )
     if found.sigma_factor > UNSURE:
         warn(f"the given sigmas are {found.sigma_factor:.2g} times too small for what the used rows are off")
-    return _tree_solution(found, {(parent, child): covariance for parent, child, _, covariance in fixed})
+    return _tree_solution(found, {(parent, child): entry for parent, child, *entry in fixed})
 
 
-def _fixed_edges(files: Sequence[str], measured: Collection[str]) -> list[tuple[str, str, Any, Components | None]]:
+def _fixed_edges(
+    files: Sequence[str], measured: Collection[str], *, normalize: bool
+) -> list[tuple[str, str, Any, Components | None]]:
     """Return the edges of --fix trees: parent, child, components, covariance."""
     from frametool.cli.trees import load_tree
+    from frametool.formats.load import Rules
 
-    tree = load_tree(files[0], files[1:])
+    tree = load_tree(files[0], files[1:], Rules(normalize=normalize))
     if moving := next((track.child for track in tree.tracks() if not track.standing), None):
         raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; what is fixed stands still (tree --at TIME)")
     if not {*tree.frames} & {*measured}:
-        one = tree.frames[0]
-        raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{alternatives(one, measured, 'frames')}")
+        known = alternatives(one := tree.frames[0], measured, "frames")
+        raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{known}")
     return [(track.parent, track.child, track.components, tree.covariances.get(track.child)) for track in tree.tracks()]
 
 
-def _measurements(files: Sequence[str], places: Sequence[str]) -> list[Measurement]:
+def _measurements(files: Sequence[str], places: Sequence[str], *, normalize: bool) -> list[Measurement]:
     from frametool.cli.trees import opened, state
     from frametool.stream.measurements import read_measurements, without
 
     recordings = opened(files)
-    found = read_measurements(recordings)
+    found = read_measurements(recordings, normalize=normalize)
     state(recordings)
     for each in recordings:
         own = [row for row in found if row.place.rpartition(":")[0] == each.name]
-        first = f", the first {own[0].parent}<-{own[0].child}" if own else ""
-        tell_taken(f"{each.name}: {len(own)} measurements parent<-child, the pose of child in parent{first}")
+        first = f": {own[0].parent}<-{own[0].child} .." if own else ""
+        tell_taken(f"{each.name}: {len(own)} rows, each the pose of child in parent{first}")
     return without(found, places)
 
 
-def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], Components | None]) -> Solution:
+def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], list[Any]]) -> Solution:
     from frametool.view.solution_text import Solution
 
     frames = [_solved_frame(found, name, fixed) for name in sorted(found.frames, key=lambda name: name != found.root)]
     unknown = [each.name for each in frames if each.parent and each.name not in found.fixed and not each.covariance]
     if unknown:
-        warn(f"no covariance: no loop and no sigma says how sure {_some(unknown)} are")
+        warn(f"no covariance of {_some(unknown)}: neither loops nor sigmas say how sure that is")
     if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
         tell_taken(f"in no loop, so that nothing checks them: {_some(alone)}")
     rows = [
@@ -100,16 +105,18 @@ def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], Components 
     return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
 
 
-def _solved_frame(found: TreeSolution, name: str, fixed: dict[tuple[str, str], Components | None]) -> SolvedFrame:
+def _solved_frame(found: TreeSolution, name: str, fixed: dict[tuple[str, str], list[Any]]) -> SolvedFrame:
     """Return the entry of a frame: in the root, or as --fix has it."""
     from frametool.view.solution_text import SolvedFrame
 
     parent, is_fixed = found.parents.get(name), name in found.fixed
-    covariance = None
-    if parent is not None:
-        covariance = fixed.get((parent, name)) if is_fixed else _listed(found.marginal(name))
-    pose = _numbers(found.pose(name, parent).components)
-    return SolvedFrame(name, parent, pose, covariance, found.rows[name], found.frame_checked[name], is_fixed)
+    pose, covariance = found.pose(name, parent).components, None
+    if parent is not None and is_fixed:
+        pose, covariance = fixed[parent, name]
+    elif parent is not None:
+        covariance = _listed(found.marginal(name))
+    seen = found.rows[name], found.frame_checked[name], is_fixed
+    return SolvedFrame(name, parent, _numbers(pose), covariance, *seen)
 
 
 def _some(names: Sequence[str], most: int = 5) -> str:
@@ -148,22 +155,21 @@ def _row(
 
 
 def solved_hand_eye(
-    files: Sequence[str], *, eye_to_hand: bool, max_gap_ns: int | None, names: Sequence[str] | None, robust: bool
+    files: Sequence[str], *, eye_to_hand: bool, max_gap_ns: int | None, names: Sequence[str] | None, robust: bool,
+    normalize: bool,
 ) -> Solution:
     """Solve where a camera is on a hand, or beside a robot: two files of poses, or one of samples."""
     from frametool.stream.samples import read_samples
 
     if len(files) == 1:
-        if settings().input_forms:
-            raise click.UsageError("--in is not used: SAMPLES are YAML or JSON")
-        samples = read_samples(files[0], eye_to_hand=eye_to_hand)
+        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize)
     else:
-        samples = _paired(files, max_gap_ns)
+        samples = _paired(files, max_gap_ns, normalize=normalize)
     called = _hand_eye_names(names, samples.names)
     base, gripper, camera, target = called
     holder, other = (base, gripper) if eye_to_hand else (gripper, base)
     second = f"; {samples.files[1]}:" if len(files) > 1 else ","
-    tell_taken(f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {len(samples.places)} samples")
+    tell_taken(f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {_count(samples.places)}")
     if samples.taken:
         tell_taken(samples.taken)
     tell_taken(f"solving for {holder}<-{camera} and {other}<-{target}")
@@ -177,11 +183,16 @@ def solved_hand_eye(
     return _hand_eye_solution(found, samples, (holder, other, camera, target))
 
 
-def _paired(files: Sequence[str], max_gap_ns: int | None) -> Samples:
+def _count(samples: Sequence[object]) -> str:
+    return f"{len(samples)} sample{'s'[: len(samples) != 1]}"
+
+
+def _paired(files: Sequence[str], max_gap_ns: int | None, *, normalize: bool) -> Samples:
     from frametool.cli.comparing import forms_of, trajectory
     from frametool.stream.samples import paired
 
-    read = [trajectory(file, STOP, form)[:2] for file, form in zip(files, forms_of(2), strict=True)]
+    named = zip(files, forms_of(2), strict=True)
+    read = [trajectory(file, STOP, form, normalize=normalize)[:2] for file, form in named]
     (gripper, first), (target, second) = read
     if max_gap_ns is not None:
         for each, name in read:

@@ -69,7 +69,7 @@ class Samples(NamedTuple):
     told: Sequence[str] = ()
 
 
-def read_samples(argument: str, *, eye_to_hand: bool) -> Samples:
+def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -> Samples:
     """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2.
 
     eye_to_hand: easy_handeye has gripper_from_base as `robot` then; it is inverted.
@@ -80,7 +80,7 @@ def read_samples(argument: str, *, eye_to_hand: bool) -> Samples:
         source = file.source
     finally:
         file.close()
-    reading = Reading(source)
+    reading = Reading(source, normalize=normalize)
     found: list[tuple[Pose, Pose]] = []
     paths: list[Path] = []
     values: list[Any] = []

@@ -10,7 +10,16 @@ import click
 
 from frametool.cli.comparing import read_span
 from frametool.cli.group import refuse_unused, settings
-from frametool.cli.options import FILE, TEXT, Command, Parsed, reading_options, result_options, rotation_options
+from frametool.cli.options import (
+    FILE,
+    TEXT,
+    Command,
+    Parsed,
+    pose_options,
+    reading_options,
+    result_options,
+    rotation_options,
+)
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import tell
@@ -26,11 +35,12 @@ if TYPE_CHECKING:
 REPORTS = {".json": "json", ".csv": "csv"}
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
 FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
+LEFT_OPEN = ("joints", "joint_files", "direction", "camera_axes", "dh", "stamps", "topics")  # in trajectories
 # shape -> the options that it does not use
 UNUSED = {
     "": ("eye_to_hand", "max_gap_ns", "names", "scale"),
-    "--hand-eye": ("root", "fix", "without", "scale"),
-    "--points": ("root", "fix", "without", "eye_to_hand", "max_gap_ns"),
+    "--hand-eye": ("root", "fix", "without", "scale", "named_frames"),
+    "--points": ("root", "fix", "without", "eye_to_hand", "max_gap_ns", "named_frames", "normalize", *LEFT_OPEN),
 }
 
 
@@ -65,18 +75,19 @@ def _read_names(text: str) -> list[str]:
 @click.option("--report", type=Parsed("report", _read_report), metavar="FILE.json|csv",
               help="numbers of the fit and of each row")  # fmt: skip
 @reading_options()
+@pose_options
 @rotation_options
 @result_options("tree", "trajectory")
 def command(
     files: Sequence[str], hand_eye: bool, points: bool, eye_to_hand: bool, max_gap_ns: int | None, scale: bool,
     root: str | None, fix: Sequence[str], without: Sequence[str], names: Sequence[str] | None, no_robust: bool,
-    report: str | None, **options: Any,
+    report: str | None, normalize: bool, **options: Any,
 ) -> int:  # fmt: skip
     """Solve for the transforms that measurements mean, with sigmas; what does not agree is left out and named.
 
     \b
       frametool solve measurements.yaml -o solved.yaml
-      frametool solve --hand-eye gripper.csv target.csv --names base,tool0,camera,board
+      frametool solve --hand-eye gripper.csv target.csv -o camera.yaml
       frametool solve --hand-eye hand_eye_samples.json -f handeye
       frametool solve --points points_a.csv points_b.csv --scale --report fit.json
 
@@ -90,8 +101,8 @@ def command(
     if hand_eye and points:
         raise click.UsageError("--hand-eye and --points are two things; give one")
     _refuse_misuse(files, shape, names)
-    if max_gap_ns is not None and len(files) == 1:
-        raise click.UsageError("--max-gap is not used: SAMPLES are pairs")
+    if hand_eye and len(files) == 1:
+        refuse_unused("is not used: SAMPLES are pairs, in YAML or JSON", "max_gap_ns", "input_forms", *LEFT_OPEN)
     path, force = options["output"], options["force"]
     if report and path and realpath(report) == realpath(path):
         raise click.UsageError("--report and -o name one file")
@@ -102,15 +113,15 @@ def command(
         raise ValueInvalid(f"{output.style.form} has no place for a scale; write json, yaml or csv")
     from frametool.cli import solving
 
-    robust = not no_robust
+    how = {"robust": not no_robust, "normalize": normalize}
     if hand_eye:
         found = solving.solved_hand_eye(
-            files, eye_to_hand=eye_to_hand, max_gap_ns=max_gap_ns, names=names, robust=robust
+            files, eye_to_hand=eye_to_hand, max_gap_ns=max_gap_ns, names=names, **how
         )
     elif points:
-        found = solving.solved_points(files, names=names, scale=scale, robust=robust)
+        found = solving.solved_points(files, names=names, scale=scale, robust=not no_robust)
     else:
-        found = solving.solved_tree(files, root=root, fix=fix, without=without, robust=robust)
+        found = solving.solved_tree(files, root=root, fix=fix, without=without, **how)
     from frametool.view.solution_text import write_left_out, write_solution
 
     said = (write_left_out if settings().quiet else write_solution)(found)
@@ -150,8 +161,12 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
         from frametool.grammar.pose import Pose
         from frametool.grammar.result import Result, uncertain
 
-        poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
-        output.poses([Result(*each) for each in zip(poses, (uncertain(each.covariance) for each in entries), strict=True)])
+        results = [
+            Result(Pose.of(each.components, each.name, each.parent), uncertain(each.covariance)) for each in entries
+        ]
+        for result in results:
+            result.pose = result.pose._replace(scale=found.scale)
+        output.poses(results)
     elif output.style.form == "handeye" and found.shape == "hand-eye":
         from frametool.formats.trees.handeye import write_mount
 
