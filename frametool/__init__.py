@@ -16,6 +16,7 @@ nanoseconds. Names are loaded when first used: `import frametool` alone loads ne
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from frametool import covariance as covariance
     from frametool.calc.api import calc as calc
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.explain.api import explain as explain
@@ -60,6 +61,7 @@ _HOMES = {
     "align": "frametool.fit.api",
     "apply_arrow": "frametool.stream.engines",
     "compare": "frametool.fit.api",
+    "covariance": "frametool.covariance",
     "diff": "frametool.lint.tree_diff",
     "explain": "frametool.explain",
     "follow_steps": "frametool.sim.followed",

@@ -21,7 +21,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
-from frametool.grammar.pose import read_pose
+from frametool.grammar.pose import UNCERTAIN, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 TAKEN = frozenset(FUNCTIONS)
 PI = 3.141592653589793
 NAME = "literal"
+LEFT_OUT = "covariances left out: calc has none"
 AXES = ("x", "y", "z")
 PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("vx", "vy", "vz", "wx", "wy", "wz"))}
 
@@ -82,12 +83,21 @@ class Scope:
         self.degrees = degrees
         self.normalize = normalize
         self.seen: set[str | None] = {None}
+        self.told: set[str] = set()  # what is told once
+
+    def leave_out(self, covariances: object) -> None:
+        """Tell once that no expression calculates with covariances, where there are any."""
+        if covariances and LEFT_OUT not in self.told:
+            self.told.add(LEFT_OUT)
+            warn(LEFT_OUT)
 
     def with_row(self, row: Type) -> Scope:
         """Return the same scope for rows of a type, its names its own."""
-        return Scope(
+        scope = Scope(
             tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
         )  # fmt: skip
+        scope.told = self.told
+        return scope
 
     def reading(self, source: Source) -> Reading:
         """Return how the literals of a text are read."""
@@ -226,6 +236,7 @@ class _Walk:
             raise CalcError(error.message) from None
         except Misfit as misfit:
             raise CalcError(str(misfit)) from None
+        self.scope.leave_out(not UNCERTAIN.isdisjoint(document.value))
         for note in reading.notes:
             warn(note.message)
         return term
@@ -305,6 +316,7 @@ class _Walk:
                 named = next((each for each, _ in scope.trees), "")
                 hint = f", or ask {named}[TARGET<-SOURCE]" if named else ", or name one: d=FILE and d[TARGET<-SOURCE]"
                 raise NoTree(f"no tree to look up in: give --tree FILE{hint}")
+            scope.leave_out(scope.tree.covariances)
             return scope.tree
         if name not in scope.names:
             trees = [each for each, _ in scope.trees if each]
@@ -312,6 +324,7 @@ class _Walk:
         tree = scope.names[name].tree
         if tree is None:
             raise CalcError(f"{name} is no tree but {scope.names[name].type.named}")
+        scope.leave_out(tree.covariances)
         return tree
 
 

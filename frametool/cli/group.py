@@ -126,7 +126,7 @@ GROUPS = {
         "input_path", "columns", "frame_column", "target_column", "source_column", "keep", "prefix", "header", "unwrap",
         "on_error", "max_errors", "jobs",
     ),
-    "Result": ("format_name", "precision", "output", "force", "explain", "explain_full", "explain_step"),
+    "Result": ("format_name", "precision", "covariance", "output", "force", "explain", "explain_full", "explain_step"),
     "What a form of file leaves open (help formats)": (
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
     ),

@@ -10,14 +10,16 @@ from frametool.cli.options import ColumnNames, together
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
+from frametool.grammar.pose_algebra import looked_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.cli.explaining import PoseTask
+    from frametool.cli.trees import CarriedSigmas
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components
 
 
 def _column_option(end: str) -> Callable[..., Any]:
@@ -41,9 +43,15 @@ class RowFrames:
         return self.target is not None or self.source is not None
 
     def run(
-        self, task: PoseTask, tree: FrameTree | TransformBuffer, target: str | None, source: str | None, at: int | None
-    ) -> int:
-        """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
+        self, task: PoseTask, tree: FrameTree | TransformBuffer, target: str | None, source: str | None, at: int | None,
+        sigmas: CarriedSigmas | None = None,
+    ) -> int:  # fmt: skip
+        """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's.
+
+        sigmas: the covariances are wanted too
+        """
+        from frametool.stream.request import Operation
+
         if self.target is not None and source is None:
             target, source = None, target
         for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
@@ -52,12 +60,22 @@ class RowFrames:
         fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
         frames = tuple(name for name in (self.target, self.source) if name is not None)
 
-        def edge_of(names: str) -> Rigid:
+        def edge_of(names: str) -> Components:
             cells = names.split("\0") if len(frames) == 2 else [names]
             if len(cells) > len(frames):
                 raise UnknownFrame(names, known=tree.frames)  # a NUL in a cell is no end of a name
-            return tree.lookup(fixed_target or cells[0], fixed_source or cells[-1], at).components
+            ends = fixed_target or cells[0], fixed_source or cells[-1]
+            if sigmas is None:
+                return tree.lookup(*ends, at).components
+            found = sigmas.noted(looked_up(tree, *ends, at, covariance=True))
+            return *found.pose.components, *found.extras["covariance"]
 
         forms = task.output.notations or (notation("quaternion"),)
-        request = task.request(poses=0, frames=frames, pose_of_row_frame=edge_of, notations=forms)
-        return task.stream.run(request, task.output, tables_only=True)
+        operation = Operation(uncertain=sigmas is not None)
+        request = task.request(
+            poses=0, frames=frames, pose_of_row_frame=edge_of, notations=forms, operation=operation
+        )
+        status = task.stream.run(request, task.output, tables_only=True)
+        if sigmas is not None:
+            sigmas.tell()
+        return status

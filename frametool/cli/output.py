@@ -165,6 +165,8 @@ class Output:
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
+        if tree.covariances and self.style.form not in ("yaml", "json", "text"):
+            warn(f"{self.style.form}: covariances left out")
         if self.style.form not in ("yaml", "json") and (
             "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
         ):

@@ -357,8 +357,6 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
     given = [_given(each, request) for each in arguments]
     several = _several(given)
     read = [each.only_poses(timed=True) for each in given]
-    if any(pose.covariance is not None for poses in read for pose in poses):
-        warn("covariances left out: interpolate has none", rule="left-out")
     most = len(read[several[0]]) if several else 1
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 

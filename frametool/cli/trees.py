@@ -18,7 +18,7 @@ from frametool.cli.options import Text, input_forms, refuse_not_needed
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
-from frametool.errors import FrametoolError, listing, shown, warn
+from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.grammar.edges import Answers
 
@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     from frametool.formats.load import Place, Recording, Rules
     from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer
-    from frametool.frames.lookups import FrameTree
+    from frametool.frames.lookups import Frames, FrameTree
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Result
 
     Value = TypeVar("Value")
 
@@ -137,6 +139,60 @@ def _loaded(
     tree = load_sources(files, rules, places)
     state(files, whole=places is None)
     return tree
+
+
+def tell_unused_sigmas(tree: Frames) -> None:
+    """Say once that edges have covariances, where a command that could carry them was not asked to."""
+    if tree.covariances and not settings().quiet:
+        say(f"sigmas of {bare(tree.name)} not used (--covariance)")
+
+
+class CarriedSigmas:
+    """What a command that carries covariances along a tree tells once, at its end."""
+
+    def __init__(self, tree: Frames) -> None:
+        """Begin before the first result."""
+        self.tree = tree
+        self.edges: set[str] = set()  # by their children
+        self.widest: Sequence[float] = ()
+        self.width = 0.0
+
+    def noted(self, result: Result) -> Result:
+        """Take a result of a lookup in."""
+        from frametool.geometry.uncertainty import widest_turn
+
+        target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
+        new = {track.child for track in self.tree.way(target, source, result.extras.get("stamp_ns"))} - self.edges
+        self.edges |= new
+        for each in (found, *(self.tree.covariances.get(edge, ()) for edge in new)):
+            if (width := widest_turn(each)) > self.width:
+                self.widest, self.width = each, width
+        return result
+
+    def beside(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
+        """Return columns of poses at times, nan where there are no data, with those of their covariance."""
+        import numpy as np
+
+        from frametool.frames.lookup_many import carried_many
+
+        times = np.asarray(times_ns)
+        there = np.flatnonzero(~np.isnan(poses[0]))
+        entries = np.full((len(times), 36), np.nan)
+        if len(there):
+            entries[there] = carried_many(self.tree, target, source, times[there])
+            self.edges |= {track.child for track in self.tree.way(target, source, int(times[there[0]]))}
+        return (*poses, *entries.T)
+
+    def tell(self) -> None:
+        """Say what was taken for granted, and warn of turns too wide for the first order."""
+        from frametool.geometry.uncertainty import warn_if_wide
+
+        warn_if_wide([self.widest])
+        exact = len(self.edges - self.tree.covariances.keys())
+        count = f"{exact} of {len(self.edges)}"
+        none = f"{count} has no sigma and counts" if exact == 1 else f"{count} have no sigma and count"
+        if self.edges and not settings().quiet:
+            say(f"edges count as independent{f'; {none} as exact' * bool(exact)}")
 
 
 OPEN_IN_TREES = ("frames", "direction", "dh", "stamps")  # what forms of files of frames may leave open

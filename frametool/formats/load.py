@@ -31,7 +31,7 @@ from frametool.errors import (
 )
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import BAG, CHOICES, FORMATS, readers
-from frametool.frames.lookups import FrameTree
+from frametool.frames.lookups import FrameTree, two_covariances
 from frametool.frames.policy import Refused
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, stop
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.buffer import TransformBuffer
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.edges import Remark, Report
 
 
@@ -252,6 +252,7 @@ class Assembly:
         self._moves: set[str] = set()
         self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were taken in one piece
         self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
+        self.covariances: dict[str, Components] = {}  # child -> how uncertain its edge is
 
     @property
     def places(self) -> dict[str, Place]:
@@ -282,8 +283,20 @@ class Assembly:
         except Refused as refused:  # in the words that tf2 logs when it drops a transform
             for line in refused.lines:
                 warn(line, kind=Tf2Warning)
+            return
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
+        if place.edge.covariance is not None or child in self.covariances:
+            self._keep_covariance(parent, self._kept(child), place)
+
+    def _keep_covariance(self, parent: str, child: str, place: Place) -> None:
+        """Keep the covariance of an edge; raises BadTopology with both places where it is not the one said before."""
+        first = self._first[child][2]
+        if place.edge.covariance != first.edge.covariance:
+            error = two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
+            raise place.error(f"{error}: {first.seen_from(place)} and {place.seen_from(place)}", BadTopology)
+        if place.edge.covariance is not None:
+            self.covariances[child] = place.edge.covariance
 
     def add_samples(self, placed: SamplesOfFile) -> None:
         """Add the poses of one frame: in one piece where nothing can be wrong with their order, else one by one."""
@@ -327,7 +340,8 @@ class Assembly:
 
     def _takes_whole(self, samples: Samples) -> bool:
         """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
-        if self.rules.policy != "frametool" or self.rules.keep_ns is not None or len(samples.stamps_ns) == 1:
+        is_plain = self.rules.policy == "frametool" and self.rules.keep_ns is None
+        if not is_plain or len(samples.stamps_ns) == 1 or samples.child in self.covariances:
             return False
         track = None if self.buffer is None else self.buffer.track(samples.child)
         if track is None:
@@ -359,6 +373,7 @@ class Assembly:
                 tree = self._standing_tree(made)
                 made = made if made.moves else tree
         made.camera_axes |= self.axes
+        made.covariances |= self.covariances
         return made
 
     def _moving(self) -> TransformBuffer:

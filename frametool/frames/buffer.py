@@ -6,7 +6,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from frametool.errors import BadTopology, ValueInvalid, shown, warn
-from frametool.frames.lookups import Frames
+from frametool.frames.lookups import Frames, taken, two_covariances
 from frametool.frames.path import cycle_message
 from frametool.frames.policy import FRAMETOOL
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
@@ -14,6 +14,7 @@ from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
     from frametool.frames.policy import BufferPolicy
     from frametool.frames.track import Track
@@ -57,19 +58,25 @@ class TransformBuffer(Frames):
 
     def insert(
         self, parent: str, child: str, transform: Transform, stamp_ns: int | None = None, *,
-        static: bool | None = None, authority: str = DEFAULT_AUTHORITY,
+        static: bool | None = None, authority: str = DEFAULT_AUTHORITY, covariance: Any = None,
     ) -> None:  # fmt: skip
         """Add parent_from_child, the pose of the child in its parent, at a time; without a time the frame stands still.
 
         static: says so where a standing frame comes with a stamp, which is then ignored.  authority: for tf2's words.
+        covariance: how uncertain the frame is, one for all its samples, said with any of them; None says nothing.
         A different pose at a stamp that is already there replaces the old one, with a warning.
-        Raises ValueInvalid; BadTopology for two standing poses, standing and moving at once, a cycle.
+        Raises ValueInvalid; BadTopology for two standing poses or covariances, standing and moving at once, a cycle.
         """
         components = transform.components
         if type(components[6]) is not float and transform.shape:
             raise ValueInvalid(f"insert takes one transform, found {len(transform)}; insert them one by one")
+        found = taken(covariance)
+        if found and (known := self.covariances.get(child, found)) != found:
+            raise two_covariances(parent, child, known, found)
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
             warn(f"frame {shown(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
+        if found:
+            self.covariances[child if child in self._tracks else child.removeprefix("/")] = found
 
     def insert_components(
         self, parent: str, child: str, components: Rigid, stamp_ns: int | None = None, *,

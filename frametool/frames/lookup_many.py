@@ -6,6 +6,7 @@ Needs numpy at import; the buffer imports it when it is asked.
 from __future__ import annotations
 
 import itertools
+from operator import methodcaller
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from frametool.geometry import arrays, quaternion, rigid
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
+
     from numpy.typing import NDArray
 
     from frametool.frames.lookups import Frames
@@ -116,6 +118,21 @@ def _joined(query: Query, times: Stamps) -> Rigid:
     found = query.compose(lambda track: track.at_many(times))
     assert found is not None  # noqa: S101 - all times are covered
     return *found[:3], *quaternion.unit(*found[3:], arrays)
+
+
+def carried_many(frames: Frames, target: str, source: str, at_ns: Any) -> Floats:
+    """Return the covariance of target_from_source, 36 columns, at times that have data."""
+    times = as_stamps(at_ns)
+    order = np.argsort(times, kind="stable")
+    found = np.empty((times.size, 36))
+    cuts = np.searchsorted(times[order], frames.changes())
+    for rows in np.split(order, cuts):
+        for start, stop in arrays.blocks(rows.size):
+            at = times[rows[start:stop]]
+            entries = frames.covariance_along(target, source, int(at[0]), methodcaller("at_many", at))
+            for column, entry in enumerate(entries):
+                found[rows[start:stop], column] = entry
+    return found
 
 
 class TrackTable:

@@ -6,27 +6,28 @@ the same lookup again and again while its time goes by.  Knows no files and no t
 
 from __future__ import annotations
 
-from functools import partial
+from functools import partial, reduce
 from itertools import chain, repeat
 from math import ceil, floor
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, ValueInvalid, shown, warn
+from frametool.errors import BadTopology, NoDataAt, NotConnected, ValueInvalid, bare, shown, warn
 from frametool.frames.path import Query, cycle_message, edges_between, to_root
 from frametool.frames.policy import FRAMETOOL, left_out
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
+from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from typing import Any
 
     from frametool.errors import LookupFailed
     from frametool.frames.policy import BufferPolicy
     from frametool.frames.track import Track
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
 
 MOST_KEPT = 1 << 14  # queries
 
@@ -45,6 +46,7 @@ class Frames:
         self._frames: dict[str, None] = {}
         self._queries: dict[tuple[str, str], Query] = {}
         self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
+        self.covariances: dict[str, Components] = {}  # of edges, by their child; those that are not here are exact
         self._varies = False  # whether any frame has ever changed its parent
         self._loops = False  # whether newest parents were found to form a circle
 
@@ -107,6 +109,7 @@ class Frames:
                 tree.add_components(parent, track.child, pose)
             elif not track.standing:
                 warn(left_out(track, at_ns))
+        tree.covariances = {child: each for child, each in self.covariances.items() if tree.track(child)}
         return tree
 
     # --- one lookup ---
@@ -158,6 +161,45 @@ class Frames:
         fixed_from_source = self.lookup_components(fixed, source, source_at_ns)
         target_from_fixed = self.lookup_components(target, fixed, target_at_ns)
         return Transform.of(*rigid.compose(*target_from_fixed, *fixed_from_source))
+
+    def covariance(self, target: str, source: str, at_ns: int | None = None) -> list[float]:
+        """Return how uncertain target_from_source is: 36 numbers, row-major, to first order; edges are independent.
+
+        Over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of the target.
+        Raises ValueInvalid where no edge on the way has a covariance; otherwise as `lookup`.
+        """
+        from frametool.geometry.uncertainty import warn_if_wide
+
+        at_ns = self.latest(target, source) if at_ns is None else at_ns
+        found = self.carried(target, source, at_ns)
+        edges = (self.covariances.get(track.child, ()) for track in self.way(target, source, at_ns))
+        warn_if_wide([found, *edges])
+        return [*found]
+
+    def carried(self, target: str, source: str, at_ns: int | None) -> Components:
+        """Return `covariance` at a time, None where nothing moves; it is for the caller to tell what is too wide."""
+        self.lookup_components(target, source, at_ns)  # raises where there are no data
+        time_ns = whole_stamp(at_ns or 0)
+        return self.covariance_along(target, source, at_ns, lambda track: track.at(time_ns))
+
+    def covariance_along(
+        self, target: str, source: str, at_ns: int | None, sample: Callable[[Track], Rigid | None]
+    ) -> Components:
+        """Return the entries of `covariance` of the poses that `sample` finds, floats or columns; zeros of no edge.
+
+        at_ns: a time at which the way is that one
+        """
+        down, up = self.between(target, source, at_ns)
+        if (down or up) and self.covariances.keys().isdisjoint((*down, *up)):
+            raise ValueInvalid(f"no edge between {bare(target)} and {bare(source)} has a sigma or a covariance")
+        from frametool.geometry import placed, uncertainty
+
+        def edge(child: str) -> Components:
+            return *(sample(self._tracks[child]) or IDENTITY), *self.covariances.get(child, ())
+
+        steps = [*(placed.inverse(edge(child)) for child in reversed(down)), *map(edge, reversed(up))]
+        found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
+        return tuple(entry + 0.0 for entry in uncertainty.symmetric([found[at : at + 6] for at in range(0, 36, 6)]))
 
     # --- many lookups ---
 
@@ -337,13 +379,20 @@ class FrameTree(Frames):
         super().__init__(name, FRAMETOOL)
         self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
 
-    def add(self, parent: str, child: str, transform: Transform) -> None:
+    def add(self, parent: str, child: str, transform: Transform, covariance: Any = None) -> None:
         """Hang a frame under a parent; `transform` is parent_from_child, the pose of the child in its parent.
 
+        covariance: how uncertain that is, as `covariance` returns it, or 6 rows of 6; None is exact.
         Adding an edge again with the same numbers changes nothing.
-        Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself.
+        Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
+        ValueInvalid for numbers that are no covariance.
         """
+        known, found = self._tracks.get(child), taken(covariance)
+        if known is not None and known.parent == parent and self.covariances.get(child) != found:
+            raise two_covariances(parent, child, self.covariances.get(child), found)
         self.add_components(parent, child, transform.components)
+        if found:
+            self.covariances[child] = found
 
     def add_components(self, parent: str, child: str, components: Rigid) -> None:
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
@@ -394,3 +443,18 @@ def checked_rate(rate_hz: float) -> float:
     if not BILLION / FURTHEST_NS <= rate_hz <= BILLION:
         raise ValueInvalid(f"a rate of {rate_hz:g} Hz has no steps between 1 ns and {FURTHEST_NS // BILLION} s")
     return rate_hz
+
+
+def taken(covariance: Any) -> Components | None:
+    """Return the entries of a covariance, checked; None of None."""
+    if covariance is None:
+        return None
+    from frametool.geometry import uncertainty
+
+    return uncertainty.taken(covariance)
+
+
+def two_covariances(parent: str, child: str, one: Components | None, other: Components | None) -> BadTopology:
+    """Make the error for an edge that is said to be uncertain in two ways."""
+    what = "two different covariances" if one and other else "a covariance in one place and none in another"
+    return BadTopology(f"frame {shown(child)} in {shown(parent)} has {what}", rule="two-covariances")

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from frametool.errors import ValueInvalid, warn
 from frametool.geometry import quaternion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from frametool.geometry.types import Components, Number, Rigid
 
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
     Rows: TypeAlias = list[list[Any]]
 
 POSE, POINT = 36, 9  # entries
+INFINITE = float("inf")
+ORDER = {POSE: "x y z, turns about X Y Z", POINT: "x y z"}
+UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known
+ASYMMETRY = 1e-6  # of the root of the product of the two variances
+NEGATIVE = 1e-9  # of the largest eigenvalue
+WIDE = 0.2  # radians
+WIDE_RULE = "wide"
+FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent off above 0.2"
 
 
 def composed(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | None) -> Components | None:
@@ -96,7 +105,7 @@ def of_blocks(placed: Rows, mixed: Rows, turning: Rows) -> Components:
     return symmetric(upper + lower)
 
 
-def symmetric(rows: Rows) -> Components:
+def symmetric(rows: Sequence[Sequence[Any]]) -> Components:
     """Return the entries of rows, those below the diagonal written from above it."""
     size = range(len(rows))
     return tuple(rows[min(i, j)][max(i, j)] for i in size for j in size)
@@ -133,3 +142,118 @@ def transposed(a: Rows) -> Rows:
 
 def _rows(nine: Entries) -> Rows:
     return [list(nine[at : at + 3]) for at in (0, 3, 6)]
+
+
+# --- what is a covariance, and which is too wide for the first order ---
+
+
+def taken(given: Any, size: int = POSE) -> Components:
+    """Return the entries of a covariance that Python gives, checked: numbers or rows of them, of numpy or not."""
+    rows, side = given.tolist() if hasattr(given, "tolist") else given, round(size**0.5)
+    try:
+        listed = [row if hasattr(row, "__iter__") else (row,) for row in rows]
+        entries = tuple(float(entry) for row in listed for entry in row)
+    except (TypeError, ValueError):
+        entries, listed = (), [()]
+    if not {len(row) for row in listed} <= {1, side}:
+        raise ValueInvalid(f"covariance must be {size} numbers or {side} rows of {side}")
+    if len(entries) != size:
+        raise ValueInvalid(wrong_count(len(entries), (size,)))
+    if bad := [entry for entry in entries if not -INFINITE < entry < INFINITE]:
+        raise ValueInvalid(f"covariance has {bad[0]} in it; every number must be finite")
+    check(entries)
+    return entries
+
+
+def wrong_count(count: int, sizes: Sequence[int]) -> str:
+    """Say how many numbers there are and how many it takes."""
+    each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
+    return f"covariance has {count} numbers; {' or '.join(each)}"
+
+
+def check(entries: Sequence[float]) -> None:
+    """Raise ValueInvalid unless these 36 or 9 numbers are a covariance: known, symmetric, not negative."""
+    size = 6 if len(entries) == 36 else 3
+    if entries[0] == UNKNOWN:
+        raise ValueInvalid("covariance[0] is -1: 'unknown' in ROS; leave the covariance out")
+    for i in range(size):
+        for j in range(i):
+            upper, lower = entries[size * j + i], entries[size * i + j]
+            both = entries[size * i + i] * entries[size * j + j]
+            if upper != lower and abs(upper - lower) > ASYMMETRY * abs(both) ** 0.5:
+                said = f"[{j}][{i}] is {short(upper)}, [{i}][{j}] is {short(lower)}"
+                raise ValueInvalid(f"covariance is not symmetric: {said}")
+    if not _is_positive(entries, size):
+        import numpy as np
+
+        least, *_, most = np.linalg.eigvalsh(np.reshape(entries, (size, size))).tolist()
+        if least < -NEGATIVE * abs(most):
+            raise ValueInvalid(f"covariance is not positive: its smallest eigenvalue is {short(least)}")
+
+
+def _is_positive(entries: Sequence[float], size: int) -> bool:
+    """Tell whether the factors of L D L' are all positive, or zero in a row of zeros; False says that one must look."""
+    rows = [list(entries[size * i : size * i + size]) for i in range(size)]
+    for k in range(size):
+        if rows[k][k] == 0.0 and not any(rows[i][k] for i in range(k, size)):
+            continue
+        if not rows[k][k] > 0.0:
+            return False
+        for i in range(k + 1, size):
+            factor = rows[i][k] / rows[k][k]
+            for j in range(k + 1, size):
+                rows[i][j] -= factor * rows[k][j]
+    return True
+
+
+def bad_rows(entries: Sequence[Any]) -> dict[int, str]:
+    """Return what is wrong with the rows of columns of a covariance, by row."""
+    import numpy as np
+
+    size = 6 if len(entries) == 36 else 3
+    rows = [[np.asarray(entries[size * i + j]) for j in range(size)] for i in range(size)]
+    suspect = rows[0][0] == UNKNOWN
+    for i in range(size):
+        for j in range(i):
+            both = np.sqrt(abs(rows[i][i] * rows[j][j]))
+            suspect = suspect | (abs(rows[i][j] - rows[j][i]) > ASYMMETRY * both)
+    for k in range(size):  # as `_is_positive`, all rows at once
+        below = [rows[i][k] for i in range(k + 1, size)]
+        empty = (rows[k][k] == 0.0) & ~np.any([each != 0.0 for each in below], axis=0) if below else rows[k][k] == 0.0
+        suspect = suspect | ~((rows[k][k] > 0.0) | empty)
+        pivot = np.where(rows[k][k] > 0.0, rows[k][k], 1.0)
+        for i in range(k + 1, size):
+            factor = rows[i][k] / pivot
+            rows[i] = [*rows[i][: k + 1], *(rows[i][j] - factor * rows[k][j] for j in range(k + 1, size))]
+    found = {}
+    for row in np.flatnonzero(suspect).tolist():
+        try:
+            check([float(entry[row]) for entry in entries])
+        except ValueInvalid as error:
+            found[row] = str(error)
+    return found
+
+
+def short(value: float) -> str:
+    """Write a number for a message: six digits, and 1e-4 rather than 0.0001 or 1e-04."""
+    if 1e-3 <= abs(value) < 1e6 or not value:
+        return f"{value:g}"
+    digits, _, exponent = f"{value:.5e}".partition("e")
+    return f"{digits.rstrip('0').rstrip('.')}e{int(exponent)}"
+
+
+def widest_turn(entries: Sequence[float]) -> float:
+    """Return the largest sigma of a turn about any axis, radians; what is surely below `WIDE` counts as 0."""
+    if len(entries) != 36 or entries[21] + entries[28] + entries[35] <= WIDE * WIDE:
+        return 0.0
+    import numpy as np
+
+    whole = np.reshape(entries, (6, 6))
+    return float(np.sqrt(max(np.linalg.eigvalsh(whole[3:, 3:])[-1], 0.0)))
+
+
+def warn_if_wide(found: Iterable[Sequence[float]]) -> None:
+    """Warn once if a turn is so uncertain that the first order is off by some per cent."""
+    widest = max(map(widest_turn, found), default=0.0)
+    if widest > WIDE:
+        warn(FIRST_ORDER.format(widest), rule=WIDE_RULE)

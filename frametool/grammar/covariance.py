@@ -11,31 +11,36 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import did_you_mean, shown, warn
+from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.geometry import uncertainty
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
 from frametool.text.numbers import ANGLES as UNITS_OF_ANGLE
 from frametool.text.numbers import BRACKETS, NotFinite, read_number_or_angle
 from frametool.text.numbers import LENGTHS as UNITS_OF_LENGTH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from frametool.geometry.types import Components
     from frametool.grammar.readers import Path
 
 COVARIANCE, SIGMA = "covariance", "sigma"
+warn_if_wide, widest_turn = uncertainty.warn_if_wide, uncertainty.widest_turn
 KEYS = frozenset((COVARIANCE, SIGMA))
 LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and how many make a metre
 ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are degrees
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known
-ORDER = {36: "x y z, turns about X Y Z", 9: "x y z"}
-ASYMMETRY = 1e-6  # of the root of the product of the two variances
-NEGATIVE = 1e-9  # of the largest eigenvalue
-WIDE = 0.2  # radians
 RADIANS = 3.141592653589793 / 180.0
-WIDE_RULE = "wide"
-FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent off above 0.2"
+
+
+class Whole(float):
+    """A number that --precision leaves whole: some digits after the point make nothing of a small square."""
+
+    __slots__ = ()
+
+    def __format__(self, _: str) -> str:
+        """Write the shortest text that reads back."""
+        return repr(self)
 
 
 _SIGMA_COLUMN = r"sigma_(xyz|rpy|x|y|z|roll|pitch|yaw)(?:_([a-z]+))?"
@@ -86,34 +91,6 @@ def in_unit(number: Any, unit: str) -> Any:
     return number / UNITS_OF_LENGTH[unit] if unit in UNITS_OF_LENGTH else number
 
 
-def bad_rows(entries: Sequence[Any]) -> dict[int, str]:
-    """Return what is wrong with the rows of columns of a covariance, by row."""
-    import numpy as np
-
-    size = 6 if len(entries) == 36 else 3
-    rows = [[np.asarray(entries[size * i + j]) for j in range(size)] for i in range(size)]
-    suspect = rows[0][0] == UNKNOWN
-    for i in range(size):
-        for j in range(i):
-            both = np.sqrt(abs(rows[i][i] * rows[j][j]))
-            suspect = suspect | (abs(rows[i][j] - rows[j][i]) > ASYMMETRY * both)
-    for k in range(size):  # as `_is_positive`, all rows at once
-        below = [rows[i][k] for i in range(k + 1, size)]
-        empty = (rows[k][k] == 0.0) & ~np.any([each != 0.0 for each in below], axis=0) if below else rows[k][k] == 0.0
-        suspect = suspect | ~((rows[k][k] > 0.0) | empty)
-        pivot = np.where(rows[k][k] > 0.0, rows[k][k], 1.0)
-        for i in range(k + 1, size):
-            factor = rows[i][k] / pivot
-            rows[i] = [*rows[i][: k + 1], *(rows[i][j] - factor * rows[k][j] for j in range(k + 1, size))]
-    found = {}
-    for row in np.flatnonzero(suspect).tolist():
-        try:
-            check([float(entry[row]) for entry in entries])
-        except NotARotation as error:
-            found[row] = str(error)
-    return found
-
-
 def columns(size: int = 36) -> tuple[str, ...]:
     """Name the entries as columns: c11 .. c66 of a pose, c11 .. c33 of a point."""
     axes = range(1, 7 if size == 36 else 4)
@@ -146,9 +123,7 @@ def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
     else:
         texts = rows
     if len(texts) not in sizes:
-        each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
-        wanted = " or ".join(each)
-        raise NotARotation(f"covariance has {len(texts)} numbers; {wanted}")
+        raise NotARotation(uncertainty.wrong_count(len(texts), sizes))
     return [(path, within(path, _entry, text)) for path, text in texts]
 
 
@@ -219,56 +194,7 @@ def of_sigmas(sigmas: Sequence[Any]) -> Components:
 
 def check(entries: Sequence[float]) -> None:
     """Raise NotARotation unless these 36 or 9 numbers are a covariance: known, symmetric, not negative."""
-    size = 6 if len(entries) == 36 else 3
-    if entries[0] == UNKNOWN:
-        raise NotARotation("covariance[0] is -1: 'unknown' in ROS; leave the covariance out", (0,))
-    for i in range(size):
-        for j in range(i):
-            upper, lower = entries[size * j + i], entries[size * i + j]
-            both = entries[size * i + i] * entries[size * j + j]
-            if upper != lower and abs(upper - lower) > ASYMMETRY * abs(both) ** 0.5:
-                said = f"[{j}][{i}] is {short(upper)}, [{i}][{j}] is {short(lower)}"
-                raise NotARotation(f"covariance is not symmetric: {said}")
-    if not _is_positive(entries, size):
-        import numpy as np
-
-        least, *_, most = np.linalg.eigvalsh(np.reshape(entries, (size, size))).tolist()
-        if least < -NEGATIVE * abs(most):
-            raise NotARotation(f"covariance is not positive: its smallest eigenvalue is {short(least)}")
-
-
-def _is_positive(entries: Sequence[float], size: int) -> bool:
-    """Tell whether the factors of L D L' are all positive, or zero in a row of zeros; False says that one must look."""
-    rows = [list(entries[size * i : size * i + size]) for i in range(size)]
-    for k in range(size):
-        if rows[k][k] == 0.0 and not any(rows[i][k] for i in range(k, size)):
-            continue
-        if not rows[k][k] > 0.0:
-            return False
-        for i in range(k + 1, size):
-            factor = rows[i][k] / rows[k][k]
-            for j in range(k + 1, size):
-                rows[i][j] -= factor * rows[k][j]
-    return True
-
-
-def short(value: float) -> str:
-    """Write a number for a message: six digits, and 1e-5 rather than 1e-05."""
-    return f"{value:g}".replace("e-0", "e-").replace("e+0", "e+")
-
-
-def widest_turn(entries: Sequence[float]) -> float:
-    """Return the largest sigma of a turn about any axis, radians; what is surely below `WIDE` counts as 0."""
-    if len(entries) != 36 or entries[21] + entries[28] + entries[35] <= WIDE * WIDE:
-        return 0.0
-    import numpy as np
-
-    whole = np.reshape(entries, (6, 6))
-    return float(np.sqrt(max(np.linalg.eigvalsh(whole[3:, 3:])[-1], 0.0)))
-
-
-def warn_if_wide(found: Iterator[Sequence[float]]) -> None:
-    """Warn once if a turn is so uncertain that the first order is off by some per cent."""
-    widest = max(map(widest_turn, found), default=0.0)
-    if widest > WIDE:
-        warn(FIRST_ORDER.format(widest), rule=WIDE_RULE)
+    try:
+        uncertainty.check(entries)
+    except ValueInvalid as error:
+        raise NotARotation(str(error), (0,) if entries[0] == uncertainty.UNKNOWN else ()) from None

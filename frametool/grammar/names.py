@@ -81,6 +81,11 @@ def on_earth(names: Iterable[str]) -> str:
     return f"{named} are coordinates on the Earth, which are not read; give x, y, z in metres"
 
 
+def may_be_uncertain(name: str) -> bool:
+    """Tell whether a column may be the first of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
+    return name == "c11" or name.startswith(("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p"))
+
+
 def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
     """Return numbers by name with those of a covariance, c11 .. c33 or c66, as the one list that mappings have."""
     if not any(name.endswith("c11") for name in extras):
@@ -91,7 +96,8 @@ def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
     names = [f"{prefix}c{i}{j}" for i in axes for j in axes]
     if not extras.keys() >= {*names}:
         return extras
-    whole = {prefix + "covariance": [extras[name] for name in names]}
+    entries = [extras[name] for name in names]
+    whole = {f"{prefix}covariance": None if entries[0] is None else entries}
     return {name: value for name, value in extras.items() if name not in names} | whole
 
 

@@ -8,13 +8,14 @@ A lookup is such a result too: the pose of SOURCE in TARGET as an entry of a tre
 from __future__ import annotations
 
 import math
+from itertools import repeat
 from math import isfinite
 
 from frametool.errors import LookupFailed, ValueInvalid, shown, warn
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
+from frametool.grammar.result import Result, uncertain
 
 TYPE_CHECKING = False
 
@@ -126,15 +127,21 @@ def _refuse_two_parents(a: Pose, b: Pose) -> None:
 BLOCK = 1 << 14  # times
 
 
-def result_at(components: Rigid, target: str | None, source: str | None, at_ns: int | None) -> Result:
-    """Return target_from_source as a result; a time of None did not matter."""
-    return Result(Pose.of(components, source, target), {} if at_ns is None else {"stamp_ns": at_ns})
+def result_at(
+    components: Rigid, target: str | None, source: str | None, at_ns: int | None, entries: Iterable[float] | None = None
+) -> Result:
+    """Return target_from_source as a result; a time of None did not matter.  entries: of its covariance."""
+    stamp = {} if at_ns is None else {"stamp_ns": at_ns}
+    return Result(Pose.of(components, source, target), {**stamp, **uncertain(entries)})
 
 
-def looked_up(frames: Frames, target: str, source: str, at_ns: int | None = None) -> Result:
+def looked_up(
+    frames: Frames, target: str, source: str, at_ns: int | None = None, *, covariance: bool = False
+) -> Result:
     """Look up at one time; None is the latest, and the result says which that was."""
     at_ns = frames.latest(target, source) if at_ns is None else at_ns
-    return result_at(frames.lookup_components(target, source, at_ns), target, source, at_ns)
+    found = frames.lookup_components(target, source, at_ns)
+    return result_at(found, target, source, at_ns, frames.carried(target, source, at_ns) if covariance else None)
 
 
 def looked_up_across(
@@ -149,8 +156,9 @@ def looked_up_across(
 
 
 def looked_up_many(
-    frames: Frames, target: str, source: str, times: Sequence[int], *, miss: Callable[[int], None] | None = None
-) -> Iterator[Result]:
+    frames: Frames, target: str, source: str, times: Sequence[int], *,
+    miss: Callable[[int], None] | None = None, covariance: bool = False,
+) -> Iterator[Result]:  # fmt: skip
     """Look up at many times, in their order, block by block.
 
     miss: takes each time without data, which then has no result; without it the first one raises.
@@ -158,10 +166,16 @@ def looked_up_many(
     for begin in range(0, len(times), BLOCK):
         block = times[begin : begin + BLOCK]
         found = frames.lookup_many(target, source, block, missing="nan" if miss else "raise")
-        rows = zip(*(column.tolist() for column in found.components), strict=True)
+        rows = [*zip(*(column.tolist() for column in found.components), strict=True)]
+        entries: Iterator[list[float] | None] = repeat(None)
+        if covariance:
+            from frametool.frames.lookup_many import carried_many
+
+            there = [at_ns for at_ns, row in zip(block, rows, strict=True) if isfinite(row[6])]
+            entries = iter(carried_many(frames, target, source, there).tolist())
         for at_ns, row in zip(block, rows, strict=True):
             if isfinite(row[6]):
-                yield result_at(row, target, source, at_ns)
+                yield result_at(row, target, source, at_ns, next(entries))
             elif miss:
                 miss(at_ns)
 

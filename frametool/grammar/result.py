@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.representations import notation
+from frametool.grammar.names import with_entries
 from frametool.grammar.pose import NAMES, SCALE, Pose
 from frametool.grammar.rotation_spelling import spelled
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
@@ -109,8 +110,8 @@ class Result:
 
     def said(self, style: Style) -> dict[str, Any]:
         """Return what is said beside the pose, its scale too unless the one matrix that is written holds it."""
-        scale = self.pose.scale
-        return self.extras if scale == 1.0 or holds_scale(style.notations) else {SCALE: scale} | self.extras
+        extras = with_entries(self.extras)
+        return extras if self.pose.scale == 1.0 or holds_scale(style.notations) else {SCALE: self.pose.scale} | extras
 
 
 class NoResult(Result):
@@ -123,7 +124,18 @@ class NoResult(Result):
         if self.pose == Pose():
             return dict(self.extras)
         entry = Result(self.pose).mapping(style)
-        return {key: value if key in NAMES else None for key, value in entry.items()} | self.extras
+        return {key: value if key in NAMES else None for key, value in entry.items()} | with_entries(self.extras)
+
+
+def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return what is said beside poses or points as a table has it: a covariance as c11 .. c66, or c11 .. c33."""
+    entries = extras.get("covariance")
+    if not (isinstance(entries, list) and len(entries) in (36, 9)):
+        return extras
+    from frametool.grammar.covariance import columns
+
+    found = {key: value for key, value in extras.items() if key != "covariance"}
+    return found | dict(zip(columns(len(entries)), entries, strict=True))
 
 
 def _add(entry: dict[str, Any], key: str, value: Any) -> None:
@@ -140,10 +152,21 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     """Yield a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
     yield from ({"name": root} for root in tree.roots)
     for track in tree.tracks():
+        beside = uncertain(tree.covariances.get(track.child))
         if track.standing:
-            yield Result(Pose.of(track.components, track.child, track.parent)).mapping(style)
+            yield Result(Pose.of(track.components, track.child, track.parent), beside).mapping(style)
         else:
-            yield {"name": track.child, "parent": track.parent, "samples": list(_samples(track, style))}
+            samples = {"samples": list(_samples(track, style))}
+            yield {"name": track.child, "parent": track.parent} | beside | samples
+
+
+def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
+    """Return what a result says of its covariance: nothing where it is exact."""
+    if entries is None:
+        return {}
+    from frametool.grammar.covariance import COVARIANCE, Whole
+
+    return {COVARIANCE: [Whole(entry + 0.0) for entry in entries]}
 
 
 def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:

@@ -9,7 +9,7 @@ import re
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid, listing, shown
 from frametool.frames.snapshot import Snapshot
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
@@ -207,7 +207,7 @@ def diff(
     return Comparison(
         [each for each in found if each.kind != SAME],
         [each for each in found if each.kind == SAME],
-        [*pair.notes, *_times(a, b, at_ns)],
+        [*pair.notes, *_times(a, b, at_ns), *_covariances(a, b)],
         [frame for frame in pair.common if frame in pair.a.without_data and frame in pair.b.without_data],
     )
 
@@ -345,6 +345,14 @@ def _apart(a: Rigid, b: Rigid) -> Apart:
 def _covered(track: MovingTrack) -> str:
     first, last = map(format_stamp, track.span)
     return f"{track.count} sample{'s' * (track.count != 1)} {first} .. {last}"
+
+
+def _covariances(a: Frames, b: Frames) -> Iterator[str]:
+    """Name the frames of both whose covariances differ, which is no difference of their poses."""
+    known = dict.fromkeys([*a.covariances, *b.covariances])
+    both = [child for child in known if a.track(child) and b.track(child)]
+    if others := [child for child in both if a.covariances.get(child) != b.covariances.get(child)]:
+        yield f"covariances are not compared; those of {listing(others, 8)} differ"
 
 
 def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:

@@ -216,6 +216,21 @@ def _text(value: Any, *, is_json: bool) -> str:
     return dump(value) if is_json else text_of(value)
 
 
+def _in_columns(name: str, cells: Cells) -> dict[str, Made]:
+    """Return the column of a name; covariances as columns c11, c12, .. of numbers."""
+    if name != "covariance" or isinstance(cells, Spans):
+        return {name: Made(cells)}
+    from frametool.grammar.covariance import columns
+
+    values = plain_cells(cells)
+    sizes = {len(each) if isinstance(each, list) else 0 for each in values if each is not None}
+    if sizes not in ({36}, {9}):
+        return {name: Made(cells)}
+    size = sizes.pop()
+    rows = np.array([[np.nan] * size if each is None else each for each in values], np.float64)
+    return {column: Made(each, not_finite(each)) for column, each in zip(columns(size), rows.T, strict=True)}
+
+
 class ArrayWriter(ColumnsWriter):
     """Write blocks of poses, points, vectors, twists or wrenches one after the other.
 
@@ -263,7 +278,8 @@ class ArrayWriter(ColumnsWriter):
             none = block.stamps_ns == NO_STAMP
             made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)
         for name, cells in block.extras.items():
-            made.setdefault(name, Made(cells))
+            for column, each in _in_columns(name, cells).items():
+                made.setdefault(column, each)
         return made
 
     def _numbers(self, block: RowPoses) -> list[Any]:

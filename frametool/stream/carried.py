@@ -5,6 +5,7 @@ Loaded where a row or what moves it has one.
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid
@@ -34,10 +35,13 @@ def with_own(
         raise ValueInvalid(MIRRORED)
     if shape.sigma:
         given = expanded(shape, given)
-    elif size == uncertainty.POINT:  # of the position alone: it turns as a point's does
+    elif size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
         if mover is not None and len(mover) > RIGID:
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
-        return pose, (given if mover is None else uncertainty.turned(given, *mover[3:])) + rest
+        count = sum(shape.covariance)
+        parts = [beside[at : at + size] for at in range(0, count, size)]
+        turned = [part if mover is None else uncertainty.turned(part, *mover[3:]) for part in parts]
+        return pose, (*chain.from_iterable(turned), *beside[count:])
     if shape.inverse:
         back = inverse((*rigid.inverse(*pose), *given))
         return (back if size == 1 else (*pose, *back[RIGID:])), rest

@@ -10,7 +10,7 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats
 from frametool.geometry.batch_validation import read_rotations
-from frametool.grammar.covariance import bad_rows
+from frametool.geometry.uncertainty import bad_rows
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, TURN, checked_rotation, doubt, wrong_tail

@@ -26,7 +26,7 @@ class Gathered:
         """Begin with none; named: so that `places` says where each was read."""
         self.places: list[str] = []
         self._lines: list[int] | None = [] if named else None  # of the block that was read last
-        self.placed = self.turned = False
+        self.placed = self.turned = self.uncertain = False
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
 
@@ -58,6 +58,7 @@ class Gathered:
         self.places += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
         self.placed |= any(pose.position is not None for pose in poses)
         self.turned |= any(pose.rotation is not None for pose in poses)
+        self.uncertain |= any(pose.covariance is not None for pose in poses)
         self._poses.append(np.array([pose.components for pose in poses], np.float64).reshape(-1, 7))
 
     @property

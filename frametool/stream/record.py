@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
-from frametool.grammar.covariance import COVARIANCE, SIGMA, UNKNOWN, check, entries_of, read_covariance
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, on_earth
 from frametool.grammar.pose import (
     POSE_KEYS,
     POSITION_KEYS,
     SCALE,
+    UNCERTAIN,
     read_angle_unit,
     read_position,
-    read_scale,
-    refuse_scale,
     unknown_keys,
 )
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
@@ -44,13 +42,13 @@ if TYPE_CHECKING:
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message")
 LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
-COVARIANCES = (COVARIANCE, "position_covariance", "orientation_covariance")
+COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 QUATERNION = (*XYZ, "w")
-USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, SIGMA), COVARIANCES, *PARTS.values())
+USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
@@ -281,7 +279,7 @@ def _parts_of(value: dict[str, Any]) -> str | None:
 
 def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None:
     """Stop where a mapping holds more than one pose: which is meant nobody can tell."""
-    ours = {*POINT_KEYS, *ROTATION_KEYS, *found, SIGMA, "twist"}
+    ours = {*POINT_KEYS, *ROTATION_KEYS, *found, "sigma", "twist"}
     more = [key for key, each in value.items() if type(each) is dict and key not in ours and _is_holder(each)]
     if len(found) + len(more) > 1:
         raise Misfit(f"expected one point or pose in a record, found several: {', '.join([*found, *more])}", path)
@@ -312,7 +310,10 @@ def _record(document: Any, place: Place, request: Request, reading: Reading, abo
     except Misfit as misfit:
         raise misfit.below(*here) from None
     try:
-        record = _with_covariances(record, document, place, above, request, reading)
+        if around := holders(document, place, record.shape):
+            from frametool.stream.beside import with_covariances
+
+            record = with_covariances(record, value_at(document, around[0]), around[0], place, above, request, reading)
         record = _with_asked(record, document, path, above, request)
         if request.operation.only_adds:
             _refuse_repeated(record, document, path, request)
@@ -386,9 +387,11 @@ def _of_message(value: Any, place: Place, path: Path, reading: Reading, request:
         raise Misfit(f"{field} cannot be taken for a {request.kind}")
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
-    known = value.get(place.covariances[0])
-    if known and within(place.covariances, entries_of, known, (9,))[0][1] == UNKNOWN:
-        return Record(path, Shape("", None), rotation=field)
+    if known := value.get(place.covariances[0]):
+        from frametool.stream.beside import is_unknown
+
+        if within(place.covariances, is_unknown, known, (9,)):
+            return Record(path, Shape("", None), rotation=field)
     reading.degrees = request.degrees
     within((field,), read_rotation, field, value[field], reading)
     record = _with_rotation(value[field], field, Record(path, Shape(POSE, None)), (field,), reading, request)
@@ -630,87 +633,6 @@ def _path_if_there(value: Any, path: Path, place: Path) -> Path | None:
     return (*path, *place)
 
 
-def _with_covariances(
-    record: Record, document: Any, place: Place, above: Path, request: Request, reading: Reading
-) -> Record:
-    """Add the numbers of the covariances beside a record, or around it where a message has it so; or its sigmas' own.
-
-    Where records move, one that begins with -1 is unknown and stays.
-    """
-    operation, shape, path = request.operation, record.shape, place.path
-    own, around, there = value_at(document, path), path, list[str]()
-    for around in (path, path[:-1])[: 1 + (path[-1:] == (shape.kind,))]:
-        holder = value_at(document, around)
-        there = [key for key in place.covariances if type(holder) is dict and key in holder]
-        if there:
-            break
-    has_sigma = type(own) is dict and SIGMA in own and shape.kind in (POSE, POINT, VECTOR)
-    if not (there or has_sigma):
-        return record
-    if request.gathered is not None or (operation.formula is not None and around == path and not operation.only_adds):
-        reading.here = (*above, *path)
-        reading.note(f"covariances left out: {'mean' if request.gathered else 'calc'} has none", rule="left-out")
-        return record._replace(others=(*record.others, *there, *[SIGMA] * has_sigma))
-    if operation.keeps_frames:
-        return record
-    if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
-        what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
-        raise Misfit(what, (*around, there[0]))
-    if has_sigma:
-        return _with_sigmas(record, own, path, reading)
-    allowed = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)
-    for key in there:
-        below = (*around, key)
-        found = within(below, entries_of, holder[key], allowed)
-        paths, numbers = tuple((*above, *below, *at) for at, _ in found), [number for _, number in found]
-        if numbers[0] == UNKNOWN and operation.moves:
-            record = record._replace(unknown=(*record.unknown, paths[0]))
-            continue
-        within(below, check, numbers)
-        record = record._replace(
-            shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
-            numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
-            known=(*record.known, paths[0]),
-        )  # fmt: skip
-    return record
-
-
-def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading) -> Record:
-    """Add the covariance that sigmas say; none of its entries stands in the text, and the result names them anew."""
-    size = 36 if record.shape.kind == POSE else 9
-    degrees, reading.degrees = reading.degrees, _in_degrees(own, reading)
-    try:
-        whole = within(path, read_covariance, own, reading)
-    finally:
-        reading.degrees = degrees
-    if size == 9 and any(whole[18:]):
-        raise Misfit("a point does not turn; its sigma has xyz alone", (*path, SIGMA))
-    entries = whole if size == 36 else tuple(whole[6 * i + j] for i in range(3) for j in range(3))
-    shape = record.shape._replace(covariance=(size,), rewritten=True)
-    return record._replace(
-        shape=shape, numbers=(*record.numbers, *[None] * size), values=(*record.values, *entries),
-        others=(*record.others, SIGMA),
-    )  # fmt: skip
-
-
-def _in_degrees(own: dict[str, Any], reading: Reading) -> bool:
-    return read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
-
-
-def _with_scale(record: Record, value: Any, around: Path, above: Path, request: Request) -> Record:
-    """Add the scale beside a pose, where the operation takes one; else it can only be 1."""
-    if not request.operation.similar or around != record.path[len(above) :]:
-        within(around, refuse_scale, value)
-        return record
-    if record.shape.covariance:
-        raise Misfit("a covariance and a scale in one entry; leave one of them out", (*around, SCALE), key=True)
-    scale = within(around, read_scale, value)
-    return record._replace(
-        shape=record.shape._replace(covariance=(1,)), numbers=(*record.numbers, (*above, *around, SCALE)),
-        values=(*record.values, scale), covariances=(SCALE,),
-    )  # fmt: skip
-
-
 def _with_names(
     record: Record, document: Any, path: Path, outer: tuple[Path, ...], above: Path, request: Request
 ) -> Record:
@@ -721,7 +643,9 @@ def _with_names(
         if type(value) is not dict:
             continue
         if record.shape.kind == POSE and SCALE in value and (around == path or type(value[SCALE]) is str):
-            record = _with_scale(record, value[SCALE], around, above, request)  # around it, of a Marker: its shape's
+            from frametool.stream.beside import with_scale
+
+            record = with_scale(record, value[SCALE], around, above, request)  # around it, of a Marker: its shape's
         parent = _named(value, PARENT_KEYS, (*above, *around), parent, request)
         if record.shape.kind == POSE or around == path:
             name = _named(value, NAME_KEYS, (*above, *around), name, request)
@@ -759,6 +683,13 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path)
     parts = (next(key for key in header["stamp"] if key.startswith(letter)) for letter in "sn")
     stamps = (*record.stamps, *((*above, *path, part) for part in parts))
     return record._replace(stamps=stamps, stamp_ns=record.stamp_ns if record.stamps else stamp_ns)
+
+
+def holders(document: Any, place: Place, shape: Shape) -> list[Path]:
+    """Return which mappings say a covariance: that of a record, or the one around it where a message has it so."""
+    around = (place.path, place.path[:-1])[: 1 + (place.path[-1:] == (shape.kind,))]
+    keys = {*place.covariances, *UNCERTAIN}
+    return [path for path in around if type(held := value_at(document, path)) is dict and not keys.isdisjoint(held)]
 
 
 def value_at(value: Any, path: Path) -> Any:

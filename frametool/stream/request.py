@@ -107,7 +107,8 @@ class Operation(NamedTuple):
 
     def carried(self, shape: Shape) -> tuple[str, ...]:
         """Name the entries of the covariance, or the scale, that the results of rows of a shape have."""
-        if self.keeps_frames or self.formula is not None or shape.kind not in (POSE, POINT, VECTOR):
+        passes = self.formula is not None or (self.keeps_frames and not self.uncertain)
+        if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
         sizes = {len(each) for each in (self.left, *self.right, self.fixed) if each is not None}
         if SCALED in sizes or 1 in shape.covariance or shape.multiple:

@@ -5,6 +5,7 @@ Stamps are read in bulk, decimal seconds or nanoseconds to integer nanoseconds, 
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -189,7 +190,7 @@ def by_frame(edge_of: Callable[..., Rigid], frames: Sequence[str | None], blame:
         if problem := known[name][1]:
             blame(row, column, problem)
     chosen_rows = np.array([known[name][0] for name in frames], np.int64)
-    return tuple(np.array(column)[chosen_rows] for column in zip(*table, strict=True))  # type: ignore[return-value]
+    return tuple(np.array(column)[chosen_rows] for column in zip_longest(*table, fillvalue=0.0))  # type: ignore[return-value]
 
 
 def _edge(edge_of: Callable[..., Rigid], name: str | None) -> tuple[Rigid, FrametoolError | None]:
@@ -214,7 +215,7 @@ def by_time(
         times, reasons = read_stamps(stamps, in_ns=timed.in_ns)
     for row, reason in reasons.items():
         blame(row, timed.column, reason)
-    poses = np.full((7, len(times)), np.nan)
+    poses = np.full((timed.width, len(times)), np.nan)
     for frame, rows in _by_frame(frames, np.delete(np.arange(len(times)), list(reasons))):
         _fill(poses, timed, frame, rows, times, blame, column)
     return tuple(poses)  # type: ignore[return-value]

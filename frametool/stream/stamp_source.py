@@ -11,7 +11,7 @@ from frametool.grammar.readers import Misfit, kind
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry.types import Components
     from frametool.grammar.readers import Path
 
 LARGEST = (1 << 63) - 1
@@ -25,12 +25,14 @@ class Timed(NamedTuple):
     many: columns of poses at an array of nanoseconds, nan where there is no data
     one: a pose at one time, or the reason raised
     moves: tells whether what lies between a frame and the target depends on the time
+    width: how many numbers such a pose has, with its covariance if that counts
     """
 
     name: str
     many: Callable[[str | None, Any], Components]
-    one: Callable[[str | None, int], Rigid]
+    one: Callable[[str | None, int], Components]
     moves: Callable[[str | None], bool] = bool
+    width: int = 7
 
     @classmethod
     def of_rows(cls, name: str) -> Timed:
@@ -47,10 +49,10 @@ class Timed(NamedTuple):
         """Name the column or key for messages."""
         return self.name or HEADER
 
-    def pose(self, frame: str | None, stamp_ns: int) -> Rigid:
+    def pose(self, frame: str | None, stamp_ns: int) -> Components:
         """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
-        tx, ty, tz, x, y, z, w = (float(column[0]) for column in self.many(frame, [stamp_ns]))
-        return (tx, ty, tz, x, y, z, w) if w == w else self.one(frame, stamp_ns)  # noqa: PLR0124 - nan is not itself
+        found = tuple(float(column[0]) for column in self.many(frame, [stamp_ns]))
+        return found if found[0] == found[0] else self.one(frame, stamp_ns)
 
 
 def _by_expression(_frame: str | None, _at: Any) -> Any:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, ValueInvalid, alternatives, shown, warn
-from frametool.grammar.covariance import find_columns, is_sigma
-from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS, in_nanoseconds, nanoseconds_beside, without_mark
-from frametool.grammar.readers import NotARotation
+from frametool.errors import FormatError, ValueInvalid, alternatives, shown
+from frametool.grammar.names import (
+    NAME_KEYS,
+    PARENT_COLUMNS,
+    in_nanoseconds,
+    may_be_uncertain,
+    nanoseconds_beside,
+    without_mark,
+)
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import (
@@ -23,7 +27,7 @@ from frametool.stream.header import (
     wholes_of,
 )
 from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, six_names
+from frametool.stream.row_layout import POSE, SIX, Shape, six_names
 from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
@@ -37,9 +41,6 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 
-_UNCERTAIN = r"c11$|sigma_"
-
-
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
@@ -51,7 +52,11 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         raise FormatError(wrong, source=source, line=1)
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
-    beside, shapes = _covariance_columns(table, request, shapes, source)
+    beside: tuple[int, ...] = ()
+    if any(may_be_uncertain(name) for name in table.names or ()):
+        from frametool.stream.beside import covariance_columns
+
+        beside, shapes = covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
@@ -66,7 +71,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     named = named if name is None else {**named, name: NAME}
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if beside and not request.keep:
-        columns = _with_entries(columns, beside, len(request.operation.carried(shapes[0])))
+        from frametool.stream.beside import with_entries_at
+
+        columns = with_entries_at(beside, columns, len(request.operation.carried(shapes[0])))
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
@@ -96,7 +103,8 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if table.pose is not None and request.given is None and request.poses == 1:
         return [table.pose]
     if table.names:
-        names = ["" if name == request.extra_column or is_sigma(name) else name for name in table.names]  # known
+        known = request.extra_column
+        names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
     if request.kind in SIX and table.width == len(six_names(request.kind)):
         return [named_pose(f"1-{table.width}", None, table.width, None, request.kind)]
@@ -145,45 +153,6 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     if request.operation.formula is None:
         return shapes
     return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
-
-
-def _covariance_columns(
-    table: Table, request: Request, shapes: tuple[Shape, ...], source: str
-) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
-    """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
-    kinds = [shape.kind for shape in shapes]
-    if not table.names or not any(re.match(_UNCERTAIN, name) for name in table.names):
-        return (), shapes
-    if not {POSE, POINT, VECTOR}.issuperset(kinds) or request.operation.formula is not None:
-        return (), shapes
-    try:
-        places, sigma = find_columns(table.names, 36 if POSE in kinds else 9)
-    except NotARotation as error:
-        raise FormatError(str(error), source=source, line=1) from None
-    if places and request.gathered is not None:
-        warn(f"{source}: covariances left out: mean has none", rule="left-out")
-    if not places or request.operation.keeps_frames:
-        return (), shapes
-    if len(shapes) != 1:
-        message = "a covariance beside several poses in a row: whose it is nobody can tell"
-        raise FormatError(message, source=source, line=1)
-    if request.degrees:
-        sigma = tuple((at, unit or "deg" * (axis > 2)) for axis, (at, unit) in enumerate(sigma))
-    return places, (shapes[0]._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
-
-
-def _with_entries(columns: Sequence[Column], beside: Sequence[int], count: int) -> list[Column]:
-    """Put the entries of a result's covariance, the last numbers there are, where that of the row stood."""
-    new = [each for each in columns if isinstance(each, New)]
-    entries = sorted(new, key=lambda each: each.number)[-count:]
-    first = min(beside)
-    found: list[Column] = []
-    for column in columns:
-        if isinstance(column, Kept) and column.place in beside:
-            found += entries if column.place == first else []
-        elif column not in entries:
-            found.append(column)
-    return found
 
 
 def _by_width(width: int, given: Notation | None) -> str:

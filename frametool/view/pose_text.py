@@ -26,6 +26,7 @@ OVERVIEW = [name + unit for name, row in REPRESENTATIONS.items() for unit in row
 
 
 WIDTH = 80
+WIDEST_SIGMAS = 62  # characters of six sigmas in one line of an overview
 DECIMALS = 6  # of an overview
 ENDLESS = 1e9  # where that many decimals say nothing
 
@@ -50,7 +51,11 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
         frame = f"m in {record['frame']}" if record.get("frame") else "m"
         at = "" if record.get("stamp_ns") is None else f" at {format_stamp(record['stamp_ns'])}"
         kind, numbers = next(each for each in record.items() if isinstance(each[1], list))
-        others = [f"  {key} {_said(value)}" for key, value in record.items() if key not in (kind, "frame", "stamp_ns")]
+        others = [
+            f"  sigma {' '.join(sigmas)}" if (sigmas := _sigmas(key, value)) else f"  {key} {_said(value)}"
+            for key, value in record.items()
+            if key not in (kind, "frame", "stamp_ns")
+        ]
         frames.append("".join([frame, at, *others]))
         rows.append([style.number(value + 0.0) for value in numbers])
     return "".join(f"{'  '.join(cells)}  {frame}\n" for cells, frame in zip(_aligned(rows), frames, strict=True))
@@ -110,8 +115,49 @@ def _extra_lines(extras: dict[str, Any]) -> Iterator[NumberLine]:
         if isinstance(value, float):
             unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
             yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
+        elif sigmas := _sigmas(key, value):
+            whole = " ".join(sigmas)
+            yield NumberLine("sigma", [], whole if len(whole) <= WIDEST_SIGMAS else " ".join(sigmas[:3]))
+            if len(whole) > WIDEST_SIGMAS:
+                yield NumberLine("", [], " ".join(sigmas[3:]))
         elif key not in TIMES and value is not None:
             yield NumberLine(key, [], _said(value))
+
+
+def _sigmas(key: str, value: Any) -> list[str]:
+    """Write the roots of the diagonal of a covariance, two digits each; nothing of any other value."""
+    if key != "covariance" or not isinstance(value, list) or len(value) not in (36, 9):
+        return []
+    try:
+        variances = [float(entry) for entry in value[:: round(len(value) ** 0.5) + 1]]
+    except (TypeError, ValueError):
+        return []
+    if variances[0] == -1.0:
+        return ["unknown"]  # as ROS has it
+    roots = [math.sqrt(max(each, 0.0)) for each in variances]
+    return [*map(_length, roots[:3]), *map(_angle, roots[3:])]
+
+
+def largest_sigmas(entries: Sequence[float]) -> str:
+    """Say how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
+    roots = [math.sqrt(max(entry, 0.0)) for entry in entries[::7]]
+    return f"±{_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
+
+
+def _length(metres: float) -> str:
+    return _two_digits(metres * 1000.0, "mm") if metres < 1.0 else _two_digits(metres, "m")
+
+
+def _angle(radians: float) -> str:
+    return _two_digits(math.degrees(radians), "deg")
+
+
+def _two_digits(value: float, unit: str) -> str:
+    """Write a sigma with its unit: `2.1 mm`, `12 m`; what is tiny with an exponent."""
+    if value and not 0.001 <= value < ENDLESS:
+        return f"{value:.1e} {unit}"
+    decimals = max(1 - math.floor(math.log10(value)), 0) if value else 0
+    return f"{value:.{decimals}f} {unit}"
 
 
 def _said(value: Any) -> str:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import Track
+    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
 
 
@@ -66,9 +67,13 @@ def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
     )  # fmt: skip
 
 
-def _label(track: Track, style: Style) -> tuple[str, ...]:
-    """Return the pose of an edge, and how it moves: its newest pose then."""
-    label = edge_label(Transform.of(*track.components), style)
+def _label(track: Track, style: Style, covariance: Components | None) -> tuple[str, ...]:
+    """Return the pose of an edge, how uncertain it is, and how it moves: its newest pose then."""
+    label: tuple[str, ...] = edge_label(Transform.of(*track.components), style)
+    if covariance is not None:
+        from frametool.view.pose_text import largest_sigmas
+
+        label = *label, largest_sigmas(covariance)
     if track.standing:
         return label
     from frametool.frames.edge_log import motion
@@ -107,7 +112,8 @@ def _lines(tree: Frames, style: Style) -> Iterator[DrawnFrame]:
     """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
     children: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
     for track in tree.tracks():
-        children.setdefault(track.parent, []).append((track.child, _label(track, style)))
+        label = _label(track, style, tree.covariances.get(track.child))
+        children.setdefault(track.parent, []).append((track.child, label))
     pending: list[tuple[str, tuple[str, ...], str, str]] = [(root, (), "", "") for root in reversed(tree.roots)]
     while pending:
         frame, label, branch, below = pending.pop()

@@ -55,7 +55,8 @@ def vectors(random: Random, *names: str) -> dict[str, dict[str, float]]:
 
 def record(random: Random) -> dict[str, Any]:
     """Draw a point, a vector, a pose, a twist or a wrench, with and without covariance."""
-    covariance = {"covariance": [random.uniform(-1.0, 1.0) for _ in range(36)]}
+    root = [[random.uniform(-1.0, 1.0) for _ in range(6)] for _ in range(6)]
+    covariance = {"covariance": [sum(x * y for x, y in zip(a, b, strict=True)) for a in root for b in root]}
     orientation = {"orientation": dict(zip("xyzw", random.choice(ROTATIONS), strict=True))}
     return random.choice((
         {"point": position(random)}, {"vector": position(random)}, pose(random), vectors(random, "linear", "angular"),

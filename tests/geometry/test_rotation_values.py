@@ -126,7 +126,7 @@ def test_normalising_helps_neither_zero_nor_nan(given: Any) -> None:
     ("entries", "message"),
     [
         (np.diag([1.0, 1.0, -1.0]), r"left-handed \(mirrored\)"),
-        (2.0 * np.eye(3), r"matrix is a rotation scaled by 2: a similarity, not a pose$"),
+        (2.0 * np.eye(3), r"matrix is 2 times a rotation: a similarity, not a pose \(--scale takes it as one\)$"),
         (np.diag([1.0, 1.0, 2.0]), r"orthonormal only to 3 \(sheared or scaled unevenly\)$"),
         (np.diag([1.0, 1.0, 1.1]), r"orthonormal only to 0.21 \(normalize it with --normalize\)$"),
         (np.zeros((3, 3)), r"matrix 0 0 0, 0 0 0, 0 0 0 is singular"),
@@ -308,7 +308,7 @@ def test_nothing_has_no_mean() -> None:
     [
         *((each, r"sheared or scaled unevenly\)$") for each in (
             (1.0, 1.0, 1e-9), (1.0, 1.0, 1e-3), (1.2, 1.0, 1.0), (0.89, 0.95, 1.1))),
-        *(((s, s, s), f"a rotation scaled by {re.escape(f'{s:g}')}: a similarity, not a pose$") for s in (
+        *(((s, s, s), f"matrix is {re.escape(f'{s:g}')} times a rotation: a similarity, not a pose") for s in (
             1e-300, 1e-3, 0.5, 0.9, 0.95, 0.998, 1.002, 1.05, 2.0, 1000.0, 1e200, 1e307)),
         ((-1.0, 1.0, 1.0), r"left-handed \(mirrored\)"), ((2.0, 2.0, -2.0), r"left-handed \(mirrored\)"),
     ],

@@ -305,13 +305,9 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a covariance of something else": (
         {"frame": "base", "point": [1.0, 2.0, 3.0], "velocity_covariance": [1.0] * 9}, f"'velocity_covariance' {WHAT}",
     ),
-    "a covariance of six": ({"frame": "base", "point": [1.0, 2.0, 3.0], "covariance": [1.0] * 36}, "expected 9 numbers (3x3), found 36"),
-    "a covariance of three": ({"header": HEADER, "twist": {"twist": BOTH, "covariance": [1.0] * 9}}, "expected 36 numbers (6x6), found 9"),
-    "a covariance cut short": (MESSAGES["MagneticField"] | {"magnetic_field_covariance": [1.0]}, "expected 9 numbers (3x3), found 1"),
-    "a covariance of the inverse": (
-        {"frame": "base", **POSE, "covariance": [1.0] * 36, "inverse": True},
-        "the covariance would be wrong afterwards; leave it out, or move the message with apply",
-    ),
+    "a covariance of six": ({"frame": "base", "point": [1.0, 2.0, 3.0], "covariance": [1.0] * 36}, "covariance has 36 numbers; 9 are needed (3x3, row-major: x y z)"),
+    "a covariance of three": ({"header": HEADER, "twist": {"twist": BOTH, "covariance": [1.0] * 9}}, "covariance has 9 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)"),
+    "a covariance cut short": (MESSAGES["MagneticField"] | {"magnetic_field_covariance": [1.0]}, "covariance has 1 number; 9 are needed (3x3, row-major: x y z)"),
 }  # fmt: skip
 
 

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from ways import Run
 
 TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-BY_A_MATRIX = "matrix is a rotation scaled by 2: a similarity, not a pose"
-BY_A_KEY = "scaled by 2: a similarity, not a pose; beside a pose scale can only be 1"
+BY_A_MATRIX = "matrix is 2 times a rotation: a similarity, not a pose (--scale takes it as one)"
+BY_A_KEY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
+TAKE_IT = ("invert", "compose")
 POSES: dict[str, dict[str, Any]] = {
     "grammar": {"xyz": [1, 2, 3], "rpy": [0, 0, 1]},
     "position": {"xyz": [1, 2, 3]},
@@ -23,6 +24,10 @@ POSES: dict[str, dict[str, Any]] = {
     "message": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
 }
 COMMANDS = (("convert",), ("invert",), ("relative", "{xyz: [1, 0, 0]}"), ("compose", "{xyz: [1, 0, 0]}"), ("mean",))
+
+
+def scales(text: str) -> set[float]:
+    return {float(found) for found in re.findall(r'"?scale"?: ([\d.]+)', text)}
 
 
 def times(size: float, *, whole: bool = False) -> list[list[float]]:
@@ -60,6 +65,9 @@ def test_a_scale_beside_a_pose(run: Run, command: tuple[str, ...], form: str, po
     for record in (POSES[pose] | {"scale": 2}, {"pose": POSES[pose], "scale": 2}):
         for way in ways(form, record):
             done = given(run, command, way)
+            if command[0] in TAKE_IT and "pose" not in record:
+                assert (done.status, 0.5 if command[0] == "invert" else 2.0) == (0, *scales(done.out)), way
+                continue
             assert (done.status, done.out) == (1, ""), way
             assert BY_A_KEY in done.err
     for one in (1, 1.0, [1, 1, 1], {"x": 1, "y": 1.0, "z": 1}):
@@ -69,13 +77,13 @@ def test_a_scale_beside_a_pose(run: Run, command: tuple[str, ...], form: str, po
 
 @pytest.mark.parametrize("command", [("convert",), ("invert",), ("compose", "{xyz: [1, 0, 0]}", "-")])
 @pytest.mark.parametrize("pose", POSES)
-@pytest.mark.parametrize("scale", [2, [1, 1, 2], {"x": 1, "y": 1, "z": 2}, "a", None, True])
+@pytest.mark.parametrize("scale", [-2, 0, [1, 1, 2], {"x": 1, "y": 1, "z": 2}, "a", None, True])
 def test_among_many_as_alone(run: Run, command: tuple[str, ...], pose: str, scale: Any) -> None:
     ones: Any = [1, 1, 1] if type(scale) is list else {"x": 1, "y": 1, "z": 1} if type(scale) is dict else 1
     good, bad = (json.dumps(POSES[pose] | {"scale": each}) + "\n" for each in (ones, scale))
     done = run(*command, "--on-error", "skip", stdin=good * 20 + bad + good * 20)
     assert (done.status, done.out.count("\n")) == (3, 40)
-    assert re.search(r"stdin:21:scale\S*: scaled by .*: a similarity, not a pose", done.err)
+    assert re.search(r"stdin:21:scale\S*: .*(a similarity, not a pose|positive|number)", done.err)
 
 
 @pytest.mark.parametrize(

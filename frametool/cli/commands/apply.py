@@ -26,9 +26,10 @@ from frametool.cli.options import (
 )
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import Stream, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.grammar.pose_algebra import looked_up
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from frametool.explain.derive import ByTree
     from frametool.explain.given import Given
     from frametool.formats.load import Rules
-    from frametool.geometry.types import Components, Rigid
+    from frametool.geometry.types import Components
     from frametool.stream.request import Request
 
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
@@ -107,11 +108,15 @@ def command(
     if time_column is not None:
         _check_timed(rest, at)
     if clouds is not None:
+        if covariance:
+            raise click.UsageError("--covariance: clouds have no place for one")
         if rest not in ((), ("-",)) or time_column or frame_column or kinds or plan is not None:
             raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
         return clouds.run(way.from_frame, way.target)
     kind = _kind(kinds, stream)
     if plan is not None:
+        if covariance or scale:
+            raise click.UsageError("--explain derives without --covariance and --scale; leave them out")
         records = list(_sources(rest, kind))
         if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
@@ -130,11 +135,14 @@ def command(
     request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
     if (count := len(stream.options["columns"])) > 1:
         request = request._replace(poses=count, kinds=(kinds if len(kinds) == count else (kind or "",) * count))
+    status = 0
     if rest in ((), ("-",)):
-        return stream.run(request, output)
-    task.only_arguments(rest, "frame_column", "time_column")
-    output.values(values_of(list(_sources(rest, kind)), request, output))
-    return 0
+        status = stream.run(request, output)
+    else:
+        task.only_arguments(rest, "frame_column", "time_column")
+        output.values(values_of(list(_sources(rest, kind)), request, output))
+    way.tell()
+    return status
 
 
 def _kind(kinds: tuple[str, ...], stream: Stream) -> str | None:
@@ -164,6 +172,7 @@ class Way(NamedTuple):
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name
     uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
+    tell: says at the end what was taken for granted of it
     """
 
     target: str | None
@@ -174,6 +183,7 @@ class Way(NamedTuple):
     has_source: bool
     counters: bool = True
     uncertain: bool = False
+    tell: Callable[[], None] = lambda: None
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Say how records move: from one frame or each from its own, all alike or each at its own time."""
@@ -181,7 +191,9 @@ class Way(NamedTuple):
         from frametool.stream.stamp_source import Timed
 
         has_source = self.has_source and frame_column is None
-        timed = self.at_times and Timed(time_column or "", self.at_times, self.from_frame, self.moves)
+        timed = self.at_times and Timed(
+            time_column or "", self.at_times, self.from_frame, self.moves, 43 if self.uncertain else 7
+        )
         frames = () if has_source else (frame_column or "",)
 
         def edge_of(own: str | None) -> Components:
@@ -213,6 +225,9 @@ def _way_by_tree(
     named = arguments[2:3] if len(arguments) > 2 and not _is_record(arguments[2]) else ()
     rest = arguments[2 + len(named) :]
     tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
+    sigmas = CarriedSigmas(tree) if uncertain else None
+    if sigmas is None:
+        tell_unused_sigmas(tree)
     target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
     source = next(iter(sources), None)
 
@@ -228,11 +243,17 @@ def _way_by_tree(
             raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
         return settled
 
-    def from_frame(own: str | None, own_ns: int | None) -> Rigid:
-        return tree.lookup(target, start(own), own_ns if chosen is None else at_ns(chosen)).components
+    def from_frame(own: str | None, own_ns: int | None) -> Components:
+        begin, at = start(own), own_ns if chosen is None else at_ns(chosen)
+        if sigmas is None:
+            return tree.lookup(target, begin, at).components
+        found = sigmas.noted(looked_up(tree, target, begin, at, covariance=True))
+        return *found.pose.components, *found.extras["covariance"]
 
     def at_times(own: str | None, times_ns: Any) -> Components:
-        return tree.lookup_many(target, start(own), times_ns, missing="nan").components
+        begin = start(own)
+        found = tree.lookup_many(target, begin, times_ns, missing="nan").components
+        return found if sigmas is None else sigmas.beside(found, target, begin, times_ns)
 
     def moves(own: str | None) -> bool:
         return tree.latest(target, start(own)) is not None
@@ -245,7 +266,8 @@ def _way_by_tree(
 
         return ByTree(tree, target, source, at_ns(chosen))
 
-    return Way(target, from_frame, in_time, moves, explained, source is not None, counters), rest
+    has_source, tell = source is not None, sigmas.tell if sigmas else lambda: None
+    return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell), rest
 
 
 def _way_by_pose(argument: str, task: PoseTask, *, uncertain: bool, multiples: bool) -> Way:

@@ -11,7 +11,7 @@ import click
 from frametool.cli.options import FILE, Command, Parsed, Skipped, Time, result_options, rules_of, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
-from frametool.errors import NoDataAt
+from frametool.errors import NoDataAt, warn
 from frametool.frames.lookups import checked_rate
 from frametool.grammar.pose_algebra import result_at
 from frametool.text.numbers import parse_number
@@ -61,6 +61,8 @@ def command(
     frames = load_tree(tree, more, taken)
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)
+    if frames.covariances:
+        warn("covariances left out: echo has none")
     replayed = frames.replay(target, source, rate_hz=rate, start_ns=start, stop_ns=stop)
     skipped = Skipped(in_json=out.told == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))

@@ -25,7 +25,8 @@ from frametool.cli.options import (
     times_option,
 )
 from frametool.cli.streaming import OPTIONS, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree
+from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
+from frametool.formats.table import holds_arrays
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
 
 
+WITH_COVARIANCE = ("json", "yaml", "csv")
+
+
 @click.command(cls=Command, name="lookup")
 @click.argument("tree", type=FILE)
 @click.argument("target", type=FRAME, required=False, metavar="TARGET")
@@ -44,6 +48,7 @@ if TYPE_CHECKING:
 @click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest]")
 @click.option("--source-at", type=TIME, metavar="TIME", help="the time at SOURCE, with --fixed; --at: at TARGET")
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="what stands still between the two times: map")
+@click.option("--covariance", is_flag=True, help="how sure it is, by the edges' sigmas (help covariance)")
 @times_option
 @rules_options
 @reading_options(streams=True)
@@ -55,8 +60,8 @@ if TYPE_CHECKING:
 @stream_options
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
-    source_at: int | str | None, fixed: str | None, times: str | None, moving: bool, cache: int | None, tf2: str | None,
-    **options: Any,
+    source_at: int | str | None, fixed: str | None, covariance: bool, times: str | None, moving: bool,
+    cache: int | None, tf2: str | None, **options: Any,
 ) -> int:  # fmt: skip
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
@@ -67,8 +72,8 @@ def command(
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along the line, rotations by slerp.
-    Trajectories (-f tum ..) hold all samples. Options of rows need --target-column or --source-column.
+    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along lines, rotations by slerp.
+    Trajectories (-f tum ..) hold all samples.
     """
     by_row, task = RowFrames(options), PoseTask(options)
     stream, output = task.stream, task.output
@@ -78,6 +83,8 @@ def command(
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
+    if covariance:
+        _check_covariance(output, derives=task.derives, fixed=fixed, by_row=bool(by_row))
     if by_row:
         refuse_unused("is for one lookup; the rows of a table name theirs", "times", "source_at", "fixed", "given")
     else:
@@ -87,8 +94,11 @@ def command(
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
     frames = load_tree(tree, more, chosen, streams=bool(by_row))
+    sigmas = CarriedSigmas(frames) if covariance else None
+    if sigmas is None:
+        tell_unused_sigmas(frames)
     if by_row or target is None or source is None:
-        return by_row.run(task, frames, target, source, at_ns(at))
+        return by_row.run(task, frames, target, source, at_ns(at), sigmas)
     if tf2 is None:
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
@@ -101,11 +111,14 @@ def command(
     every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None
     if times is not None or every:
         skip = stream.options["on_error"] == "skip"
-        return _many(output, frames, target, source, times, skip=skip)
+        return _many(output, frames, target, source, times, sigmas, skip=skip)
     if fixed is not None:
         output.poses([looked_up_across(frames, target, at_ns(at), source, at_ns(source_at), fixed)])
     else:
-        output.poses([looked_up(frames, target, source, at_ns(at))])
+        result = looked_up(frames, target, source, at_ns(at), covariance=covariance)
+        output.poses([result if sigmas is None else sigmas.noted(result)])
+    if sigmas is not None:
+        sigmas.tell()
     return 0
 
 
@@ -117,7 +130,23 @@ def _check(at: int | str | None, source_at: int | str | None, fixed: str | None,
         raise click.UsageError("--times says all the times; leave --at, --source-at and --fixed out")
 
 
-def _many(output: Output, frames: Frames, target: str, source: str, times: str | None, *, skip: bool) -> int:
+def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_row: bool) -> None:
+    """Refuse --covariance where it has no meaning, and in forms that have no place for it."""
+    if derives:
+        raise click.UsageError("--explain derives poses; leave --covariance out")
+    if fixed is not None:
+        raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
+    if by_row:
+        refuse_unused("is not for --covariance: the edges that are taken for exact are counted in one process", "jobs")
+    form = output.told if by_row else output.style.form
+    if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
+        raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
+
+
+def _many(
+    output: Output, frames: Frames, target: str, source: str, times: str | None, sigmas: CarriedSigmas | None, *,
+    skip: bool,
+) -> int:  # fmt: skip
     """Print the results at many times, or at those of all samples; with `skip` the others are left out and reported."""
     skipped = Skipped(in_json=output.told == "json")
     asked = sample_stamps(frames, target, source) if times is None else read_times(times, skipped.add if skip else stop)
@@ -125,6 +154,9 @@ def _many(output: Output, frames: Frames, target: str, source: str, times: str |
     def miss(at_ns: int) -> None:
         skipped.add(None if skipped.is_full else why_missing(frames, target, source, at_ns))
 
-    results = looked_up_many(frames, target, source, asked, miss=miss if skip else None)
-    output.poses_as_they_come(skipped.counted(results))
+    carried = sigmas is not None
+    results = looked_up_many(frames, target, source, asked, miss=miss if skip else None, covariance=carried)
+    output.poses_as_they_come(skipped.counted(results if sigmas is None else map(sigmas.noted, results)))
+    if sigmas is not None:
+        sigmas.tell()
     return skipped.finish()

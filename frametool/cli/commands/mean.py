@@ -65,6 +65,8 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
         given = None if weights is None else _numbers(weights)
         if given is not None and len(given) != len(gathered.transforms):
             raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
+    if gathered.uncertain:
+        warn("covariances left out: mean has none")
     result, left_out = _mean(gathered, given, robust=robust)
     task.output.poses([result])
     for line in left_out[:MOST]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
-from frametool.grammar.result import NoResult, carries_position, pose_numbers
+from frametool.grammar.result import NoResult, carries_position, in_columns, pose_numbers
 from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
         cells |= dict.fromkeys(cells.keys() - NAMES)
     extras = {
         name: cell
-        for key, value in result.said(style).items()
+        for key, value in in_columns(result.said(style)).items()
         for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
     }
     return cells | {key: value for key, value in extras.items() if key not in cells}
@@ -66,7 +66,7 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
 
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the cells of a record: three of each vector; what else is no scalar is one cell of JSON."""
-    for key, value in record.items():
+    for key, value in in_columns(record).items():
         if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
             numbers = value.values() if isinstance(value, dict) else value or [None] * 3
             yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], numbers, strict=False)

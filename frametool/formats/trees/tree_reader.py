@@ -19,7 +19,7 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
-from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
+from frametool.grammar.pose import POSE_KEYS, UNCERTAIN, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import rotation_of
 from frametool.ros import messages
@@ -177,7 +177,7 @@ def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
         pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
         if pose.name is None:
             raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
-        if pose.parent is None and (pose.position or pose.rotation):
+        if pose.parent is None and (pose.position or pose.rotation or (pose.covariance and "samples" not in entry)):
             raise Misfit(f"frame {shown(pose.name)} has a pose but no parent")
         return _edges(entry, pose, pose.parent, pose.name, path, reading)
     except Misfit as misfit:
@@ -193,7 +193,7 @@ def _edges(
         return read_samples(entry, pose, parent, child, path, reading)
     if parent is not None and pose.position is None and pose.rotation is None:
         reading.note(f"frame {shown(child)} has neither position nor rotation: taken as the identity", rule="identity")
-    return [Edge(parent, child, pose.components, stamp_of(entry or {}), path=path)]
+    return [Edge(parent, child, pose.components, stamp_of(entry or {}), path=path, covariance=pose.covariance)]
 
 
 def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
@@ -223,6 +223,8 @@ def read_samples(
     if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
         message = f"frame {shown(child)} has samples and a pose or a stamp beside them; put all into samples"
         raise Misfit(message, ("samples",), key=True)
+    if entry.get("inverse") == "true":
+        raise Misfit("inverse belongs into each of the samples", ("inverse",), key=True)
     samples = entry["samples"]
     if type(samples) is not list or not samples:
         raise Misfit(f"expected samples as a list of {{stamp: .., xyz: [..], ..}}, found {kind(samples)}", ("samples",))
@@ -232,19 +234,25 @@ def read_samples(
         reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
         for index, sample in enumerate(samples):
             reading.here = (*path, "samples", index)
-            moved, stamp_ns = within(("samples", index), _sample, sample, reading)
+            moved, stamp_ns = within(("samples", index), _sample, sample, reading, uncertain=bool(pose.covariance))
             above = moved.parent or parent
             if above is None:
                 raise Misfit(f"frame {shown(child)} moves but has no parent", ("samples", index))
-            edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here))
+            edges.append(
+                Edge(above, child, moved.components, stamp_ns, path=reading.here, covariance=pose.covariance)
+            )
     finally:
         reading.degrees = outer
     return edges
 
 
-def _sample(sample: Any, reading: Reading) -> tuple[Pose, int]:
-    """Read one pose with its stamp."""
+def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
+    """Read one pose with its stamp.  uncertain: there is a covariance for all."""
     pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
+    if said := UNCERTAIN.intersection(sample):
+        raise Misfit(f"{min(said)} is one for all samples; write it beside samples", (min(said),), key=True)
+    if uncertain and sample.get("inverse") == "true":
+        raise Misfit("a sample that is inverted has no part in one covariance for all; write its inverse", ("inverse",))
     if pose.name is not None:
         raise Misfit("name is given by the entry; leave it out", ("name",), key=True)
     stamp_ns = stamp_of(sample)

@@ -1,0 +1,131 @@
+"""How uncertain poses are: covariances composed, inverted and taken to points, to first order.
+
+    from frametool import Transform, covariance
+    base_from_tool = Transform.from_arrays([0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0])
+    turning = [[1e-4 * (i == j == 3) for j in range(6)] for i in range(6)]         # 0.01 rad about x of base
+    covariance.point(base_from_tool, turning, [0.0, 1.0, 0.0])                     # 9 numbers: 1e-4 along z of base
+
+A covariance is 36 numbers, row-major, or 6 rows, over (x, y, z, turns about X, Y, Z), metres and radians, along the
+fixed axes of the parent, as ROS has it: t + d[:3], Exp(d[3:]) R.  None is exact.  All things count as independent.
+One transform is plain floats, and results are lists, of 36 numbers or of the 9 of a point; of arrays of transforms or
+of covariances (n, 6, 6) results are arrays (n, 6, 6) or (n, 3, 3).  Raise ValueInvalid for what is no covariance.
+`FrameTree.covariance` follows a tree; `frametool help covariance` says how to convert other conventions.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import ValueInvalid
+from frametool.geometry import placed, uncertainty, validation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frametool.geometry.transform import Transform
+    from frametool.geometry.types import Components, Numbers
+
+    Covariance = Numbers | list[list[float]] | None
+
+__all__ = ["compose", "invert", "point"]
+
+
+def compose(a: Transform, cov_a: Covariance, b: Transform, cov_b: Covariance) -> Any:
+    """Return the covariance of a @ b: what a is uncertain about its turn has the lever arm of b."""
+    first, second = _placed(a, cov_a), _placed(b, cov_b)
+
+    def kernel(*parts: Any) -> Components | None:
+        return placed.covariance_of(placed.compose(parts[: len(first)], parts[len(first) :]))
+
+    return _found(kernel, uncertainty.POSE, (*first, *second))
+
+
+def invert(a: Transform, cov_a: Covariance) -> Any:
+    """Return the covariance of a.inverse(), along the axes of what was the child."""
+
+    def kernel(*parts: Any) -> Components | None:
+        return placed.covariance_of(placed.inverse(parts))
+
+    return _found(kernel, uncertainty.POSE, _placed(a, cov_a))
+
+
+def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None) -> Any:
+    """Return the 3 x 3 covariance of a.apply(p), of that of a, and of the point's own."""
+    pose, at, own = _placed(a, cov_a), validation.columns(p, 3, "point"), _entries(cov_p, uncertainty.POINT)
+    end = len(pose)
+
+    def kernel(*parts: Any) -> Components | None:
+        moved, numbers = parts[:end], parts[end : end + 3]
+        of_pose = placed.covariance_of(moved)
+        return uncertainty.of_point(placed.pose_of(moved), of_pose, numbers, parts[end + 3 :] or None)
+
+    return _found(kernel, uncertainty.POINT, (*pose, *at, *own))
+
+
+def _placed(a: Transform, covariance: Covariance) -> Components:
+    """Return a transform with its covariance behind it, if it has one."""
+    return (*a.components, *_entries(covariance, uncertainty.POSE))
+
+
+def _found(kernel: Callable[..., Components | None], size: int, parts: Components) -> Any:
+    """Run a kernel; None of it is exact.  Warn of turns that are too wide for the first order."""
+    if validation.single(parts):
+        entries = [entry + 0.0 for entry in kernel(*parts) or [0.0] * size]
+        uncertainty.warn_if_wide([entries])
+        return entries
+    import numpy as np
+
+    from frametool.geometry import arrays
+
+    side = round(size**0.5)
+    found = arrays.rows(lambda *columns: kernel(*columns) or (0.0,) * size, (side, side), parts) + 0.0
+    if size == uncertainty.POSE and found.size:
+        widest = np.linalg.eigvalsh(found[..., 3:, 3:])[..., -1].argmax()
+        uncertainty.warn_if_wide([found.reshape(-1, size)[widest].tolist()])
+    return found
+
+
+def _entries(given: Covariance, size: int) -> Components:
+    """Return the entries of a covariance, or columns of those of many, checked; none of None."""
+    if given is None:
+        return ()
+    side = round(size**0.5)
+    if not _are_many(given, side):
+        return uncertainty.taken(given, size)
+    import numpy as np
+
+    try:
+        rows = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        raise ValueInvalid(f"covariances: expected numbers of shape (..., {side}, {side})") from None
+    if rows.shape[-2:] != (side, side):
+        raise ValueInvalid(f"covariances: expected shape (..., {side}, {side}), got {rows.shape}")
+    _check_each(rows.reshape(-1, size), side)
+    return tuple(rows[..., i, j] for i in range(side) for j in range(side))
+
+
+def _are_many(given: Any, side: int) -> bool:
+    """Tell an array of covariances, or a list of them, from the numbers or rows of one."""
+    if hasattr(given, "shape"):
+        return len(given.shape) > 1 and given.shape != (side, side)
+    first = given[0] if isinstance(given, (list, tuple)) and given else None
+    inner = first[0] if isinstance(first, (list, tuple)) and first else None
+    return len(getattr(first, "shape", ())) > 1 or hasattr(inner, "__len__")
+
+
+def _check_each(rows: Any, side: int) -> None:
+    """Raise ValueInvalid for the first of many covariances that is none."""
+    import numpy as np
+
+    whole = rows.reshape(-1, side, side)
+    roots = np.sqrt(abs(np.einsum("nii->ni", whole)))
+    with np.errstate(invalid="ignore"):
+        skew = abs(whole - whole.swapaxes(1, 2)) > uncertainty.ASYMMETRY * roots[:, :, None] * roots[:, None, :]
+    doubtful = skew.any((1, 2)) | ~np.isfinite(rows).all(1)
+    values = np.linalg.eigvalsh(np.where(doubtful[:, None, None], 0.0, whole))
+    doubtful |= values[:, 0] < -uncertainty.NEGATIVE * abs(values[:, -1])
+    for row in np.flatnonzero(doubtful).tolist():
+        try:
+            uncertainty.taken(rows[row], side * side)
+        except ValueInvalid as error:
+            raise ValueInvalid(f"row {row}: {error}") from None

@@ -1,0 +1,153 @@
+"""What records and rows say beside a pose or point: a covariance, sigmas, a scale; read where it counts.
+
+Loaded where one of them is there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import FormatError, warn
+from frametool.geometry.uncertainty import UNKNOWN
+from frametool.grammar.covariance import COVARIANCE, SIGMA, check, entries_of, find_columns, read_covariance
+from frametool.grammar.pose import SCALE, read_angle_unit, read_scale, refuse_scale
+from frametool.grammar.readers import Misfit, NotARotation, within
+from frametool.ros.messages import whole_list
+from frametool.stream.layout import Kept, New
+from frametool.stream.row_layout import PARTS, POINT, POSE, VECTOR
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.grammar.readers import Path, Reading
+    from frametool.stream.layout import Column
+    from frametool.stream.record import Place, Record
+    from frametool.stream.request import Request
+    from frametool.stream.row_layout import Shape
+    from frametool.stream.table import Table
+
+PLACED = (POSE, POINT, VECTOR)
+LEFT_OUT = "covariances left out: calc has none"
+
+
+def with_covariances(
+    record: Record, holder: Any, around: Path, place: Place, above: Path, request: Request, reading: Reading
+) -> Record:
+    """Add the numbers of the covariances of a record, or the one that its sigmas say.
+
+    holder: the mapping that says them, at the path `around`
+    Where records move, one that begins with -1 is unknown and stays.
+    """
+    operation, shape, path = request.operation, record.shape, place.path
+    there = [key for key in place.covariances if key in holder]
+    has_sigma = SIGMA in holder and shape.kind in PLACED and around == path
+    is_left_out = operation.formula is not None and around == path and not operation.only_adds
+    if is_left_out:
+        reading.here = (*above, *path)
+        reading.note(LEFT_OUT, rule="left-out")
+    if request.gathered is not None:
+        request.gathered.uncertain = True
+    if request.gathered is not None or is_left_out:
+        return record._replace(others=(*record.others, *there, *[SIGMA] * has_sigma))
+    if operation.keeps_frames:
+        return record
+    if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
+        what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
+        raise Misfit(what, (*around, there[0]))
+    if has_sigma:
+        return _with_sigmas(record, holder, path, reading)
+    sizes = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)
+    for key in there:
+        below = (*around, key)
+        found = within(below, _entries, holder[key], sizes)
+        paths, numbers = tuple((*above, *below, *at) for at, _ in found), [number for _, number in found]
+        if numbers[0] == UNKNOWN and operation.moves:
+            record = record._replace(unknown=(*record.unknown, paths[0]))
+            continue
+        within(below, check, numbers)
+        record = record._replace(
+            shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
+            numbers=record.numbers + paths, values=(*record.values, *numbers), covariances=(*record.covariances, key),
+            known=(*record.known, paths[0]),
+        )  # fmt: skip
+    return record
+
+
+def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
+    """Read a covariance, as `entries_of`; one that was cut short when it was printed says so."""
+    return entries_of(whole_list(value, " or ".join(f"{size} numbers" for size in sizes)), sizes)
+
+
+def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
+    """Tell whether a covariance begins with -1: nothing is known of it, nor of what it would be of."""
+    return _entries(value, sizes)[0][1] == UNKNOWN
+
+
+def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading) -> Record:
+    """Add the covariance that sigmas say; none of its entries stands in the text, and the result names them anew."""
+    size = 36 if record.shape.kind == POSE else 9
+    degrees = reading.degrees
+    reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
+    try:
+        entries = within(path, read_covariance, own, reading)
+    finally:
+        reading.degrees = degrees
+    if size == 9 and any(entries[18:]):
+        raise Misfit("a point does not turn; its sigma has xyz alone", (*path, SIGMA))
+    entries = entries if size == 36 else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
+    return record._replace(
+        shape=record.shape._replace(covariance=(size,), rewritten=True), numbers=(*record.numbers, *[None] * size),
+        values=(*record.values, *entries), others=(*record.others, SIGMA),
+    )  # fmt: skip
+
+
+def with_scale(record: Record, value: Any, around: Path, above: Path, request: Request) -> Record:
+    """Add the scale beside a pose, where the operation takes one; else it can only be 1."""
+    if not request.operation.similar or around != record.path[len(above) :] or type(value) in (dict, list):
+        within(around, refuse_scale, value)
+        return record
+    if record.shape.covariance:
+        raise Misfit("a covariance and a scale in one entry; leave one of them out", (*around, SCALE), key=True)
+    scale = within(around, read_scale, value)
+    return record._replace(
+        shape=record.shape._replace(covariance=(1,)), numbers=(*record.numbers, (*above, *around, SCALE)),
+        values=(*record.values, scale), covariances=(SCALE,),
+    )  # fmt: skip
+
+
+def covariance_columns(
+    table: Table, request: Request, shapes: tuple[Shape, ...], source: str
+) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
+    """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
+    kinds = [shape.kind for shape in shapes]
+    passes = request.operation.keeps_frames and request.gathered is None
+    if passes or not kinds or not {*PLACED}.issuperset(kinds):
+        return (), shapes
+    try:
+        places, sigma = find_columns(table.names or (), 36 if POSE in kinds else 9)
+    except NotARotation as error:
+        raise FormatError(str(error), source=source, line=1) from None
+    if places and request.operation.formula is not None:
+        warn(f"{source}: {LEFT_OUT}", rule="left-out")
+    if places and request.gathered is not None:
+        request.gathered.uncertain = True
+    if not places or request.gathered is not None or request.operation.formula is not None:
+        return (), shapes
+    if len(shapes) != 1:
+        message = "a covariance beside several poses in a row: whose it is nobody can tell"
+        raise FormatError(message, source=source, line=1)
+    if request.degrees:
+        sigma = tuple((at, unit or "deg" * (axis > 2)) for axis, (at, unit) in enumerate(sigma))
+    return places, (shapes[0]._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
+
+
+def with_entries_at(beside: Sequence[int], columns: Sequence[Column], count: int) -> list[Column]:
+    """Put the entries of a result's covariance, the last numbers there are, where that of the row stood."""
+    entries = sorted([each for each in columns if isinstance(each, New)], key=lambda each: each.number)[-count:]
+    found: list[Column] = []
+    for column in columns:
+        if isinstance(column, Kept) and column.place in beside:
+            found += entries if column.place == min(beside) else []
+        elif column not in entries:
+            found.append(column)
+    return found

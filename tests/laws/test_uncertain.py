@@ -1,0 +1,221 @@
+"""Covariances and scale are carried alike by every way in which a record comes, and by every form it leaves in."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from ways import STREAMS, given, values, ways
+
+from frametool.covariance import compose, invert, point
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from conftest import Outcome
+    from ways import Run
+
+ROOT = np.random.default_rng(5).normal(size=(6, 6)) * 0.1
+WHOLE = [float(entry) for entry in ((ROOT @ ROOT.T + (ROOT @ ROOT.T).T) / 2.0).ravel()]
+SIGMAS = [0.01, 0.02, 0.03, 0.1, 0.2, 0.3]
+DIAGONAL = [SIGMAS[i] ** 2 if i == j else 0.0 for i in range(6) for j in range(6)]
+POSE: dict[str, Any] = {"xyz": [1.0, 2.0, 3.5], "quaternion": {"x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5}}
+CELLS = {"x": 1.0, "y": 2.0, "z": 3.5, "qx": 0.5, "qy": -0.5, "qz": 0.5, "qw": 0.5}
+OTHER: dict[str, Any] = {"xyz": [0.5, -1.0, 0.25], "quaternion": {"x": 0.0, "y": 0.6, "z": 0.0, "w": 0.8}}
+ROW, B = (Transform.from_arrays(each["xyz"], list(each["quaternion"].values())) for each in (POSE, OTHER))
+NAMES = [f"c{i}{j}" for i in range(1, 7) for j in range(1, 7)]
+SIGMA_CELLS = dict(zip(("sigma_x", "sigma_y", "sigma_z", "sigma_roll", "sigma_pitch", "sigma_yaw"), SIGMAS, strict=True))
+SPELLINGS: dict[str, tuple[dict[str, Any], dict[str, Any], list[float]]] = {
+    "none": ({}, {}, [0.0] * 36),
+    "entries": ({"covariance": WHOLE}, dict(zip(NAMES, WHOLE, strict=True)), WHOLE),
+    "rows": ({"covariance": np.reshape(WHOLE, (6, 6)).tolist()}, {}, WHOLE),
+    "sigmas": ({"sigma": {"xyz": SIGMAS[:3], "rpy": SIGMAS[3:]}}, SIGMA_CELLS, DIAGONAL),
+}
+EXACT, UNSURE = json.dumps(OTHER), json.dumps(OTHER | {"covariance": DIAGONAL})
+COMMANDS: dict[str, tuple[tuple[str, ...], Any]] = {
+    "invert": (("invert",), lambda c: invert(ROW, c)),
+    "compose before": (("compose", UNSURE), lambda c: compose(B, DIAGONAL, ROW, c)),
+    "compose exact": (("compose", EXACT), lambda c: compose(B, None, ROW, c)),
+    "relative": (("relative", UNSURE), lambda c: compose(B.inverse(), invert(B, DIAGONAL), ROW, c)),
+    "apply": (("apply", "--transform", EXACT), lambda c: compose(B, None, ROW, c)),
+    "apply --covariance": (("apply", "--covariance", "--transform", UNSURE), lambda c: compose(B, DIAGONAL, ROW, c)),
+    "world axes": (("convert", "--world-axes", "ned_from_enu"), None),
+    "axes": (("convert", "--axes", "frd_from_flu"), lambda c: c),
+}
+
+
+def covariances(done: Outcome, form: str) -> list[list[float]]:
+    """Read the covariances of all results; of rows those of their columns."""
+    if form != "csv":
+        return [np.ravel(each["covariance"]).tolist() for each in flat(values(done.out, form))]
+    return [[float(row[name]) for name in NAMES] for row in csv.DictReader(io.StringIO(done.out))]
+
+
+def flat(found: Any) -> list[Any]:
+    return [each for value in found for each in (value if isinstance(value, list) else [value])]
+
+
+def wanted(command: str, own: list[float]) -> Any:
+    if command == "world axes":
+        turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+        both = np.kron(np.eye(2), turn)
+        return (both @ np.reshape(own, (6, 6)) @ both.T).ravel()
+    return np.ravel(COMMANDS[command][1](own))
+
+
+@pytest.mark.parametrize("form", ["argument", "file", *STREAMS])
+@pytest.mark.parametrize("spelling", SPELLINGS)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str, spelling: str, form: str) -> None:
+    arguments, _ = COMMANDS[command]
+    beside, cells, own = SPELLINGS[spelling]
+    if (spelling == "none" and "UNSURE" not in repr(arguments) and UNSURE not in arguments) or (form == "table" and spelling == "rows"):
+        return
+    expected = wanted(command, own)
+    record, row = {"id": 7} | POSE | beside | {"note": "x"}, {"id": 7} | CELLS | cells | {"note": "x"}
+    for way in ways(form, record, row):
+        bits = set()
+        for out in ("json", "csv", "yaml", *[None] * (way.argument == "-")):
+            told = ("-f", out) if out else ()
+            done = given(run, (*arguments, *told), way)
+            assert done.status == 0, done.err
+            found = covariances(done, out or ("csv" if form == "table" else "yaml" if "documents" in form else "json"))
+            assert len(found) == way.rows
+            assert np.allclose(found, expected, rtol=1e-14, atol=1e-17), (way, out)
+            bits |= {tuple(map(repr, each)) for each in found}
+            assert "sigma" not in done.out
+            assert "note" in done.out
+            if command not in ("axes", "apply"):
+                assert all(np.array_equal(np.reshape(each, (6, 6)), np.reshape(each, (6, 6)).T) for each in found)
+        assert len(bits) == 1
+
+
+@pytest.mark.parametrize("form", ["argument", "file", *STREAMS])
+@pytest.mark.parametrize(("size", "own"), [(0, None), (9, [4.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 9.0])])
+def test_points_too(run: Run, form: str, size: int, own: list[float] | None) -> None:
+    record = {"point": [1.0, 2.0, 3.5]} | ({"covariance": own} if own else {})
+    cells = {"x": 1.0, "y": 2.0, "z": 3.5} | (dict(zip((n for n in NAMES if n[1] < "4" and n[2] < "4"), own, strict=True)) if own else {})
+    expected = point(B, DIAGONAL, [1.0, 2.0, 3.5], own)
+    for way in ways(form, record, cells):
+        done = given(run, ("apply", "--covariance", "--transform", UNSURE, "-f", "json"), way)
+        assert done.status == 0, done.err
+        for each in flat(values(done.out)):
+            assert np.allclose(each["covariance"], expected, rtol=1e-14, atol=1e-17)
+    assert size in (0, 9)
+
+
+@pytest.mark.parametrize("form", ["argument", "file", *STREAMS[:-1]])
+def test_scale_is_carried(run: Run, form: str) -> None:
+    similar = json.dumps(OTHER | {"scale": 2.0})
+    for way in ways(form, POSE | {"scale": 4.0, "id": 7}):
+        for command, scale in ((("invert",), 0.25), (("compose", similar), 8.0), (("compose", EXACT), 4.0)):
+            for out in ("json", "csv", "yaml"):
+                done = given(run, (*command, "-f", out), way)
+                rows = list(csv.DictReader(io.StringIO(done.out))) if out == "csv" else flat(values(done.out, out))
+                assert [float(each["scale"]) for each in rows] == [scale] * way.rows
+            done = given(run, (*command, "-f", "json", "--to", "matrix"), way)
+            for each in flat(values(done.out)):
+                assert "scale" not in each
+                assert np.linalg.det(np.array(each["matrix"])[:3, :3]) == pytest.approx(scale**3, rel=1e-14)
+            assert given(run, (*command, "-f", "tum"), way).status == 1
+
+
+def test_a_similarity_moves_points_vectors_and_poses(run: Run) -> None:
+    pose = json.dumps(OTHER | {"scale": 2.0})
+
+    def by(record: Any) -> Any:
+        return json.loads(run("apply", "--transform", pose, json.dumps(record), "-f", "json").out)
+
+    turned = B.apply_vector([1.0, 2.0, 3.5])
+    assert by({"point": [1.0, 2.0, 3.5]})["point"] == pytest.approx((2.0 * turned + np.array(OTHER["xyz"])).tolist(), rel=1e-15)
+    assert by({"vector": [1.0, 2.0, 3.5]})["vector"] == pytest.approx((2.0 * turned).tolist(), rel=1e-15)
+    moved = by(POSE)
+    assert "scale" not in moved
+    assert moved["xyz"] == pytest.approx((2.0 * turned + np.array(OTHER["xyz"])).tolist(), rel=1e-15)
+    for record in ({"linear": [1, 2, 3], "angular": [1, 2, 3]}, POSE | {"covariance": WHOLE}, {"point": [1, 2, 3], "covariance": WHOLE[:1] * 9}):
+        done = run("apply", "--transform", pose, json.dumps(record))
+        assert done.status == 1
+        assert "cannot be carried through a scale" in done.err
+
+
+BAD: dict[str, Any] = {
+    "sigma and covariance in one entry; give one": {"sigma": {"xyz": 1}, "covariance": WHOLE},
+    "covariance has 21 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)": {"covariance": WHOLE[:21]},
+    "covariance[0] is -1: 'unknown' in ROS; leave the covariance out": {"covariance": [-1.0, *WHOLE[1:]]},
+    "covariance is not symmetric: [0][4] is 1e-5, [4][0] is 2e-5": {
+        "covariance": [1.0 if at % 7 == 0 else {4: 1e-5, 24: 2e-5}.get(at, 0.0) for at in range(36)]
+    },
+    "covariance is not positive: its smallest eigenvalue is -1e-4": {"covariance": [(-1e-4 if at == 35 else 1.0) if at % 7 == 0 else 0.0 for at in range(36)]},
+    "sigma is negative: -0.1": {"sigma": {"xyz": -0.1}},
+}
+
+
+@pytest.mark.parametrize("form", ["argument", "file", *STREAMS[:-1]])
+@pytest.mark.parametrize("why", BAD)
+def test_what_is_no_covariance_is_refused_with_its_place(run: Run, why: str, form: str) -> None:
+    for way in ways(form, POSE | BAD[why]):
+        for command in (("invert",), ("compose", EXACT), ("relative", EXACT)):
+            done = given(run, command, way)
+            assert (done.status, done.out.strip("[\n]")) == (1, "")
+            assert why in done.err.splitlines()[0]
+            assert done.err.startswith(f"frametool: {way.source}:1") or form in ("documents", "file")
+
+
+def test_rows_without_a_covariance_are_bad_one_by_one(run: Run) -> None:
+    bad = [-1.0, *WHOLE[1:]]
+    lines = [",".join([*CELLS, *NAMES])]
+    lines += [",".join(map(repr, [*CELLS.values(), *each])) for each in (WHOLE, bad, WHOLE)]
+    done = run("invert", "--on-error", "skip", stdin="\n".join(lines) + "\n")
+    assert (done.status, done.out.count("\n")) == (3, 3)
+    assert "stdin:3:c11: covariance[0] is -1: 'unknown' in ROS" in done.err
+    done = run("invert", stdin="x,y,z,sigma_x\n1,2,3,-0.5\n")
+    assert (done.status, "stdin:2:sigma_x: sigma is negative: -0.5" in done.err) == (1, True)
+
+
+def test_units_of_sigma_columns_count(run: Run) -> None:
+    text = "x,y,z,yaw,sigma_x_mm,sigma_y [cm],sigma_z (m),sigma_yaw_deg\n0,0,0,0,10,2,0.03,180\n"
+    row = next(csv.DictReader(io.StringIO(run("compose", EXACT, "-", "--to", "rpy", stdin=text).out)))
+    assert "sigma_x_mm" not in row
+    turn = B.rotation.as_matrix()
+    placed = np.diag([0.01**2, 0.02**2, 0.03**2])
+    assert np.allclose([[float(row[f"c{i}{j}"]) for j in (1, 2, 3)] for i in (1, 2, 3)], turn @ placed @ turn.T, rtol=1e-13, atol=1e-18)
+    assert "unknown unit 'ft'" in run("invert", stdin="x,y,z,sigma_x_ft\n1,2,3,1\n").err
+    assert run("convert", "--to", "xyzw", stdin="x,y,z,yaw,sigma_x_ft\n1,2,3,0,1\n").status == 0
+
+
+def test_a_mirror_a_mean_and_a_fraction_have_none(run: Run) -> None:
+    done = run("convert", "--world-axes", "unity_from_ros", "--axes", "unity_from_ros", json.dumps(POSE | {"covariance": WHOLE}))
+    assert (done.status, "cannot be carried through axes that mirror" in done.err) == (1, True)
+    pose = json.dumps(POSE | {"covariance": WHOLE})
+    for command in (("mean", pose, pose), ("interpolate", pose, pose, "0.5")):
+        done = run(*command)
+        assert (done.status, "covariance:" in done.out) == (0, False)
+        assert f"covariances left out: {command[0]} has none" in done.err
+    assert "covariances left out: mean has none" in run("mean", stdin="x,y,z,sigma_x\n1,2,3,0.5\n").err
+
+
+def test_converting_leaves_a_covariance_as_it_is_written(run: Run) -> None:
+    line = '{"xyz": [1, 2, 3], "rpy": [0, 0, 1], "covariance": [' + ", ".join(["1"] + ["0"] * 35) + "]}\n"
+    assert json.loads(run("convert", line, "-f", "json").out)["covariance"] == [1.0, *[0.0] * 35]
+    assert line.partition('"covariance"')[2] in run("convert", "--to", "rpy_deg", stdin=line).out
+
+
+def test_a_matrix_is_a_similarity_where_it_is_asked_for(run: Run) -> None:
+    matrix = [[0, -2, 0, 1], [2, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]]
+    for argument in (json.dumps({"matrix": matrix}), "[[0,-2,0,1],[2,0,0,0],[0,0,2,0],[0,0,0,1]]"):
+        assert json.loads(run("invert", "--scale", argument, "-f", "json").out)["scale"] == 0.5
+        assert json.loads(run("apply", "--scale", "--transform", argument, "1", "1", "1", "-f", "json").out)["point"] == [-1.0, 2.0, 2.0]
+        assert "matrix is 2 times a rotation: a similarity, not a pose (--scale takes it as one)" in run("invert", argument).err
+    cells = {f"m{i + 1}{j + 1}": matrix[i][j] for i in range(4) for j in range(4)}
+    rows = ",".join(cells) + "\n" + ",".join(map(str, cells.values())) + "\n"
+    back = np.linalg.inv(np.array(matrix, float))
+    found = next(csv.DictReader(io.StringIO(run("invert", "--scale", stdin=rows).out)))
+    assert np.allclose([float(found[name]) for name in cells], back.ravel(), atol=1e-15)
+    found = next(csv.DictReader(io.StringIO(run("invert", "--scale", "--to", "quaternion", stdin=rows).out)))
+    assert float(found["scale"]) == 0.5
+    off = json.dumps({"matrix": [[2, 0, 0.5], [0, 2, 0], [0, 0, 2]]})
+    assert run("invert", "--scale", off).status == 1
+    assert "--scale is about the matrix of --transform" in run("apply", "--scale", "tree.yaml", "a", "b", "1", "1", "1", files={"tree.yaml": "frames: {a: {b: {}}}"}).err
