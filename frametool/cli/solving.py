@@ -189,7 +189,7 @@ def _count(samples: Sequence[object]) -> str:
 
 def _paired(files: Sequence[str], max_gap_ns: int | None, *, normalize: bool) -> Samples:
     from frametool.cli.comparing import forms_of, trajectory
-    from frametool.stream.samples import paired
+    from frametool.fit.pairs import paired_samples
 
     named = zip(files, forms_of(2), strict=True)
     read = [trajectory(file, STOP, form, normalize=normalize)[:2] for file, form in named]
@@ -198,7 +198,7 @@ def _paired(files: Sequence[str], max_gap_ns: int | None, *, normalize: bool) ->
         for each, name in read:
             if each.stamps_ns is None:
                 raise click.UsageError(f"--max-gap is not used: {name} has no stamps")
-    return paired(gripper, target, (first, second), max_gap_ns)
+    return paired_samples(gripper, target, (first, second), max_gap_ns)
 
 
 def _hand_eye_names(said: Sequence[str] | None, found: Sequence[str | None]) -> tuple[str, str, str, str]:
