@@ -102,7 +102,7 @@ def files() -> dict[str, str]:
     many = noisy(draw, Transform.of(*(np.full(12, part) for part in TAG.components)), 4e-3, np.radians(0.4))
     poses = [*many]
     poses[4] = poses[4] @ Transform(Rotation.from_rpy([0.0, 0.0, np.pi / 2]), [0.0, 0.0, 0.0])
-    poses[8] = Transform(poses[8].rotation, poses[8].xyz + [0.0, 0.0, 0.6])
+    poses[8] = Transform(poses[8].rotation, poses[8].xyz + np.array([0.0, 0.0, 0.6]))
     made["tag_seen.csv"] = head + "".join(f"{row(each, 4)}\n" for each in poses)
     return made
 

@@ -76,13 +76,13 @@ def _fixed_edges(
 
 def _measurements(files: Sequence[str], places: Sequence[str], *, normalize: bool) -> list[Measurement]:
     from frametool.cli.trees import opened, state
-    from frametool.stream.measurements import read_measurements, without
+    from frametool.stream.measurements import parted, read_measurements, without
 
     recordings = opened(files)
     found = read_measurements(recordings, normalize=normalize)
     state(recordings)
     for each in recordings:
-        own = [row for row in found if row.place.rpartition(":")[0] == each.name]
+        own = [row for row in found if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
         tell_taken(f"{each.name}: {len(own)} rows, each the pose of child in parent{first}")
     return without(found, places)

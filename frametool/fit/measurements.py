@@ -15,13 +15,13 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.lint.findings import Finding
 from frametool.lint.tree_diff import Tolerance
+from frametool.stream.measurements import Measurement, parted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Array
-    from frametool.stream.measurements import Measurement
 
 NEAR = Tolerance(0.01, math.radians(1.0))  # where nothing says how sure a measurement is
 LEAST = 1e-9  # metres, radians
@@ -113,10 +113,9 @@ def loops(
         if not agrees:
             words = best_blunder(each, pose, information)
             off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg{sigmas} off the tree"
-            names = f"{printable(each.parent)}<-{printable(each.child)}"
-            file, _, line = each.place.rpartition(":")
-            place = (file, int(line)) if line.isdecimal() else (each.place,)
-            findings.append(Finding("loop", f"{names} is {off}{f'; fits when {words}' if words else ''}", *place))
+            message = f"{printable(each.parent)}<-{printable(each.child)} is {off}"
+            message += f"; fits when {words}" if words else ""
+            findings.append(Finding("loop", message, *parted(each.place)))
     return findings, [*lacking], apart
 
 

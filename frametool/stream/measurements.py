@@ -10,6 +10,7 @@ Whatever holds a tree is read too: each of its edges measures.  Poses are read a
 from __future__ import annotations
 
 import re
+from collections import Counter
 from math import radians
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -54,7 +55,7 @@ class Measurement(NamedTuple):
 
     components: tx, ty, tz, x, y, z, w; metres
     covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
-    place: where it stands, `m.yaml:12`
+    place: where it stands, `m.yaml:12`, and its column behind that where several stand on a line
     written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
     """
 
@@ -90,11 +91,12 @@ class Measurement(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A measurement as read, its line, and its time if it says one."""
+    """A measurement as read, its line, its time if it says one, and its column where that is known."""
 
     measurement: Measurement
     line: int
     stamp_ns: int | None = None
+    column: int = 0
 
 
 def read_measurements(
@@ -111,13 +113,18 @@ def read_measurements(
     try:
         for file in files:
             first: dict[tuple[str, str], Row] = {}
-            before = len(found)
+            rows: list[Row] = []
             for row in _reader(file)(file, request):
                 if problem := _problem(row, first):
                     raise FormatError(problem, source=file.name, line=row.line)
-                found.append(row.measurement._replace(place=f"{file.name}:{row.line}" if row.line else file.name))
-            if len(found) == before:
+                rows.append(row)
+            if not rows:
                 raise FormatError(f"no measurements in it; {LIKE}", source=file.name)
+            many = Counter(row.line for row in rows)
+            for row in rows:
+                column = row.column if many[row.line] > 1 else 0
+                place = ":".join(str(part) for part in (file.name, row.line, column) if part)
+                found.append(row.measurement._replace(place=place))
     finally:
         close_all(files)
     return found
@@ -128,18 +135,23 @@ def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[
 
     Raises ValueInvalid for a place where none stands, or several.
     """
-    there = [each.place.rpartition(":") for each in measurements]
-    for place in places:
-        file, _, line = place.rpartition(":")
-        count = there.count((file, ":", line))
-        if count > 1:
-            raise ValueInvalid(f"{place} holds {count} measurements; write each on a line of its own")
-        if not count:
-            near = sorted((abs(int(at) - int(line)), at) for name, _, at in there if name == file and line.isdecimal())
-            files = ", ".join(dict.fromkeys(name for name, *_ in there))
-            known = f"the nearest stand at {', '.join(f'{file}:{at}' for _, at in near[:3])}" if near else ""
-            raise ValueInvalid(f"no measurement stands at {shown(place)}; {known or f'give FILE:LINE of {files}'}")
+    there = {each.place: parted(each.place) for each in measurements}
+    for place in (each for each in places if each not in there):
+        file, line, _ = parted(place)
+        own = [(abs(at[1] - line), each) for each, at in there.items() if line and at[0] == file]
+        files = ", ".join(dict.fromkeys(name for name, *_ in there.values()))
+        known = f"the nearest stand at {', '.join(each for _, each in sorted(own)[:3])}" if own else ""
+        raise ValueInvalid(f"no measurement stands at {shown(place)}; {known or f'give FILE:LINE of {files}'}")
+    many = Counter(each.place for each in measurements)
+    if several := next((place for place in places if many[place] > 1), ""):
+        raise ValueInvalid(f"{several} holds {many[several]} measurements; write each on a line of its own")
     return [each for each in measurements if each.place not in places]
+
+
+def parted(place: str) -> tuple[str, int, int]:
+    """Take a place apart: file, line, column; 0 where it does not say that."""
+    file, line, column = re.fullmatch(r"(?s)(.*?)(?::(\d+))?(?::(\d+))?", place).groups("0")  # type: ignore[union-attr]
+    return file, int(line), int(column)
 
 
 def _reader(file: Recording) -> Callable[[Recording, Request], Iterator[Row]]:
@@ -237,8 +249,8 @@ def _of_documents(file: Recording, request: Request) -> Iterator[Row]:
             raise placed(misfit, source) from None
     tell(source, reading.notes)
     places = locate_many(source.text, [path for _, path, _ in found], key=True)
-    for (made, _, stamp_ns), (line, _) in zip(found, places, strict=True):
-        yield Row(made, source.place(line, 1)[0], stamp_ns)
+    for (made, _, stamp_ns), (line, column) in zip(found, places, strict=True):
+        yield Row(made, line, stamp_ns, column)
 
 
 def _rows(value: Any, path: Path, reading: Reading) -> Iterator[tuple[Path, Any]]:

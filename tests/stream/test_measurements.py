@@ -238,5 +238,10 @@ def test_rows_are_dropped_by_their_places(read: Read) -> None:
             without(rows, [place])
         assert str(caught.value) == message
     twice = read("[{parent: a, child: b, xyz: [1, 2, 3]}, {parent: a, child: c, xyz: [1, 2, 3]}]")
-    with pytest.raises(ValueInvalid, match=r"m\.yaml:1 holds 2 measurements; write each on a line of its own"):
+    assert [each.place for each in twice] == ["m.yaml:1:2", "m.yaml:1:41"]
+    assert [each.child for each in without(twice, ["m.yaml:1:2"])] == ["c"]
+    with pytest.raises(ValueInvalid, match=r"at 'm\.yaml:1'; the nearest stand at m\.yaml:1:2, m\.yaml:1:41"):
         without(twice, ["m.yaml:1"])
+    robot = ROBOT.replace("\n", "").replace("</robot>", '<link name="c"/><joint name="k" type="fixed"><parent link="a"/><child link="c"/></joint></robot>')
+    with pytest.raises(ValueInvalid, match=r"r\.urdf:1 holds 2 measurements; write each on a line of its own"):
+        without(read(robot, "r.urdf"), ["r.urdf:1"])
