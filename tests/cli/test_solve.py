@@ -131,7 +131,7 @@ noise of one axis 0.5 mm 0.00 deg, estimated
   base_link                                                3  root
   lidar       1.2002   0.0000   1.8000       0.3  0.00     4
   camera      1.5006   0.0000   1.2000       0.4  0.00     2
-  tag_7       4.2002   1.0000   0.2000       0.5  0.00     1  unchecked
+  tag_7       4.2002   1.0000   0.2000       0.6  0.00     1  unchecked
 left out                           off mm    deg
   m.yaml:6 camera<-lidar           1341.9    0.0  fits when inverted
 """
