@@ -45,29 +45,24 @@ class CheckCommand(Command):
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
 @click.option("--measured", multiple=True, type=FILE, metavar="FILE",
-              help="compare these measurements with the tree (rule loop); may be repeated")  # fmt: skip
+              help="compare these measurements (help solve) too")  # fmt: skip
 @click.option("--tolerance", metavar="LENGTH,ANGLE",
               type=Parsed("tolerance", partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0)))),
-              help="how far measurements may be off  [default: 3 of their own sigmas, else 10mm,1deg]")  # fmt: skip
+              help="what they may be off  [3 sigmas, or 10mm,1deg]")  # fmt: skip
 @file_options
 def command(
     files: Sequence[str], form: str, strict: bool, measured: Sequence[str], tolerance: Tolerance | None, normalize: bool
 ) -> int:
-    """Look for mistakes in FILES, trees and recordings, taken together as one tree.
+    """Look for mistakes in FILES, trees and recordings, taken as one tree.
 
     \b
       frametool check robot.yaml
       frametool check drive.yaml --strict
-      frametool check robot.yaml --format github
-      frametool check robot.yaml --measured measurements.yaml --tolerance 5mm,0.5deg
+      frametool check robot.yaml --measured measurements.yaml
       ros2 topic echo /tf > tf.txt; frametool check tf.txt tf_static.txt
 
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input.
-
-    --measured FILE holds measurements as `frametool solve` reads them: each is compared with the pose between its
-    frames in the tree, and what it would fit as is said: inverted, millimetres, w first.. Frames that move, and those
-    that the tree does not have, are not compared, and told.
     """
     if tolerance is not None and not measured:
         raise click.UsageError("--tolerance is about --measured; name the measurements")
