@@ -133,7 +133,7 @@ noise of one axis 0.5 mm 0.00 deg, estimated
   camera      1.5006   0.0000   1.2000       0.4  0.00     2
   tag_7       4.2002   1.0000   0.2000       0.6  0.00     1  unchecked
 left out                           off mm    deg
-  m.yaml:6 camera<-lidar           1341.9    0.0  fits when inverted
+  m.yaml:6 camera<-lidar           1341.8    0.0  fits when inverted
 """
 
 
