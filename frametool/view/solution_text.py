@@ -16,7 +16,7 @@ WIDTH = 80
 NAMED, LONGEST = 9, 18  # characters of a frame beside its numbers
 PLACED, LONGEST_PLACE = 30, 44  # characters of a place before its numbers
 MOST = 50  # frames
-LARGE = 1e5
+LARGE, NOTHING = 1e5, 1e-6  # millimetres, degrees
 
 
 class SolvedFrame(NamedTuple):
@@ -163,12 +163,12 @@ def _deg(radians: float) -> str:
 
 def _degrees(value: float) -> str:
     """Write a sigma in at most five characters."""
-    return f"{value:.2f}" if not value or 0.005 <= value < 100 else f"{value:.0e}"
+    return f"{value:.2f}" if value < NOTHING or 0.005 <= value < 100 else f"{value:.0e}"
 
 
 def _fixed(value: float, decimals: int) -> str:
-    is_plain = not value or 0.5 * 10.0**-decimals <= abs(value) < LARGE
-    return f"{value + 0.0:.{decimals}f}" if is_plain else f"{value:.1e}"
+    is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
+    return f"{value:.{decimals}f}" if is_plain else f"{value:.1e}"
 
 
 def _metres(value: float) -> str:

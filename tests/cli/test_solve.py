@@ -126,14 +126,14 @@ TOLD = """\
 frametool: m.yaml: 6 rows, each the pose of child in parent: base_link<-lidar ..
 frametool: in no loop, so that nothing checks them: m.yaml:7
 4 frames from 5 of 6 measurements, 4 in loops; rms 0.5 mm 0.00 deg
-noise of one axis 0.4 mm 5e-08 deg, estimated
+noise of one axis 0.5 mm 0.00 deg, estimated
   frame            x        y        z  sigma mm   deg  rows
-  base_link                                              3  root
-  lidar       1.2002   0.0000   1.8000       0.3 4e-08     4
-  camera      1.5006   0.0000   1.2000       0.4 5e-08     2
-  tag_7       4.2002   1.0000   0.2000       0.5 7e-08     1  unchecked
+  base_link                                                3  root
+  lidar       1.2002   0.0000   1.8000       0.3  0.00     4
+  camera      1.5006   0.0000   1.2000       0.4  0.00     2
+  tag_7       4.2002   1.0000   0.2000       0.6  0.00     1  unchecked
 left out                           off mm    deg
-  m.yaml:6 camera<-lidar           1341.9    0.0  fits when inverted
+  m.yaml:6 camera<-lidar           1341.8    0.0  fits when inverted
 """
 
 
@@ -311,7 +311,6 @@ def test_golden_rigs_are_solved_whatever_form_they_are_written_in(name: str, for
             assert f"  {row['place']} row {row['row']} " in done.err
 
 
-MATRICES = "moveit.yaml"
 EASY = "easy.samples"
 
 
@@ -363,7 +362,7 @@ def test_a_calibration_of_easy_handeye_holds_the_camera(name: str, mount: str, o
     assert f"eye_on_hand: {mount}\n" in text
     assert other in text
     assert done.err.count("left out") == 1
-    holder = other.split()[-1]
+    holder = other.rsplit(maxsplit=1)[-1]
     found = json.loads(run("lookup", "c.yaml", holder, "camera", "--in", "handeye", "-f", "json").out)
     require_near(found, RIGS[name]["x"] | {"covariance": None}, within=1e-6)
 
@@ -386,8 +385,6 @@ def test_stamped_poses_are_interpolated_else_the_nearest_else_told(run: Run) -> 
     assert (none.status, none.err) == (
         1, "frametool: no pose of g.csv is within 5 ms of one of t.csv: their stamps are 0.020 s apart at least; one clock? --max-gap\n",
     )  # fmt: skip
-    halfway = [mapping(a.interpolate(b, 0.5)) for a, b in ((transform(p), transform(p) @ Transform.exp([0.01, 0, 0, 0, 0, 0.02])) for p in rig["gripper"])]
-    assert transform(halfway[0]).is_close(transform(halfway[0]), angle=1e-9, distance=1e-9)
 
 
 def one_axis() -> dict[str, str]:
@@ -457,10 +454,14 @@ def test_golden_points_are_solved_whatever_form_they_are_written_in(name: str, f
     assert done.status == (3 if case["left_out"] else 0), done.err
     entry = json.loads(done.out) if scale else entries(done.out)["B"]
     assert (entry["name"], entry["parent"]) == ("B", "A")
-    require_near(entry, case["pose"])
+    require_near(entry, case["pose"] | ({"covariance": None} if scale else {}))
+    assert ("covariance" in entry) is not bool(scale)
     assert entry.get("scale", 1.0) == pytest.approx(case["scale"], rel=1e-10)
     report = json.loads(Path("r.json").read_text())
     assert tuple(report) == TREE_KEYS
+    sigmas = np.sqrt(np.diag(np.reshape(case["pose"]["covariance"], (6, 6))))
+    assert report["frames"][1]["sigma"]["xyz"] == pytest.approx(sigmas[:3], rel=1e-7)
+    assert report["frames"][1]["sigma"]["rpy_deg"] == pytest.approx(np.degrees(sigmas[3:]), rel=1e-7)
     assert report["scale_sigma"] == (None if case["scale_sigma"] is None else pytest.approx(case["scale_sigma"], rel=1e-6))
     assert [row["id"] for row in report["measurements"] if not row["used"]] == case["left_out"]
     assert report["rms_distance"] == pytest.approx(case["rms_distance"], rel=1e-6)
@@ -479,6 +480,7 @@ def test_a_scale_stands_beside_the_pose_and_apply_takes_it(form: str, run: Run) 
     done = run("solve", "--points", "a.csv", "b.csv", "--scale", "-f", form, files=points_files("scale", "csv"))
     assert "scale" in done.out
     assert done.status == 0
+    assert done.err.count("covariance left out: it has no place beside a scale") == 1
     if form == "yaml":
         moved = run("apply", "--transform", "t.yaml", "-i", "b.csv", "-f", "csv", files={"t.yaml": done.out})
         found = np.array([[float(row[axis]) for axis in "xyz"] for row in csv.DictReader(io.StringIO(moved.out))])
