@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from frametool.fit.api import align as align
     from frametool.fit.api import compare as compare
     from frametool.fit.api import resample as resample
+    from frametool.fit.api import solve as solve
+    from frametool.fit.api import solve_hand_eye as solve_hand_eye
+    from frametool.fit.api import solve_mean as solve_mean
+    from frametool.fit.api import solve_points as solve_points
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
     from frametool.formats.table import FORMATS as FORMATS
@@ -72,6 +76,10 @@ _HOMES = {
     "resample": "frametool.fit.api",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
+    "solve": "frametool.fit.api",
+    "solve_hand_eye": "frametool.fit.api",
+    "solve_mean": "frametool.fit.api",
+    "solve_points": "frametool.fit.api",
     "sql": "frametool.stream.engines",
     "tutorial": "frametool.sim.scene",
 }

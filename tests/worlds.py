@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.graph import bridges, spanning_tree
-from frametool.fit.measurements import Measurement
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.stream.measurements import Measurement
 
 if TYPE_CHECKING:
     from collections.abc import Callable

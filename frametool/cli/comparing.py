@@ -154,7 +154,9 @@ trajectory_options = together(
 )  # fmt: skip
 
 
-def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory, str, bool]:
+def trajectory(
+    argument: str, on_error: str, form: str = "", *, normalize: bool = False
+) -> tuple[Trajectory, str, bool]:
     """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
     from os.path import basename
 
@@ -167,10 +169,20 @@ def trajectory(argument: str, on_error: str, form: str = "") -> tuple[Trajectory
         made.append(BadRows(name, on_error, most=MOST, tell=partial(say_error, in_json=False)))
         return made[-1]
 
-    found = read_trajectory(argument, form=form, topics=settings().topics, answers=answers(), policy=policy)
+    found = read_trajectory(
+        argument, form=form, topics=settings().topics, answers=answers(), policy=policy, normalize=normalize
+    )
     file, inside = split_name(argument)
     name = ":".join(["stdin" if file == "-" else basename(file), *inside])
     return found, name, any(bad.count for bad in made)
+
+
+def forms_of(files: int) -> list[str]:
+    """Return the form of each of several files as --in says, the last for the rest; "" where it says none."""
+    forms = list(settings().input_forms)
+    if len(forms) > files:
+        raise click.UsageError(f"--in is given {len(forms)} times for {files} files")
+    return forms + (forms[-1:] * (files - len(forms)) or [""] * files)
 
 
 def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple[list[Comparison], bool]:
@@ -180,10 +192,7 @@ def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple
     if [ref, *ests].count("-") > 1:
         raise click.UsageError("standard input can be read once; only one trajectory may be -")
     on_error = options.pop("on_error")
-    forms = list(settings().input_forms)
-    if len(forms) > 1 + len(ests):
-        raise click.UsageError(f"--in is given {len(forms)} times for {1 + len(ests)} files")
-    forms += forms[-1:] * (1 + len(ests) - len(forms)) or [""] * (1 + len(ests))
+    forms = forms_of(1 + len(ests))
     chosen = _settings(options)
     reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
     found = []

@@ -182,7 +182,9 @@ class Stream:
         asked = tuple(ask for ask in FORMATS[form].asks if ask in keeps)
         settings().inputs = (*settings().inputs, (form, asked))
         outcomes, about = way(stream, form, request, output)
-        status = self._write(outcomes, output, gathers=request.gathered is not None, by_row=holds_arrays(form))
+        if request.gathered is not None:
+            outcomes = request.gathered.placing(outcomes, self.policy(self.name, _counted(form)).place)
+        status = self._write(outcomes, output, gathers=request.gathered is not None, counted=_counted(form))
         if about is not None and (states := FORMATS[form].states) and not self.options["quiet"]:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
@@ -284,7 +286,7 @@ class Stream:
         from frametool.stream.record_values import read_poses, results
 
         if request.gathered is not None:
-            request.gathered.add(read_poses(source, request))
+            request.gathered.add(read_poses(source, request), source.name)
             return 0
         request = request._replace(notations=request.notations or output.notations)
         output.values(results(source, request, output.style))
@@ -329,7 +331,7 @@ class Stream:
             on_error=options["on_error"],
         )
 
-    def _write(self, outcomes: Generator[Outcome], output: Output, *, gathers: bool, by_row: bool) -> int:
+    def _write(self, outcomes: Generator[Outcome], output: Output, *, gathers: bool, counted: str) -> int:
         """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
         from contextlib import closing, nullcontext
 
@@ -342,7 +344,7 @@ class Stream:
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
             closing(outcomes),  # ends the processes of --jobs
         ):
-            return run(outcomes, write, self.policy(self.name, "row" if by_row else "line"), progress.advance)
+            return run(outcomes, write, self.policy(self.name, counted), progress.advance)
 
     def _jobs(self, obstacle: str) -> int:
         """Return how many processes do the work: one where something is in the way of more, which is said."""
@@ -356,6 +358,11 @@ class Stream:
             return jobs
         say(f"--jobs does not help here: {obstacle}; one process does the work")
         return 1
+
+
+def _counted(form: str) -> str:
+    """Return what places count in a form."""
+    return "row" if holds_arrays(form) else "line"
 
 
 def _signed(begin: bytes, name: str) -> str:

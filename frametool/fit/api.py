@@ -1,4 +1,4 @@
-"""Comparing trajectories from Python: paths or arrays in, numbers and arrays out."""
+"""Comparing and solving from Python: paths, transforms or arrays in, numbers and arrays out."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, alternatives
+from frametool.errors import ValueInvalid, alternatives, warn
 from frametool.fit.comparison import AUTO, EVO, Delta, Settings, parse_delta
 from frametool.fit.comparison import compare as compared
+from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.fit.numbers import whole_estimate
 from frametool.fit.resampling import resampled, stamps_at_rate, stamps_every
+from frametool.frames.lookups import FrameTree, taken
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+from frametool.stream.measurements import Measurement
 from frametool.stream.trajectories import load_trajectory
 
 if TYPE_CHECKING:
@@ -21,9 +25,14 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from frametool.fit.comparison import Comparison
-    from frametool.geometry.transform import Transform
+    from frametool.fit.hand_eye import HandEye
+    from frametool.fit.matched_points import PointsFit
+    from frametool.fit.robust_mean import MeanFit
+    from frametool.geometry.types import Numbers
 
     Given: TypeAlias = Trajectory | str | PathLike[str]
+    Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]
+    Batch: TypeAlias = Transform | Numbers | Sequence[Transform]
 
 BILLION = 1_000_000_000
 
@@ -103,6 +112,128 @@ def resample(
     else:
         stamps = np.asarray(at, np.int64) if every is None else stamps_every(given, parse_delta(every, ("m", "deg")))
     return resampled(given, stamps, max_gap_ns)
+
+
+def solve(
+    measurements: Measured,
+    *,
+    root: str | None = None,
+    fix: Iterable[FrameTree | str | PathLike[str]] = (),
+    robust: bool = True,
+) -> TreeSolution:
+    """Solve for the tree that measurements mean; what does not agree with the rest is left out.
+
+    measurements: (parent, child, transform) or (parent, child, transform, covariance), the covariance as 36 numbers or
+    (6, 6); or the path of a file as `frametool solve` takes it
+    root: the frame that the others are given in; fix: trees, or paths of them, that are exact
+    Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
+    Raises ValueInvalid for what is not connected or undecided; FormatError.
+    """
+    from frametool.formats.load import load
+
+    trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
+    if moving := next((each for each in trees if each.moves), None):
+        raise ValueInvalid(f"{moving.name} moves; what is fixed stands still")
+    fixed = [(track, tree.covariances.get(track.child)) for tree in trees for track in tree.tracks()]
+    edges = [(track.parent, track.child, track.components) for track, _ in fixed]
+    found = solve_tree(_measurements(measurements), root=root, fixed=edges, robust=robust)
+    kept = {track.child: (Transform.of(*track.components), covariance) for track, covariance in fixed}
+    tree = FrameTree("the result")
+    for name in found.frames:
+        parent = found.parents.get(name)
+        if parent is None:
+            tree.add_root(name)
+        else:
+            tree.add(parent, name, *(kept[name] if name in found.fixed else (found.pose(name), found.marginal(name))))
+    found.tree = tree
+    return found
+
+
+def _measurements(given: Measured) -> list[Measurement]:
+    if isinstance(given, str | PathLike):
+        from frametool.formats.load import Recording
+        from frametool.stream.measurements import read_measurements
+
+        return read_measurements([Recording(given)])
+    return [_measurement(each, f"measurement {number}") for number, each in enumerate(given, 1)]
+
+
+def _measurement(given: Any, place: str) -> Measurement:
+    """Check one of what Python gives; raises ValueInvalid that names it."""
+    if isinstance(given, Measurement):
+        return given
+    if not (isinstance(given, tuple | list) and len(given) in (3, 4) and isinstance(given[2], Transform)):
+        raise ValueInvalid(f"{place}: expected (parent, child, Transform) or with a covariance behind")
+    parent, child, transform = given[:3]
+    if wrong := [name for name in (parent, child) if not (isinstance(name, str) and name)]:
+        raise ValueInvalid(f"{place}: a frame is named by a text, found {wrong[0]!r}")
+    if transform.shape:
+        raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
+    try:
+        return Measurement(parent, child, transform.components, taken(given[3] if len(given) > 3 else None))
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{place}: {error}") from None
+
+
+def solve_hand_eye(gripper: Batch, target: Batch, *, eye_to_hand: bool = False, robust: bool = True) -> HandEye:
+    """Solve for where a camera is on a gripper, and where the target is; wrong samples are left out.
+
+    gripper: base_from_gripper; target: camera_from_target; as many, transforms or matrices (n, 4, 4)
+    eye_to_hand: the camera is beside the robot, the target in the gripper
+    Returns .x (gripper_from_camera, or base_from_camera), .z (base_from_target, or gripper_from_target),
+    .covariance_x, .covariance_z, .noise_at, .used and more.  Raises ValueInvalid where they are not determined.
+    """
+    from frametool.fit import hand_eye
+
+    pair = _poses(gripper, "gripper"), _poses(target, "target")
+    found = hand_eye.solve_hand_eye(*pair, eye_to_hand=eye_to_hand, robust=robust)
+    for sentence in found.warnings:
+        warn(sentence)
+    return found
+
+
+def solve_points(
+    target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True
+) -> PointsFit:
+    """Fit source points to the target points that they are, (n, 3) each; wrong pairs are left out.
+
+    weights: (n,), in proportion to 1 / variance; scale: fit one too, target = scale R source + t
+    Returns .transform (target_from_source), .scale, .covariance, .used and more.
+    Raises ValueInvalid where the points are too few, lie on a line, or are mirrored.
+    """
+    from frametool.fit import matched_points
+
+    found = matched_points.solve_points(target, source, weights=weights, scale=scale, robust=robust)
+    for sentence in found.hints:
+        warn(sentence)
+    return found
+
+
+def solve_mean(poses: Batch, *, weights: Numbers | None = None, robust: bool = True) -> MeanFit:
+    """Return the mean of poses, transforms or matrices (n, 4, 4); wrong ones are left out.
+
+    weights: (n,), in proportion to 1 / variance
+    Returns .transform, .covariance (of one pose), .used and more.  Raises ValueInvalid where there is no mean.
+    """
+    from frametool.fit import robust_mean
+
+    return robust_mean.solve_mean(_poses(poses, "poses"), weights=weights, robust=robust)
+
+
+def _poses(given: Any, name: str) -> Transform:
+    """Take a batch of transforms, a sequence of single ones, or matrices; raises ValueInvalid with the shape."""
+    if not isinstance(given, Transform) and len(given) and all(isinstance(each, Transform) for each in given):
+        if many := next((each.shape for each in given if each.shape), ()):
+            raise ValueInvalid(f"{name}: expected single transforms, got shape {many}")
+        given = Transform.of(*map(np.array, zip(*(each.components for each in given), strict=True)))
+    if not isinstance(given, Transform):
+        matrices = np.asarray(given)
+        if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
+            raise ValueInvalid(f"{name}: expected matrices of shape (n, 4, 4), got {matrices.shape}")
+        return Transform.from_matrix(matrices)
+    if len(given.shape) != 1:
+        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {given.shape}")
+    return given
 
 
 def _name(given: Given, otherwise: str) -> str:

@@ -12,8 +12,8 @@ from frametool.geometry.transform import Transform
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.fit.measurements import Measurement
     from frametool.geometry.types import Rigid
+    from frametool.stream.measurements import Measurement
 
     Fixed = Sequence[tuple[str, str, Rigid]]
 

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.fit.bodies import Bodies, Fixed
-    from frametool.fit.measurements import Measurement
+    from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Array
+    from frametool.stream.measurements import Measurement
 
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance has
 
@@ -101,8 +102,11 @@ class TreeSolution:
     sigma: estimated (metres, radians) of those without a covariance, or None; sigma_factor: 1, or how much too small
     the given sigmas are; they are believed all the same
     dof: degrees of freedom of either half; rms_distance, rms_angle: of those used
+    tree: all of that as a tree with covariances, where `frametool.solve` made it
     rows: how many measurements of each frame are used; frame_checked: whether its pose in the root rests on loops only
     """
+
+    tree: FrameTree
 
     def __init__(
         self,

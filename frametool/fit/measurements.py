@@ -1,66 +1,34 @@
-"""A measurement of one frame in another, and the blunders that people make when they write one down."""
+"""The blunders that people make when they write down a measurement, and which of them explains one."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frametool.errors import NotConnected, printable
 from frametool.fit.rigid_arrays import Poses
+from frametool.fit.robust import KEPT
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.lint.findings import Finding
+from frametool.lint.tree_diff import Tolerance
+from frametool.stream.measurements import Measurement, parted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-    from frametool.geometry.types import Array, Rigid
+    from frametool.frames.lookups import FrameTree
+    from frametool.geometry.types import Array
 
+NEAR = Tolerance(0.01, math.radians(1.0))  # where nothing says how sure a measurement is
+LEAST = 1e-9  # metres, radians
 FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
 ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
 TIE = 1e-9  # of u: what is not nearer than this explains nothing
 O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, as in papers
-
-
-class Measurement(NamedTuple):
-    """The pose of a child in its parent, as somebody measured it.
-
-    components: tx, ty, tz, x, y, z, w; metres
-    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
-    place: where it stands, `m.yaml:12`
-    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
-    """
-
-    parent: str
-    child: str
-    components: Rigid
-    covariance: tuple[float, ...] | None = None
-    place: str = ""
-    id: str | None = None
-    written: tuple[str, tuple[float, float, float]] | None = None
-
-    @property
-    def transform(self) -> Transform:
-        """Return parent_from_child."""
-        return Transform.of(*self.components)
-
-    def turned(self, x: float, y: float, z: float, w: float) -> Transform:
-        """Return it with another quaternion."""
-        return Transform.of(*self.components[:3], x, y, z, w)
-
-    def shifted(self, factor: float) -> Transform:
-        """Return it with its translation times a factor."""
-        x, y, z, *turn = self.components
-        return Transform.of(x * factor, y * factor, z * factor, *turn)
-
-    def reread(self, change: Callable[[float], float]) -> Transform | None:
-        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
-        if self.written is None:
-            return None
-        kind, angles = self.written
-        read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
-        return self.turned(*read([change(angle) for angle in angles]).components)
 
 
 def _translation_of_inverse(m: Measurement) -> Transform:
@@ -110,6 +78,45 @@ def best_blunder(measurement: Measurement, pose: Poses, information: Array) -> s
         return None
     as_good = (_sigmas(errors - errors[best], information) <= ALIKE) & (u <= FITTING)
     return list(meant)[int(as_good.argmax())]
+
+
+def loops(
+    tree: FrameTree, measurements: Sequence[Measurement], tolerance: Tolerance | None
+) -> tuple[list[Finding], list[str], int]:
+    """Compare measurements with a tree: findings of those that are off, frames it lacks, how many have no way in it.
+
+    tolerance: what still agrees; None: 3 sigmas where a measurement has a covariance, else 10 mm and 1 deg
+    """
+    findings, lacking, apart = [], dict[str, None](), 0
+    for each in measurements:
+        unknown = [name for name in each[:2] if name not in tree.frames]
+        lacking |= dict.fromkeys(unknown)
+        if unknown:
+            continue
+        try:
+            pose = Poses.of(tree.lookup(each.parent, each.child))
+        except NotConnected:
+            apart += 1
+            continue
+        error = pose.errors(Poses.of(each.transform))
+        metres, radians = (float(np.linalg.norm(half)) for half in (error[:3], error[3:]))
+        if tolerance is None and each.covariance is not None:
+            information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
+            u = _sigmas(error[None], information)[0]
+            agrees, sigmas = u <= KEPT, f" ({u:.1f} sigmas)"
+        else:
+            near = tolerance or NEAR
+            agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
+            # `FITTING` sigmas are reached where both halves reach the tolerance
+            sigma = np.maximum(np.repeat([near.metres, near.radians], 3), LEAST) / FITTING / 3**0.5
+            information = np.diag(sigma**-2.0)
+        if not agrees:
+            words = best_blunder(each, pose, information)
+            off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg{sigmas} off the tree"
+            message = f"{printable(each.parent)}<-{printable(each.child)} is {off}"
+            message += f"; fits when {words}" if words else ""
+            findings.append(Finding("loop", message, *parted(each.place)))
+    return findings, [*lacking], apart
 
 
 def _sigmas(errors: Array, information: Array) -> Array:

@@ -1,4 +1,7 @@
-"""Which pose of an estimate belongs to which of the reference: at common stamps, or the nearest ones."""
+"""Which pose of an estimate belongs to which of the reference: at common stamps, or the nearest ones.
+
+Also which pose of a gripper belongs to which of a target.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.errors import ValueInvalid
+from frametool.frames.trajectory import BODY, WORLD
+from frametool.stream.samples import Samples
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array
 
 GAP = 3  # median intervals that may lie between two neighbours which are interpolated
+NEAR_NS = 50_000_000  # between stamps of a gripper and a target that are paired
 
 
 class Pairs(NamedTuple):
@@ -94,3 +104,45 @@ def interval(stamps_ns: Array) -> float:
 
 def _inside(stamps_ns: Array, span: Array) -> int:
     return int(np.count_nonzero((span[0] <= stamps_ns) & (stamps_ns <= span[-1])))
+
+
+def paired_samples(gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None) -> Samples:
+    """Pair poses: the gripper's at the target's stamps, or row by row where not both have stamps.
+
+    Between two that are no more than a gap apart it is interpolated, else the nearest within the gap is taken.
+    Raises ValueInvalid where there are as many as nothing pairs.
+    """
+    names = [name if each.world != WORLD or each.body != BODY else None
+             for each in (gripper, target) for name in (each.world, each.body)]  # fmt: skip
+    for each, file in ((gripper, files[0]), (target, files[1])):
+        if each.xyzw is None:
+            raise ValueInvalid(f"{file}: positions alone are no poses: rotations are needed here")
+    if gripper.stamps_ns is None or target.stamps_ns is None:
+        if gripper.size != target.size:
+            counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
+            raise ValueInvalid(f"{counts}, and no stamps to pair them")
+        return Samples(gripper.poses, target.poses, _places(files[1], target, range(target.size)), tuple(names), files)
+    gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
+    made, is_between = between(dense, target.stamps_ns, gap_ns)
+    index = np.searchsorted(dense.stamps_ns, target.stamps_ns).clip(1, max(dense.size - 1, 1))
+    off = np.abs(dense.stamps_ns[[index - 1, index.clip(0, dense.size - 1)]] - target.stamps_ns)
+    nearest, near = np.where(off[0] <= off[1], index - 1, index.clip(0, dense.size - 1)), off.min(0) <= gap_ns
+    chosen = dense.at(nearest)
+    chosen.xyz[is_between], chosen.xyzw[is_between] = made.xyz, made.xyzw
+    kept = np.flatnonzero(is_between | near)
+    gap = f"{gap_ns / 1e6:g} ms"
+    if not len(kept):
+        apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
+        raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
+    told = []
+    if alone := target.size - len(kept):
+        told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
+    sides = chosen.at(kept).poses, target.at(kept).poses
+    return Samples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", told)
+
+
+def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:
+    """Name where poses stand: by line, or by row where there are none."""
+    if each.lines is None:
+        return [f"{file} row {row + 1}" for row in rows]
+    return [f"{file}:{line}" for line in each.lines.tolist()]

@@ -16,10 +16,10 @@ from frametool.fit.uncertainty import Uncertainty
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.fit.measurements import Measurement
     from frametool.fit.rigid_arrays import Poses
     from frametool.fit.tree_solver import Fitted, TreeProblem
     from frametool.geometry.types import Array
+    from frametool.stream.measurements import Measurement
 
 ONE_LINE = 200  # characters
 

@@ -23,6 +23,7 @@ class Trajectory(NamedTuple):
 
     stamps_ns: integers of shape (n,), or None where poses are counted; xyz: (n, 3), metres
     xyzw: unit quaternions (n, 4), or None where there are positions alone
+    lines: of the file, from 1, that each stands on; None where that is not known
     """
 
     stamps_ns: Any
@@ -30,6 +31,7 @@ class Trajectory(NamedTuple):
     xyzw: Any = None
     world: str = WORLD
     body: str = BODY
+    lines: Any = None
 
     @property
     def size(self) -> int:
@@ -55,9 +57,8 @@ class Trajectory(NamedTuple):
     def at(self, index: Any) -> Trajectory:
         """Choose poses as numpy does."""
         stamps = None if self.stamps_ns is None else self.stamps_ns[index]
-        return self._replace(
-            stamps_ns=stamps, xyz=self.xyz[index], xyzw=None if self.xyzw is None else self.xyzw[index]
-        )
+        turns, lines = (None if each is None else each[index] for each in (self.xyzw, self.lines))
+        return self._replace(stamps_ns=stamps, xyz=self.xyz[index], xyzw=turns, lines=lines)
 
     def numbered(self) -> Trajectory:
         """Return it with the numbers of its poses as seconds."""

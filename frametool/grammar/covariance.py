@@ -79,6 +79,11 @@ def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tupl
     return whole or tuple(places), tuple(found.get(axis, (-1, "")) for axis in AXES) if found else ()
 
 
+def is_sigma(name: str) -> bool:
+    """Tell whether a column is called as a sigma is: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
+    return name.startswith("sigma_") and re.match(_SIGMA_COLUMN + r"\s*(?:[\[(]|$)", name) is not None
+
+
 def in_unit(number: Any, unit: str) -> Any:
     """Return sigmas in metres or radians."""
     if UNITS_OF_ANGLE.get(unit):

@@ -43,6 +43,7 @@ RULES = {
     "jump": ("warning", "a step 10 times the usual one, and 0.1 m or 0.2 rad"),
     "disagreement": ("error", "a frame that jumps to and fro: two publishers?"),
     "reparented": ("note", "a frame whose parent changes once or twice"),
+    "loop": ("warning", "a measurement (--measured) that the tree does not agree with"),
     "flicker": ("error", "a parent that goes to and fro: two publishers?"),
 }
 

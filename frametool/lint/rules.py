@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import FormatError, Unanswered, shown
+from frametool.errors import BadTopology, FormatError, Unanswered, shown
 from frametool.formats.load import refuse_unknown_joints
 from frametool.formats.trees.tree_reader import read_edges, without_slashes
 from frametool.frames.edge_log import EdgeLog
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from frametool.documents.document import Document
     from frametool.documents.source import Source
     from frametool.formats.load import Recording
+    from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge
 
@@ -137,12 +140,30 @@ def _written_xyzw(value: Any, edge: Edge) -> bool:
 FLICKER = 3  # so many changes of parent are no picking up and putting down
 
 
-def check(files: Sequence[Recording], *, normalize: bool = False) -> list[Finding]:
-    """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines."""
+def check(files: Sequence[Recording], *, normalize: bool = False, tree: FrameTree | None = None) -> list[Finding]:
+    """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines.
+
+    tree: takes what stands still
+    """
     findings: list[Finding] = []
-    findings += lint(_statements(files, findings, normalize=normalize))
+    everything = _statements(files, findings, normalize=normalize)
+    if tree is not None:
+        everything, again = tee(everything)
+        _stand(tree, again)
+    findings += lint(everything)
     order = {file.name: index for index, file in enumerate(files)}
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
+
+
+def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
+    """Put into a tree what stands still; what is wrong is left out, and found elsewhere."""
+    said: dict[str, list[Statement]] = {}
+    for each in everything:
+        said.setdefault(each.child, []).append(each)
+    for statements in said.values():
+        if len({each.stamp_ns for each in statements}) < 2 or len({each[:3] for each in statements}) < 2:
+            with suppress(BadTopology):
+                tree.add_components(*statements[0][:3])
 
 
 def _statements(files: Sequence[Recording], findings: list[Finding], *, normalize: bool) -> Iterator[Statement]:

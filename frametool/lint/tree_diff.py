@@ -58,9 +58,10 @@ class Tolerance(NamedTuple):
         return max(apart.metres / (self.metres or NEAR_BY), apart.radians / (self.radians or NEAR))
 
 
-def parse_tolerance(text: str) -> Tolerance:
+def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:  # noqa: B008 - it is frozen
     """Read `1mm,0.1deg`, or one of them; bare numbers are metres and radians, in this order.
 
+    otherwise: what holds of the one that is not said
     Raises ValueInvalid.
     """
     parts: dict[str, str] = {}
@@ -71,7 +72,7 @@ def parse_tolerance(text: str) -> Tolerance:
     try:
         if len(parts) != len(cells):
             raise ValueInvalid(f"{shown(text)} is not one length and one angle")
-        found = Tolerance(**{
+        found = otherwise._replace(**{
             name: parse_length(cell) if name == "metres" else read_number_or_angle(cell, degrees=False)
             for name, cell in parts.items()
         })  # fmt: skip

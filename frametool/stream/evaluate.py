@@ -136,7 +136,7 @@ class Run:
             self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
         if plan.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
-            plan.gathered.take(plan.shapes[0], moved[0], kept, weights)
+            plan.gathered.take(plan.shapes[0], moved[0], kept, weights, self.block.line_of)
         if plan.unwrap and len(self.rows):
             _unwrap(self.results, plan.targets[0].angle_columns(), state)
 

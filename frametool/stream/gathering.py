@@ -9,26 +9,33 @@ import numpy as np
 from frametool.errors import ValueInvalid
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Generator, Iterable, Sequence
 
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components
     from frametool.grammar.pose import Pose
     from frametool.stream.row_layout import Shape
+    from frametool.stream.run import Outcome
     from frametool.text.spans import Flags, Floats
 
 
 class Gathered:
     """The poses that were read so far, in metres and as unit quaternions, and a number that stands beside each."""
 
-    def __init__(self) -> None:
-        """Begin with none."""
+    def __init__(self, *, named: bool = False) -> None:
+        """Begin with none; named: so that `places` says where each was read."""
+        self.places: list[str] = []
+        self._lines: list[int] | None = [] if named else None  # of the block that was read last
         self.placed = self.turned = self.uncertain = False
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
 
-    def take(self, shape: Shape, pose: Components, kept: Flags, beside: Floats | None) -> None:
+    def take(
+        self, shape: Shape, pose: Components, kept: Flags, beside: Floats | None, line_of: Callable[[int], int]
+    ) -> None:
         """Add the rows of a block that are kept: components of a pose, and what stands beside them."""
+        if self._lines is not None:
+            self._lines += map(line_of, np.flatnonzero(kept).tolist())
         self.placed |= shape.whole or shape.unit is not None
         self.turned |= shape.notation is not None
         rows = np.stack([np.broadcast_to(np.asarray(part, np.float64), len(kept)) for part in pose[:7]], axis=-1)
@@ -36,8 +43,19 @@ class Gathered:
         if beside is not None:
             self._beside.append(beside[kept])
 
-    def add(self, poses: Sequence[Pose]) -> None:
-        """Add poses that were read one by one."""
+    def placing(self, outcomes: Iterable[Outcome], place: Callable[[int], str]) -> Generator[Outcome]:
+        """Pass the outcomes of blocks, and keep the places of what was taken from each; place: names a line."""
+        line = 1
+        for outcome in outcomes:
+            if self._lines is not None:
+                self.places += [place(line + below) for below in self._lines]
+                self._lines = []
+            line += outcome.lines
+            yield outcome
+
+    def add(self, poses: Sequence[Pose], name: str = "") -> None:
+        """Add poses that were read one by one from something with a name."""
+        self.places += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
         self.placed |= any(pose.position is not None for pose in poses)
         self.turned |= any(pose.rotation is not None for pose in poses)
         self.uncertain |= any(pose.covariance is not None for pose in poses)

@@ -69,7 +69,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     nodes: list[Node] = []
     for document, records in documents(source, request):
         for record in records:
-            poses.append(pose_of(record, request)._replace(stamp_ns=_stamp_of(document, record, source)))
+            poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(document, record, source)))
             unit = _unit(record, document.value)
             if not _says_no_more(record, document, unit):
                 nodes = nodes or parse_nodes(source.text)
@@ -79,7 +79,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     return poses, beside
 
 
-def _stamp_of(document: Document, record: Record, source: Source) -> int | None:
+def stamp_of(document: Document, record: Record, source: Source) -> int | None:
     """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
     own = value_at(document.value, record.path[1:])
     key = _stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""

@@ -70,7 +70,7 @@ class RowPoses(NamedTuple):
 class TablePoses:
     """Turn one block of a table after the other into poses; the rows that are bad are listed in `faults`.
 
-    faults, notes: of the last block, lines from 0
+    faults, notes: of the last block, lines from 0; given: the numbers of its good rows as read, a row a column
     rows, mended: how many rows there were, and rotations that were normalised; off: how far the worst one was
     """
 
@@ -128,6 +128,7 @@ class TablePoses:
         self.mended += len(run.mended)
         self.off = max(self.off, run.off)
         self.notes = notes_of(run, block)
+        self.given = np.array(run.columns)[:, run.rows]
         self.rows += len(block.places) + len(block.broken)
         rows, results, lines = run.rows, run.results, block.places
         if nulls and self.faults:

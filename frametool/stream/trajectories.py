@@ -14,7 +14,7 @@ import numpy as np
 from frametool.documents.source import InputFile
 from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
 from frametool.formats.detect import detect
-from frametool.formats.load import Recording, load_sources, opened_together
+from frametool.formats.load import Recording, Rules, load_sources, opened_together
 from frametool.formats.table import FORMATS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.grammar.edges import Answers
@@ -68,25 +68,28 @@ def read_trajectory(
     topics: Sequence[str] = (),
     answers: Answers = Answers(),  # noqa: B008 - it is frozen
     policy: Callable[[str], BadRows] = stop_at_first,
+    normalize: bool = False,
 ) -> Trajectory:
     """Read what an argument names; otherwise as `load_trajectory`.
 
     policy: makes of a file's name what reports the rows that are none, and says whether they are skipped
+    normalize: take any non-zero quaternion and any matrix near a rotation
     """
     name, inside = split_name(text)
     if len(inside) == 1:
         topics, inside = inside, []
     if os.path.isdir(name) or inside or topics:
-        return _of_tree(name, form, topics, answers, inside)
+        return _of_tree(name, form, topics, answers, inside, normalize=normalize)
     file = InputFile(name)
     if not form:
         form = detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
     is_record = "records" in FORMATS[form].reads and not re.search(TREE, file.head())
     if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
-        return _of_tree(name, form, topics, answers, inside, file)
+        return _of_tree(name, form, topics, answers, inside, file, normalize=normalize)
     try:
         bad = policy(file.name)
-        return _of_records(file, form, bad) if is_record else _of_rows(file, form, answers, bad)
+        asked = Request(normalize=normalize, on_error=bad.on_error)
+        return _of_records(file, form, bad, asked) if is_record else _of_rows(file, form, answers, bad, asked)
     finally:
         file.close()
 
@@ -107,20 +110,24 @@ def split_name(text: str) -> tuple[str, list[str]]:
     return text[:end], names
 
 
-def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Trajectory:
+def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
     row = FORMATS[form].poses
     counts = row is not None and bool(row.counted)
     own = answers if counts or form == "csv" else answers._replace(stamps="")
-    request = Request(Operation(moves=True), on_error=bad.on_error)
+    request = asked._replace(operation=Operation(moves=True))
     converter = FormatConverter(form, request, Style("tum"), file.name, own)
     numbers: list[Any] = []
     stamps: list[Any] = []
+    lines: list[Any] = []
+    before = [int(converter.is_table)]  # what lists poses says itself where they stand
     named: set[tuple[str | None, str | None]] = set()
 
     def gathered() -> Iterator[Outcome]:
         for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
+            before.append(before[-1] + outcome.lines)
             if len(poses.numbers):
+                lines.append(poses.lines + before[-2])
                 numbers.append(poses.numbers)
                 stamps.append(poses.stamps_ns)
                 named.update(zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True))
@@ -139,13 +146,14 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Traj
     parent, name = named.pop()
     times: Any = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
-    return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body)
+    at = None if "arrays" in FORMATS[form].reads else np.concatenate(lines)
+    return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
 
 
-def _of_records(file: InputFile, form: str, bad: BadRows) -> Trajectory:
+def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request) -> Trajectory:
     """Gather records one by one: poses, or points, with their stamps."""
     poses, stamps, named = [], [], set()
-    for each in stream_results(cast("ByteStream", file.stream), form, Request(), Style("tum"), bad):
+    for each in stream_results(cast("ByteStream", file.stream), form, asked, Style("tum"), bad):
         if not isinstance(each, Result) or each.pose.position is None:
             raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
         poses.append(each.pose)
@@ -169,11 +177,12 @@ def _all(names: Sequence[str | None], others: Sequence[str | None]) -> Sequence[
 
 
 def _of_tree(
-    name: str, form: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None
+    name: str, form: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None,
+    *, normalize: bool = False,
 ) -> Trajectory:
     """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
     recording = Recording(name, None if file is None else file.stream, form or None, topics, answers)
-    tree = cast("TransformBuffer", load_sources(opened_together([recording])))
+    tree = cast("TransformBuffer", load_sources(opened_together([recording]), Rules(normalize=normalize)))
     if topics and not recording.topics.counts:
         raise ValueInvalid(f"{recording.name}: {FORMATS[recording.form].summary}: nothing in it came by a topic")
     if not tree.moves:

@@ -181,3 +181,83 @@ def test_what_is_no_direction_is_refused(run: Run, arguments: list[str], status:
     outcome = run("between", *arguments)
     assert (outcome.status, outcome.out) == (status, "")
     assert outcome.err.count("\n") <= 3
+
+
+# --- mean --robust -------------------------------------------------------------------------------------------------
+
+WRONG = {3: [0.5, 0.0, 0.0], 7: [0.0, 0.0, -0.25]}
+ALIKE = [
+    [1 + at / 2e3 + WRONG.get(at, [0.0])[0], 2 + (at * 7 % 5) / 2e3, 3 + WRONG.get(at, [0.0] * 3)[2], 0.0, 0.0, 0.6, 0.8] for at in range(12)
+]  # fmt: skip
+FORMS = {
+    "a.csv": "x,y,z,qx,qy,qz,qw,w\n" + "".join(",".join(map(repr, row)) + ",1\n" for row in ALIKE),
+    "a.jsonl": "".join(json.dumps({"xyz": row[:3], "xyzw": row[3:], "w": 1}) + "\n" for row in ALIKE),
+    "a.tum": "".join(f"{at} {' '.join(map(repr, row))}\n" for at, row in enumerate(ALIKE)),
+    "a.yaml": "\n---\n".join(f"xyz: {row[:3]}\nxyzw: {row[3:]}\nw: 1" for row in ALIKE),
+}
+FIRST_LINES = {"a.csv": 2, "a.jsonl": 1, "a.tum": 1, "a.yaml": 1}
+LINES_EACH = {"a.yaml": 4}
+KEPT = [row for at, row in enumerate(ALIKE) if at not in WRONG]
+
+
+def robust(run: Run, *arguments: str, **more: Any) -> Outcome:
+    return run("mean", *arguments, "--robust", "-f", "json", **more)
+
+
+@pytest.mark.parametrize("weights", [(), ("--weights", "w")])
+@pytest.mark.parametrize("piped", [False, True])
+@pytest.mark.parametrize("name", FORMS)
+def test_wrong_rows_are_left_out_and_told_with_their_places(run: Run, name: str, piped: bool, weights: tuple[str, ...]) -> None:  # noqa: FBT001
+    if weights and name == "a.tum":
+        weights = ()
+    given = {"stdin": FORMS[name]} if piped else {"files": {name: FORMS[name]}}
+    found = robust(run, *(() if piped else (name,)), *weights, **given)
+    plain = mean_of(run("mean", "-f", "json", stdin="".join(json.dumps({"xyz": row[:3], "xyzw": row[3:]}) + "\n" for row in KEPT)))
+    assert found.status == 3
+    assert json.loads(found.out) == {**plain, "count": 12, "used": 10}
+    lines = [FIRST_LINES[name] + at * LINES_EACH.get(name, 1) for at in WRONG]
+    where = "stdin" if piped else name
+    told = [line for line in found.err.splitlines() if "left out" in line]
+    assert [line.partition(": left out, ")[0] for line in told] == [f"frametool: warning: {where}:{line}" for line in lines]
+    assert " mm 0.00 deg off (u " in told[0]
+
+
+def test_arguments_left_out_are_named_by_number_or_file(run: Run) -> None:
+    poses = [json.dumps({"xyz": row[:3], "xyzw": row[3:]}) for row in ALIKE]
+    found = robust(run, *poses[:6], "rest.json", files={"rest.json": "[" + ", ".join(poses[6:]) + "]"})
+    assert (found.status, json.loads(found.out)["used"]) == (3, 10)
+    assert [line.partition(": left out")[0][20:] for line in found.err.splitlines()] == ["argument 4", "rest.json, pose 2"]
+
+
+def test_rows_of_arrays_are_counted_and_bad_rows_before_are_too(run: Run) -> None:
+    assert run("convert", "-i", "a.csv", "-f", "npy", "-o", "a.npy", files={"a.csv": FORMS["a.csv"]}).status == 0
+    assert "a.npy: row 4: left out, " in robust(run, "a.npy").err
+    broken = FORMS["a.csv"].replace("1.0005,", "none,", 1)
+    found = robust(run, "a.csv", "--on-error", "skip", files={"a.csv": broken})
+    assert (found.status, json.loads(found.out)["count"], json.loads(found.out)["used"]) == (3, 11, 9)
+    assert "a.csv:5: left out, " in found.err
+
+
+@pytest.mark.parametrize("text", [TABLE, LINES], ids=["csv", "jsonl"])
+@pytest.mark.parametrize("weights", [(), ("--weights", "weight")])
+def test_where_nothing_is_wrong_the_bits_are_those_of_the_plain_mean(run: Run, text: str, weights: tuple[str, ...]) -> None:
+    plain = mean_of(run("mean", "-f", "json", *weights, stdin=text))
+    found = robust(run, *weights, stdin=text)
+    assert (found.status, found.err) == (0, "")
+    assert json.loads(found.out) == {**plain, "used": COUNT}
+
+
+def test_points_and_rotations_alone_are_left_out_too(run: Run) -> None:
+    points = [f"{{xyz: [{1 + at / 1e3}, 0, 0]}}" for at in range(6)]
+    turns = [f"{{rpy_deg: [{at / 10}, 0, 0]}}" for at in range(6)]
+    for poses, wrong in ((points, "{xyz: [9, 0, 0]}"), (turns, "{rpy_deg: [90, 0, 0]}")):
+        found = robust(run, *poses, wrong)
+        assert (found.status, json.loads(found.out)["used"]) == (3, 6)
+        assert "argument 7: left out" in found.err
+
+
+def test_of_many_left_out_the_rest_are_counted(run: Run) -> None:
+    rows = "x,y,z\n" + "".join(f"{at / 1e4},0,0\n" for at in range(60)) + "".join(f"{5 + at},0,0\n" for at in range(25))
+    found = robust(run, stdin=rows)
+    assert (found.status, found.err.count("left out")) == (3, 21)
+    assert found.err.endswith("frametool: warning: 5 more poses left out\n")

@@ -15,10 +15,11 @@ from worlds import COVARIANCE, SIGMA_M, SIGMA_RAD, World, inverted, world
 
 from frametool.errors import ValueInvalid
 from frametool.fit.measured_tree import TreeSolution, solve_tree
-from frametool.fit.measurements import BLUNDERS, Measurement
+from frametool.fit.measurements import BLUNDERS
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.stream.measurements import Measurement
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "golden" / "solve_tree.json").read_text())["tree"]
 LEAST_SQUARES = 3e-8

@@ -14,6 +14,7 @@ COMMANDS = {
     "compare": ("frametool.cli.commands.compare", "how far trajectories are from a reference"),
     "align": ("frametool.cli.commands.align", "the transform that brings a trajectory onto its reference"),
     "resample": ("frametool.cli.commands.resample", "a trajectory at other moments"),
+    "solve": ("frametool.cli.commands.solve", "the tree, the camera's place or the transform that measurements mean"),
     "fk": ("frametool.cli.commands.fk", "where TIP of a robot is seen from BASE, for rows of joint values"),
     "tree": ("frametool.cli.commands.tree", "the tree of frames, drawn or written in another form"),
     "view": ("frametool.cli.commands.view", "the frames seen: in the terminal, as a page that turns, as a picture"),

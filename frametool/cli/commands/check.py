@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
+from math import radians
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.options import FILE, Command, file_options
+from frametool.cli.options import FILE, Command, Parsed, file_options
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import opened, state
+from frametool.cli.trees import opened, refuse_two_readers, state
+from frametool.errors import listing, warn
 from frametool.lint.findings import RULES, WRITERS
 from frametool.lint.rules import check
+from frametool.lint.tree_diff import Tolerance, parse_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from frametool.formats.load import Recording
+    from frametool.lint.findings import Finding
+    from frametool.stream.measurements import Measurement
 
 FAILED = 1
 
@@ -36,21 +44,33 @@ class CheckCommand(Command):
 @click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
 @click.option("--strict", is_flag=True, help="let warnings fail too")
+@click.option("--measured", multiple=True, type=FILE, metavar="FILE",
+              help="compare these measurements (help solve) too")  # fmt: skip
+@click.option("--tolerance", metavar="LENGTH,ANGLE",
+              type=Parsed("tolerance", partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0)))),
+              help="what they may be off  [3 sigmas, or 10mm,1deg]")  # fmt: skip
 @file_options
-def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> int:
-    """Look for mistakes in FILES, trees and recordings, taken together as one tree.
+def command(
+    files: Sequence[str], form: str, strict: bool, measured: Sequence[str], tolerance: Tolerance | None, normalize: bool
+) -> int:
+    """Look for mistakes in FILES, trees and recordings, taken as one tree.
 
     \b
       frametool check robot.yaml
       frametool check drive.yaml --strict
-      frametool check robot.yaml --format github
+      frametool check robot.yaml --measured measurements.yaml
       ros2 topic echo /tf > tf.txt; frametool check tf.txt tf_static.txt
 
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input.
     """
-    recordings = opened(files)
-    findings = check(recordings, normalize=normalize)
+    if tolerance is not None and not measured:
+        raise click.UsageError("--tolerance is about --measured; name the measurements")
+    refuse_two_readers((*files, *measured))
+    count = len(files) + len(measured)
+    rows = _read(opened(measured, behind=len(files), of=count), normalize=normalize) if measured else []
+    recordings = opened(files, of=count)
+    findings = _with_loops(recordings, rows, tolerance, normalize=normalize)
     state(recordings)
     text = WRITERS[form](findings)
     with writing(None) as write:
@@ -60,6 +80,33 @@ def command(files: Sequence[str], form: str, strict: bool, normalize: bool) -> i
     if summary:
         say(summary)
     return FAILED if counts["error"] or (strict and counts["warning"]) else 0
+
+
+def _read(files: Sequence[Recording], *, normalize: bool) -> list[Measurement]:
+    from frametool.stream.measurements import read_measurements
+
+    rows = read_measurements(files, normalize=normalize)
+    state(files, whole=False)
+    return rows
+
+
+def _with_loops(
+    files: Sequence[Recording], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
+) -> list[Finding]:
+    """Return what is wrong with files, then the measurements that do not agree; tell what was not compared."""
+    if not rows:
+        return check(files, normalize=normalize)
+    from frametool.fit.measurements import loops
+    from frametool.frames.lookups import FrameTree
+
+    tree = FrameTree()
+    findings = check(files, normalize=normalize, tree=tree)
+    found, lacking, apart = loops(tree, rows, tolerance)
+    if lacking:
+        warn(f"frames that the tree does not have, or that move; not compared: {listing(lacking)}")
+    if apart:
+        warn(f"{apart} of {len(rows)} measurements not compared: their frames are not connected by what stands still")
+    return [*findings, *found]
 
 
 def _in_terminal(text: str) -> str:

@@ -9,8 +9,9 @@ import click
 
 from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
-from frametool.cli.poses import is_pasted, poses_from
+from frametool.cli.poses import is_inline, is_pasted, poses_from
 from frametool.errors import ValueInvalid, warn
+from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -26,25 +27,31 @@ if TYPE_CHECKING:
     metavar="NAME | W,W,..",
     help="column or key of each pose's weight, or the weights of the POSEs",
 )
+@click.option("--robust", is_flag=True, help="leave out poses that do not agree with the rest, and tell them")
 @pose_result_options("poses")
 @pose_stream_options
-def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
+def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options: Any) -> int:
     """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
 
     \b
       frametool mean '{rpy_deg: [0, 0, 80]}' '{rpy_deg: [0, 0, 100]}'
       frametool mean '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' --weights 1,3
       printf 'x,y,z,weight\\n0,0,0,1\\n4,0,0,3\\n' | frametool mean --weights weight
+      frametool mean tag_seen.csv --robust
 
     Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
     of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
     _deg degrees) between the poses and the mean.
+
+    With --robust all of that is of the poses kept, `used` of `count`: what is more than 3 sigmas off, by medians, is
+    left out, told with its place, how far off it is, and u, that in sigmas; the status is then 3. Where none is, the
+    numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task = PoseTask(options)
     stream = task.stream
     from frametool.stream.gathering import Gathered
 
-    gathered = Gathered()
+    gathered = Gathered(named=robust)
     request = task.request(extra_column=weights, gathered=gathered)
     status, given = 0, None
     if len(poses) == 1 and poses[0] != "-" and not stream.path and not is_pasted(poses[0], stream.given):
@@ -53,15 +60,20 @@ def command(poses: tuple[str, ...], weights: str | None, **options: Any) -> int:
         status = stream.run(request, task.output)
     else:
         task.only_arguments(poses)
-        for each in poses:
-            gathered.add(poses_from(each, request))
+        for number, each in enumerate(poses, 1):
+            gathered.add(poses_from(each, request), f"argument {number}" if is_inline(each) else each)
         given = None if weights is None else _numbers(weights)
         if given is not None and len(given) != len(gathered.transforms):
             raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
     if gathered.uncertain:
         warn("covariances left out: mean has none")
-    task.output.poses([_mean(gathered, given)])
-    return status
+    result, left_out = _mean(gathered, given, robust=robust)
+    task.output.poses([result])
+    for line in left_out[:MOST]:
+        warn(line)
+    if len(left_out) > MOST:
+        warn(f"{len(left_out) - MOST} more poses left out")
+    return ROWS_SKIPPED if left_out else status
 
 
 def _numbers(weights: str) -> list[float]:
@@ -72,19 +84,33 @@ def _numbers(weights: str) -> list[float]:
         raise click.UsageError(f"--weights: {error}; of POSEs they are numbers, of rows the name of a column") from None
 
 
-def _mean(gathered: Gathered, given: list[float] | None) -> Result:
-    """Return the mean of what was gathered, with its spread."""
+def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
+    """Return the mean of what was gathered, with its spread, and what to say of each pose that was left out."""
     from frametool.geometry.spread import mean_and_spread
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result
 
     transforms = gathered.transforms
-    mean, spread = mean_and_spread(transforms, gathered.weights if given is None else given)
-    pose = Pose.of(mean.components)
+    weights = gathered.weights if given is None else given
     extras: dict[str, Any] = {"count": len(transforms)}
+    left_out: list[str] = []
+    if robust:
+        from frametool.fit.robust_mean import solve_mean
+
+        found = solve_mean(transforms, weights=weights)
+        mean, spread = found.transform, found.spread
+        extras["used"] = int(found.used.sum())
+        for row in found.left_out.nonzero()[0].tolist():
+            metres, radians = (math.hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
+            off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.2f} deg"
+            left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
+    else:
+        mean, spread = mean_and_spread(transforms, weights)
+    pose = Pose.of(mean.components)
     if gathered.placed:
         extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
     if gathered.turned:
         extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": math.degrees(spread.angle_rms)}
         extras |= {"angle_max": spread.angle_max, "angle_max_deg": math.degrees(spread.angle_max)}
-    return Result(Pose(pose.position if gathered.placed else None, pose.rotation if gathered.turned else None), extras)
+    position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
+    return Result(Pose(position, rotation), extras), left_out

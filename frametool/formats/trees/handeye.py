@@ -95,10 +95,16 @@ def write_tree(tree: Frames, style: Style) -> str:
         children = listing(child for _, child, _ in edges)
         raise ValueInvalid(f"{NAME} holds one pose, and here are {len(edges)}: {children}")
     ((parent, child, pose),) = edges
+    warn(f"{NAME}: {shown(parent)} is written as the hand; beside the base write eye_on_hand: false and {BASE}")
+    tell_lonely_roots(tree, NAME)
+    return write_mount(parent, child, pose, style, on_hand=True)
+
+
+def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: bool) -> str:
+    """Return the pose of a camera on the hand, or beside the base, as easy_handeye has it."""
     turned = quaternion.from_quaternion(*pose[3:], floats)
     numbers = zip((*XYZ, *_XYZW.columns), (*pose[:3], *turned), strict=True)
     lines = "".join(f"  {key}: {flow(number, style.number)}\n" for key, number in numbers)
-    warn(f"{NAME}: {shown(parent)} is written as the hand; beside the base write eye_on_hand: false and {BASE}")
-    tell_lonely_roots(tree, NAME)
-    frames = f"  eye_on_hand: true\n  {EFFECTOR}: {quoted(parent)}\n  {CHILD}: {quoted(child)}\n"
+    mount = EFFECTOR if on_hand else BASE
+    frames = f"  eye_on_hand: {str(on_hand).lower()}\n  {mount}: {quoted(parent)}\n  {CHILD}: {quoted(child)}\n"
     return f"parameters:\n{frames}transformation:\n{lines}"

@@ -1,0 +1,203 @@
+"""`frametool solve`: the transforms that measurements mean."""
+
+from __future__ import annotations
+
+import os
+from os.path import realpath, splitext
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.comparing import read_span
+from frametool.cli.group import refuse_unused, settings
+from frametool.cli.options import (
+    FILE,
+    TEXT,
+    Command,
+    Parsed,
+    pose_options,
+    reading_options,
+    result_options,
+    rotation_options,
+)
+from frametool.cli.output import Output
+from frametool.cli.sink import refuse_existing, writing
+from frametool.cli.stderr import tell
+from frametool.cli.trees import refuse_two_readers
+from frametool.errors import ValueInvalid, shown, warn
+from frametool.stream.faults import ROWS_SKIPPED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.view.solution_text import Solution
+
+REPORTS = {".json": "json", ".csv": "csv"}
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
+FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
+LEFT_OPEN = ("joints", "joint_files", "direction", "camera_axes", "dh", "stamps", "topics")  # in trajectories
+# shape -> the options that it does not use
+UNUSED = {
+    "": ("eye_to_hand", "max_gap_ns", "names", "scale"),
+    "--hand-eye": ("root", "fix", "without", "scale", "named_frames"),
+    "--points": ("root", "fix", "without", "eye_to_hand", "max_gap_ns", "named_frames", "normalize", *LEFT_OPEN),
+}
+
+
+def _read_report(path: str) -> str:
+    if splitext(path)[1].lower() not in REPORTS:
+        raise ValueInvalid(f"{shown(path)}: a report is written as .json or .csv")
+    return path
+
+
+def _read_names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",")]
+    if not all(names) or len({*names}) < len(names):
+        raise ValueInvalid(f"{shown(text)}: names stand with commas between them, each once")
+    return names
+
+
+@click.command(cls=Command, name="solve", epilog=EXIT_CODES)
+@click.argument("files", nargs=-1, required=True, type=FILE, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
+@click.option("--root", type=TEXT, metavar="FRAME", help="that all others are given in  [default: never a child]")
+@click.option("--fix", type=FILE, multiple=True, metavar="TREE", help="exact edges, kept as they are; may be repeated")
+@click.option("--without", type=TEXT, multiple=True, metavar="FILE:LINE",
+              help="leave this row out; may be repeated")  # fmt: skip
+@click.option("--hand-eye", is_flag=True, help="where a camera sits, from poses of gripper and target")
+@click.option("--eye-to-hand", is_flag=True, help="the camera is beside the robot, the target in the hand")
+@click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
+              help="between stamps that are paired  [default: 50ms]")  # fmt: skip
+@click.option("--points", is_flag=True, help="A<-B from points that are the same in both")
+@click.option("--scale", is_flag=True, help="of A to B too")
+@click.option("--names", type=Parsed("names", _read_names), metavar="NAME,..",
+              help="BASE,GRIPPER,CAMERA,TARGET, or A,B")  # fmt: skip
+@click.option("--no-robust", is_flag=True, help="use all rows, wrong ones too")
+@click.option("--report", type=Parsed("report", _read_report), metavar="FILE.json|csv",
+              help="numbers of the fit and of each row")  # fmt: skip
+@reading_options()
+@pose_options
+@rotation_options
+@result_options("tree", "trajectory")
+def command(
+    files: Sequence[str], hand_eye: bool, points: bool, eye_to_hand: bool, max_gap_ns: int | None, scale: bool,
+    root: str | None, fix: Sequence[str], without: Sequence[str], names: Sequence[str] | None, no_robust: bool,
+    report: str | None, normalize: bool, **options: Any,
+) -> int:  # fmt: skip
+    """Solve for the transforms that measurements mean, with sigmas; what does not agree is left out and named.
+
+    \b
+      frametool solve measurements.yaml -o solved.yaml
+      frametool solve --hand-eye gripper.csv target.csv -o camera.yaml
+      frametool solve --hand-eye hand_eye_samples.json -f handeye
+      frametool solve --points points_a.csv points_b.csv --scale --report fit.json
+
+    A measurement is {parent, child, a pose, sigma or covariance}: the pose of child in parent; YAML, JSON, CSV or
+    whatever `tree` reads. The result is a tree with covariances, of all frames in one root. GRIPPER holds
+    base<-gripper, TARGET camera<-target, row by row or by their stamps; SAMPLES are {gripper, target}, or of
+    moveit_calibration or easy_handeye. Points are matched by id, else by row; a column weight counts.
+    """
+    _use_one_thread()
+    shape = "--hand-eye" if hand_eye else "--points" if points else ""
+    if hand_eye and points:
+        raise click.UsageError("--hand-eye and --points are two things; give one")
+    _refuse_misuse(files, shape, names)
+    if hand_eye and len(files) == 1:
+        refuse_unused("is not used: SAMPLES are pairs, in YAML or JSON", "max_gap_ns", "input_forms", *LEFT_OPEN)
+    path, force = options["output"], options["force"]
+    if report and path and realpath(report) == realpath(path):
+        raise click.UsageError("--report and -o name one file")
+    for name in filter(None, (report, path)):
+        refuse_existing(name, force=force)
+    output = Output("tree", "trajectory", **options)
+    if scale and output.style.form not in FORMS_OF_SCALE:
+        raise ValueInvalid(f"{output.style.form} has no place for a scale; write json, yaml or csv")
+    from frametool.cli import solving
+
+    how = {"robust": not no_robust, "normalize": normalize}
+    if hand_eye:
+        found = solving.solved_hand_eye(
+            files, eye_to_hand=eye_to_hand, max_gap_ns=max_gap_ns, names=names, **how
+        )
+    elif points:
+        found = solving.solved_points(files, names=names, scale=scale, robust=not no_robust)
+    else:
+        found = solving.solved_tree(files, root=root, fix=fix, without=without, **how)
+    from frametool.view.solution_text import write_left_out, write_solution
+
+    said = (write_left_out if settings().quiet else write_solution)(found)
+    if said:
+        tell(said.rstrip("\n"))
+    if report:
+        _write_report(found, report, force=force)
+    _write(output, found, on_hand=not eye_to_hand)
+    return ROWS_SKIPPED if found.left_out else 0
+
+
+def _use_one_thread() -> None:
+    """Make sums come out in one order, whatever the surroundings say: the same bytes each run."""
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ[f"{library}_NUM_THREADS"] = "1"
+
+
+def _refuse_misuse(files: Sequence[str], shape: str, names: Sequence[str] | None) -> None:
+    """Raise a usage error for options of another shape, and for too many or too few files."""
+    refuse_unused(f"is not used {f'with {shape}' if shape else 'without --hand-eye or --points'}", *UNUSED[shape])
+    if not shape and names:
+        refuse_unused("is not used without --hand-eye or --points", "names")
+    refuse_two_readers(files)
+    if shape == "--hand-eye" and len(files) > 2:
+        raise click.UsageError(f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {len(files)} files")
+    if shape == "--points" and len(files) != 2:
+        raise click.UsageError(f"--points takes two files, A B, found {len(files)}")
+    if names and len(names) != (wanted := 4 if shape == "--hand-eye" else 2):
+        said = "four names, BASE,GRIPPER,CAMERA,TARGET" if wanted == 4 else "two names, A,B"
+        raise click.UsageError(f"--names takes {said}")
+
+
+def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
+    """Write the result: a tree, or entries where there is a scale; as hand-eye calibration only the camera."""
+    entries = [each for each in found.frames if each.parent is not None]
+    if output.style.form == "csv" or found.scale_sigma is not None:
+        from frametool.grammar.pose import Pose
+        from frametool.grammar.result import Result, uncertain
+
+        is_pose = found.scale == 1.0
+        if not is_pose:  # as the grammar has it
+            warn("covariance left out: it has no place beside a scale; --report has the sigmas")
+        poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
+        covariances = [uncertain(each.covariance if is_pose else None) for each in entries]
+        output.poses([Result(*each) for each in zip(poses, covariances, strict=True)])
+    elif output.style.form == "handeye" and found.shape == "hand-eye":
+        from frametool.formats.trees.handeye import write_mount
+
+        camera, target = entries
+        warn(f"handeye: {shown(target.name)} in {shown(str(target.parent))} and covariances left out")
+        output.text(write_mount(str(camera.parent), camera.name, camera.components, output.style, on_hand=on_hand))
+    else:
+        from frametool.frames.lookups import FrameTree
+        from frametool.geometry.transform import Transform
+
+        tree = FrameTree("the result")
+        for each in found.frames:
+            if each.parent is None:
+                tree.add_root(each.name)
+            else:
+                tree.add(each.parent, each.name, Transform.of(*each.components), each.covariance)
+        output.tree(tree)
+
+
+def _write_report(found: Solution, path: str, *, force: bool) -> None:
+    """Write the numbers of the fit as one document, or those of its rows as a table."""
+    from frametool.view.solution_text import report, row_report
+
+    if REPORTS[splitext(path)[1].lower()] == "csv":
+        from frametool.formats.rows.csv import write_points
+        from frametool.grammar.result import Style
+
+        text = write_points([row_report(each, in_cells=True) for each in found.rows], Style("csv"))
+    else:
+        from frametool.documents.json import dump
+
+        text = f"{dump(report(found))}\n"
+    with writing(path, force=force) as write:
+        write(text)

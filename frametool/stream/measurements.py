@@ -1,0 +1,343 @@
+"""Measurements of frames in one another, and the files they are read from.
+
+    measurements: [{parent: base, child: lidar, xyz: [1, 0, 2], rpy_deg: [0, 0, 90], sigma: {xyz: 0.01, rpy_deg: 1}}]
+    parent,child,x,y,z,qx,qy,qz,qw,sigma_xyz,sigma_rpy_deg,id         one a row; pairs may repeat
+    {"parent": "base", "child": "lidar", "xyz": [1, 0, 2]}            one a line
+
+Whatever holds a tree is read too: each of its edges measures.  Poses are read as records and rows are anywhere.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from math import radians
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+from frametool.documents.document import locate_many, parse_documents
+from frametool.documents.source import Verbatim
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
+from frametool.formats.load import Place, close_all, lines_of
+from frametool.formats.trees.tree_reader import read_edges, shown_keys
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+from frametool.grammar.covariance import AXES, columns, find_columns, in_unit, is_sigma, of_sigmas
+from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
+from frametool.grammar.pose import UNCERTAIN, Pose, inverted, read_angle_unit
+from frametool.grammar.readers import Misfit, Reading, kind, read_number, tell, within
+from frametool.stream.record import INNER, KNOWN, find_records, placed, value_at
+from frametool.stream.record_values import pose_of, stamp_of
+from frametool.stream.request import COMBINED, Operation, Request
+from frametool.stream.row_layout import POSE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from frametool.formats.load import Recording
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Path
+    from frametool.stream.record import Record
+    from frametool.stream.row_layout import Shape
+    from frametool.text.lines import ByteStream
+
+LISTS = ("measurements", "frames")
+CHILD = "child"
+OURS = frozenset((*KNOWN, *NAME_KEYS, *STAMP_KEYS, *INNER, CHILD, "id", "children", "samples", "header"))
+MISSPELT = ("parent", CHILD, *UNCERTAIN, "inverse", "angles")  # keys that nobody else would miss
+LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
+WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # of JSON that holds messages rather than rows
+TABLES = ("csv", "tsv", "semicolon")
+MOVED = Operation(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))  # by nothing: so that covariances count
+
+
+class Measurement(NamedTuple):
+    """The pose of a child in its parent, as somebody measured it.
+
+    components: tx, ty, tz, x, y, z, w; metres
+    covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
+    place: where it stands, `m.yaml:12`, and its column behind that where several stand on a line
+    written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
+    """
+
+    parent: str
+    child: str
+    components: Rigid
+    covariance: tuple[float, ...] | None = None
+    place: str = ""
+    id: str | None = None
+    written: tuple[str, tuple[float, float, float]] | None = None
+
+    @property
+    def transform(self) -> Transform:
+        """Return parent_from_child."""
+        return Transform.of(*self.components)
+
+    def turned(self, x: float, y: float, z: float, w: float) -> Transform:
+        """Return it with another quaternion."""
+        return Transform.of(*self.components[:3], x, y, z, w)
+
+    def shifted(self, factor: float) -> Transform:
+        """Return it with its translation times a factor."""
+        x, y, z, *turn = self.components
+        return Transform.of(x * factor, y * factor, z * factor, *turn)
+
+    def reread(self, change: Callable[[float], float]) -> Transform | None:
+        """Return it with the numbers of its rotation changed; None where it was not written in angles."""
+        if self.written is None:
+            return None
+        kind, angles = self.written
+        read = Rotation.from_rpy if kind == "rpy" else Rotation.from_rotvec
+        return self.turned(*read([change(angle) for angle in angles]).components)
+
+
+class Row(NamedTuple):
+    """A measurement as read, its line, its time if it says one, and its column where that is known."""
+
+    measurement: Measurement
+    line: int
+    stamp_ns: int | None = None
+    column: int = 0
+
+
+def read_measurements(
+    files: Sequence[Recording], *, degrees: bool = False, normalize: bool = False
+) -> list[Measurement]:
+    """Read the measurements of files, in their order.
+
+    degrees: the unit of bare angles; normalize: take any non-zero quaternion and any matrix near a rotation
+    Raises FormatError with the place of what is no measurement: a frame that moves, or is measured from itself, an
+    exact one; a missing name or pose.
+    """
+    request = Request(kind=POSE, degrees=degrees, normalize=normalize)
+    found: list[Measurement] = []
+    try:
+        for file in files:
+            first: dict[tuple[str, str], Row] = {}
+            rows: list[Row] = []
+            for row in _reader(file)(file, request):
+                if problem := _problem(row, first):
+                    raise FormatError(problem, source=file.name, line=row.line)
+                rows.append(row)
+            if not rows:
+                raise FormatError(f"no measurements in it; {LIKE}", source=file.name)
+            many = Counter(row.line for row in rows)
+            for row in rows:
+                column = row.column if many[row.line] > 1 else 0
+                place = ":".join(str(part) for part in (file.name, row.line, column) if part)
+                found.append(row.measurement._replace(place=place))
+    finally:
+        close_all(files)
+    return found
+
+
+def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[Measurement]:
+    """Return the measurements but those that stand at some places, FILE:LINE.
+
+    Raises ValueInvalid for a place where none stands, or several.
+    """
+    there = {each.place: parted(each.place) for each in measurements}
+    for place in (each for each in places if each not in there):
+        file, line, _ = parted(place)
+        own = [(abs(at[1] - line), each) for each, at in there.items() if line and at[0] == file]
+        files = ", ".join(dict.fromkeys(name for name, *_ in there.values()))
+        known = f"the nearest stand at {', '.join(each for _, each in sorted(own)[:3])}" if own else ""
+        raise ValueInvalid(f"no measurement stands at {shown(place)}; {known or f'give FILE:LINE of {files}'}")
+    many = Counter(each.place for each in measurements)
+    if several := next((place for place in places if many[place] > 1), ""):
+        raise ValueInvalid(f"{several} holds {many[several]} measurements; write each on a line of its own")
+    return [each for each in measurements if each.place not in places]
+
+
+def parted(place: str) -> tuple[str, int, int]:
+    """Take a place apart: file, line, column; 0 where it does not say that."""
+    file, line, column = re.fullmatch(r"(?s)(.*?)(?::(\d+))?(?::(\d+))?", place).groups("0")  # type: ignore[union-attr]
+    return file, int(line), int(column)
+
+
+def _reader(file: Recording) -> Callable[[Recording, Request], Iterator[Row]]:
+    is_rows = file.form == "jsonl" and not re.search(WRAPPED, file.head())
+    if is_rows or not file.holds_samples:
+        return _of_documents
+    return _of_table if file.form in TABLES else _of_edges
+
+
+def _problem(row: Row, first: dict[tuple[str, str], Row]) -> str:
+    """Say what is wrong with a measurement; first: of each pair the first one that says a time."""
+    parent, child, components, covariance = row.measurement[:4]
+    if missing := [key for key, name in (("parent", parent), (CHILD, child)) if not name]:
+        return f"missing {' and '.join(missing)}; {LIKE}"
+    if parent == child:
+        return f"{shown(child)} is measured from itself"
+    sigmas = covariance[::7] if covariance is not None else (1.0,)
+    if not all(sigmas):
+        halves = [name for name, half in (("xyz", sigmas[:3]), ("rpy", sigmas[3:])) if not any(half)]
+        if len(halves) == 1:
+            return f"sigma of one half only, none of {halves[0]}: give both; what is exact goes into --fix"
+        return f"sigma of {AXES[sigmas.index(0.0)]} is 0; what is exact goes into --fix"
+    if row.stamp_ns is not None:
+        before = first.setdefault((parent, child), row)
+        if before.stamp_ns != row.stamp_ns and before.measurement.components != components:
+            moves = f"{shown(child)} moves in {shown(parent)}: another stamp than on line {before.line}"
+            return f"{moves}; measure what stands still, and leave the stamps out if it does"
+    return ""
+
+
+def _of_edges(file: Recording, request: Request) -> Iterator[Row]:
+    """Yield the edges of a file that holds a tree; what recordings say again at one time they say once."""
+    edges = [edge for edge in file.edges(normalize=request.normalize) if edge.parent is not None]
+    lines = lines_of([Place(file, edge) for edge in edges])
+    said = {edge[:4] if edge.stamp_ns is not None else at: at for at, edge in reversed([*enumerate(edges)])}
+    for at in sorted(said.values()):
+        edge, (_, line) = edges[at], lines[at]
+        yield Row(Measurement(edge.parent or "", edge.child, edge.components, edge.covariance), line, edge.stamp_ns)
+
+
+def _of_table(file: Recording, request: Request) -> Iterator[Row]:
+    """Yield the rows of a table."""
+    from frametool.geometry.representations import notation
+    from frametool.stream.row_poses import TablePoses, results_of
+    from frametool.stream.table_stream import begin_table
+
+    request = request._replace(operation=MOVED, notations=(notation("quaternion"),), keep_sign=True)
+    begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
+    rows = TablePoses(begun, file.form, request, file.name)
+    if rows.shape.notation is None:
+        raise FormatError(f"no rotation among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
+    line, bare = 1 + begun.lines, file.tally.names.bare
+    has_place = rows.shape.whole or rows.shape.unit is not None
+    for text in filter(None, (begun.rest, *begun.blocks)):
+        block = rows.of_block(text)
+        for below, column, reason, *_ in rows.faults:
+            raise FormatError(f"{column}{': ' * bool(column)}{reason}", source=file.name, line=line + below)
+        results = results_of(block, columns() if rows.shape.covariance else (), placed=has_place)
+        for at, result, given in zip(block.lines.tolist(), results, rows.given.T.tolist(), strict=True):
+            pose, cells = result.pose, result.extras
+            try:
+                child = _one_child(cells.get(CHILD), pose.name)
+                inverse = _read_flag(cells.get("inverse"))
+            except ValueInvalid as error:
+                raise FormatError(str(error), source=file.name, line=line + at) from None
+            pose = pose._replace(covariance=cells.get("covariance"))
+            made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
+            written = None if inverse else _written(rows.shape, given)
+            yield Row(made._replace(written=written), line + at, cells.get("stamp_ns"))
+        line += text.count(b"\n")
+    file.tally.rough += [1] * rows.mended
+    file.tell()
+
+
+def _read_flag(cell: str | None) -> bool:
+    if cell not in (None, "true", "false"):
+        raise ValueInvalid(f"inverse must be true or false, found {shown(str(cell))}")
+    return cell == "true"
+
+
+def _of_documents(file: Recording, request: Request) -> Iterator[Row]:
+    """Yield the measurements of a YAML or JSON text."""
+    source = file.source
+    reading = Reading(source, normalize=request.normalize)
+    found: list[tuple[Measurement, Path, int | None]] = []
+    for document in parse_documents(source.text, source.name):
+        try:
+            for path, row in _rows(document.value, (document.index,), reading):
+                asked = request._replace(operation=COMBINED, degrees=reading.degrees or request.degrees)
+                for record, each in _of_row(row, path, asked, reading):
+                    last = max(at for at, step in enumerate(record.path) if type(step) is int)
+                    stamp_ns = stamp_of(document, record, source)
+                    found.append((each, record.path[: max(last + 1, len(path))], stamp_ns))
+        except Misfit as misfit:
+            raise placed(misfit, source) from None
+    tell(source, reading.notes)
+    places = locate_many(source.text, [path for _, path, _ in found], key=True)
+    for (made, _, stamp_ns), (line, column) in zip(found, places, strict=True):
+        yield Row(made, line, stamp_ns, column)
+
+
+def _rows(value: Any, path: Path, reading: Reading) -> Iterator[tuple[Path, Any]]:
+    """Yield the rows of a document with their paths; what is nested gets the names that nesting tells."""
+    reading.degrees = False
+    if type(value) is dict and (keys := [key for key in LISTS if key in value]):
+        key = keys[0]
+        if unknown := [each for each in value if each not in (key, "angles")]:
+            message = f"unknown key {shown(unknown[0])} beside {key}; expected angles"
+            raise Misfit(message, (*path, unknown[0]), key=True)
+        reading.degrees = "angles" in value and within(path, read_angle_unit, value["angles"])
+        if type(value[key]) is dict and key == "frames":
+            edges = within(path, lambda: [*read_edges(value, Reading(reading.source, normalize=reading.normalize))])
+            for edge in edges:
+                here = edge.path[: -2 if "samples" in edge.path[-2:-1] else None]
+                if edge.parent is not None:
+                    names = {"parent": edge.parent, CHILD: edge.child}
+                    yield (*path, *here), (value_at(value, here) or {}) | names
+            return
+        value, path = value[key] or [], (*path, key)
+    elif type(value) is dict:
+        yield path, value
+        return
+    if type(value) is not list:
+        raise Misfit(f"expected a list of measurements, found {kind(value)}; {LIKE}", path)
+    for at, row in enumerate(value):
+        yield (*path, at), row
+
+
+def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterator[tuple[Record, Measurement]]:
+    """Yield what one row of a document measures: one pose, or those of the transforms of a message."""
+    if type(row) is not dict:
+        raise Misfit(f"expected a measurement, found {kind(row)}; {LIKE}", path)
+    if OURS.isdisjoint(row):
+        raise Misfit(f"expected measurements:, frames: or a row, found the keys {shown_keys(row)}; {LIKE}", path)
+    if "samples" in row:
+        raise Misfit("a frame that moves is not solved for; measure what stands still", (*path, "samples"), key=True)
+    if set(row) == {"name"}:
+        return  # a list of frames may name its roots
+    for key in row:
+        if key not in OURS and not is_sigma(key) and (hint := did_you_mean(key, MISSPELT, cutoff=0.75)):
+            raise Misfit(f"unknown key {shown(key)}{hint}", (*path, key), key=True)
+    plain = {key: each for key, each in row.items() if key not in (CHILD, "id", "children")}
+    plain = within(path, _with_columns, plain, request)
+    for record in find_records(plain, request, reading, path):
+        if not record.values:
+            raise Misfit(f"no pose; {LIKE}", path)
+        pose = pose_of(record, request)
+        child = within(path, _one_child, row.get(CHILD), pose.name)
+        label = row.get("id") if type(row.get("id")) is str else None
+        made = _made(pose, reading.bare(pose.parent or ""), reading.bare(child), label)
+        own = record.values[: record.shape.own_size]
+        yield record, made._replace(written=None if record.shape.inverse else _written(record.shape, own))
+
+
+def _with_columns(row: dict[str, Any], request: Request) -> dict[str, Any]:
+    """Return a row with the covariance that its keys say which are called as columns: sigma_x, c11."""
+    names = [key for key in row if is_sigma(key) or key in columns()]
+    places, sigma = find_columns(names, 36)
+    if not places:
+        return row
+    numbers = [within((name,), read_number, row.pop(name)) for name in names]
+    if sigma:
+        units = [(at, unit or "deg" * (request.degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma)]
+        numbers = [*of_sigmas([in_unit(numbers[places[at]], unit) if at >= 0 else 0.0 for at, unit in units])]
+    if not UNCERTAIN.isdisjoint(row):
+        raise Misfit("sigma and covariance in one row; keep one")
+    return row | {"covariance": [repr(number) for number in numbers]}
+
+
+def _one_child(child: Any, name: str | None) -> str:
+    """Return the name of the frame that is measured, under either key; raises Misfit where they differ."""
+    if child is not None and (type(child) not in (str, Verbatim) or not child):
+        raise Misfit(f"child must be a frame's name, found {kind(child)}", (CHILD,))
+    if child and name and child != name:
+        raise Misfit(f"child says {shown(child)} and name says {shown(name)}; keep one", (CHILD,))
+    return str(child or name or "")
+
+
+def _made(pose: Pose, parent: str, child: str, label: str | None) -> Measurement:
+    return Measurement(parent, child, pose.components, pose.covariance, "", label and str(label))
+
+
+def _written(shape: Shape, own: Sequence[float]) -> tuple[str, tuple[float, float, float]] | None:
+    """Return the angles that a rotation was written in; None where it was written otherwise."""
+    name = shape.notation.representation.name if shape.notation else ""
+    if name not in ("rpy", "rotvec"):
+        return None
+    a, b, c = (radians(angle) if shape.degrees else angle for angle in shape.rotation(own))
+    return name, (a, b, c)

@@ -1,0 +1,352 @@
+"""What hand-eye and matched points are solved from: pairs of poses, and points with their ids and weights.
+
+- {gripper: {xyz: [..], rpy: [..]}, target: {..}}                      samples as one writes them
+- {effector_wrt_world: [16 numbers], object_wrt_sensor: [..]}          of moveit_calibration
+samples: [{robot: {translation: .., rotation: ..}, tracking: {..}}]    of easy_handeye2 (`optical` in the first)
+id,x,y,z,weight                                                        points, in any form that holds such
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from frametool.documents.document import locate_many, parse_documents
+from frametool.documents.source import InputFile
+from frametool.errors import FormatError, ValueInvalid, bare, shown
+from frametool.formats.detect import detect
+from frametool.formats.table import FORMATS
+from frametool.formats.trees.tree_reader import shown_keys
+from frametool.geometry.transform import Transform
+from frametool.grammar.pose import inverted, read_pose
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, tell, within
+from frametool.grammar.result import Style
+from frametool.stream.as_poses import FormatConverter
+from frametool.stream.record import placed, value_at
+from frametool.stream.record_values import documents, pose_of
+from frametool.stream.request import Operation, Request
+from frametool.stream.row_poses import plain_cells
+from frametool.stream.run import Outcome, run
+from frametool.stream.trajectories import TREE
+from frametool.text.numbers import parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from io import BufferedReader
+
+    from frametool.documents.document import Document
+    from frametool.geometry.types import Array
+    from frametool.grammar.edges import Answers
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.readers import Path
+    from frametool.stream.faults import BadRows
+
+ROBOT = "robot"
+PARTNERS = {"gripper": ("target",), "effector_wrt_world": ("object_wrt_sensor",), ROBOT: ("tracking", "optical")}
+LIKE = "{gripper: POSE, target: POSE}"
+IDS, WEIGHT = ("id", "name"), "weight"
+MOST_NAMED = 5
+
+
+class Samples(NamedTuple):
+    """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
+
+    places: where each stands; names: of base, gripper, camera and target, None where nothing says one
+    files: what they are called; taken: how a form's own words were taken; told: sentences on what has no partner
+    """
+
+    gripper: Transform
+    target: Transform
+    places: list[str]
+    names: tuple[str | None, ...]
+    files: tuple[str, ...]
+    taken: str = ""
+    told: Sequence[str] = ()
+
+
+def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -> Samples:
+    """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2.
+
+    eye_to_hand: easy_handeye has gripper_from_base as `robot` then; it is inverted.
+    Raises FormatError with the place.
+    """
+    file = InputFile(argument)
+    try:
+        source = file.source
+    finally:
+        file.close()
+    reading = Reading(source, normalize=normalize)
+    found: list[tuple[Pose, Pose]] = []
+    paths: list[Path] = []
+    values: list[Any] = []
+    for document in parse_documents(source.text, source.name):
+        try:
+            for path, value in _listed(document.value):
+                values.append(value)
+                reading.here = (document.index, *path)
+                found.append(within(path, _sample, value, reading, eye_to_hand=eye_to_hand))
+                paths.append(reading.here)
+        except Misfit as misfit:
+            raise misfit.placed(source, document.index) from None
+    if not found:
+        raise FormatError(f"no samples in it; each is {LIKE}", source=source.name)
+    tell(source, reading.notes)
+    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
+    sides = [[*each] for each in zip(*found, strict=True)]
+    names = [_one_name(each, places) for side in sides for each in ([p.parent for p in side], [p.name for p in side])]
+    taken = ""
+    if any(ROBOT in value for value in values):
+        ways = ("gripper<-base, inverted", "with") if eye_to_hand else ("base<-gripper", "without")
+        taken = f"robot is taken for {ways[0]}, as easy_handeye has it {ways[1]} --eye-to-hand"
+    return Samples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), (source.name,), taken)
+
+
+def _listed(value: Any) -> Iterator[tuple[Path, Any]]:
+    """Yield the samples of a document with their paths."""
+    path: Path = ()
+    if type(value) is dict and "samples" in value:
+        value, path = value["samples"], ("samples",)
+    elif type(value) is dict and not PARTNERS.keys().isdisjoint(value):
+        yield (), value
+        return
+    if type(value) is not list:
+        found = f"the keys {shown_keys(value)}" if type(value) is dict else kind(value)
+        raise Misfit(f"expected samples {LIKE}, found {found}; two files of poses are GRIPPER TARGET", path)
+    yield from (((*path, at), each) for at, each in enumerate(value))
+
+
+def _sample(value: Any, reading: Reading, *, eye_to_hand: bool) -> tuple[Pose, Pose]:
+    """Read base_from_gripper and camera_from_target of one sample."""
+    sample = as_mapping(value, f"a sample {LIKE}")
+    first = next((key for key in PARTNERS if key in sample), None)
+    if first is None:
+        raise Misfit(f"no sample; expected {LIKE}, found the keys {shown_keys(sample)}")
+    second = next((key for key in PARTNERS[first] if key in sample), None)
+    if second is None:
+        raise Misfit(f"missing {PARTNERS[first][0]} beside {first}")
+    gripper, target = (within((key,), _pose, sample[key], reading) for key in (first, second))
+    if first == ROBOT and eye_to_hand:
+        gripper = inverted(gripper)._replace(name=gripper.parent, parent=gripper.name)
+    return gripper, target
+
+
+def _pose(value: Any, reading: Reading) -> Pose:
+    """Read a pose in our grammar, as a matrix of 16 numbers, or as a message; it has a rotation."""
+    if type(value) is list:
+        if len(value) not in (4, 16):
+            raise Misfit(f"expected the 16 numbers of a 4x4 matrix, found {len(value)}")
+        rows = value if len(value) == 4 else [value[at : at + 4] for at in range(0, 16, 4)]
+        return read_pose({"matrix": rows}, reading)
+    pose = as_mapping(value, "a pose")
+    header = pose.get("header")
+    frames = {"parent": header.get("frame_id") if type(header) is dict else None, "name": pose.get("child_frame_id")}
+    inner = pose.get("transform", {key: each for key, each in pose.items() if key not in ("header", "child_frame_id")})
+    whole = as_mapping(inner, "a pose") | {key: name for key, name in frames.items() if type(name) is str and name}
+    found = within(("transform",), read_pose, whole, reading) if "transform" in pose else read_pose(whole, reading)
+    if found.rotation is None:
+        raise Misfit("the pose has no rotation")
+    if found.covariance is not None:
+        reading.note("the covariance of a sample is not used: all count alike", rule="left-out")
+    return found
+
+
+def _batch(poses: Sequence[Pose]) -> Transform:
+    return Transform.of(*np.array([pose.components for pose in poses]).T.copy())
+
+
+def _one_name(names: Sequence[str | None], places: Sequence[str]) -> str | None:
+    """Return the one name that samples give a frame; raises ValueInvalid where they give several."""
+    known = [*dict.fromkeys(filter(None, names))]
+    if len(known) > 1:
+        raise ValueInvalid(f"{places[names.index(known[1])]}: {shown(known[1])} is {shown(known[0])} in other samples")
+    return known[0] if known else None
+
+
+class Points(NamedTuple):
+    """Points of a file, (n, 3), metres.
+
+    ids, weights: of each, None where the file has none; places: where each stands; frame: the one they are given in
+    """
+
+    file: str
+    xyz: Array
+    ids: list[str] | None
+    weights: list[float] | None
+    places: list[str]
+    frame: str | None
+
+
+def read_points(argument: str, *, form: str, answers: Answers, policy: Callable[[str], BadRows]) -> Points:
+    """Read the points of a file in any form that holds such, with what is called `id` or `name`, and `weight`.
+
+    Raises FormatError with the place.
+    """
+    import re
+
+    file = InputFile(argument)
+    try:
+        form = form or detect(file.head(), "rows", "arrays", "records", name=file.path)[0]
+        if "records" in FORMATS[form].reads and not re.search(TREE, file.head()):
+            return _of_documents(file)
+        return _of_rows(file, form, answers, policy(file.name))
+    finally:
+        file.close()
+
+
+def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Points:
+    """Gather the points of a table, or of columns of numbers."""
+    if {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
+        raise FormatError(f"no points in it: {FORMATS[form].summary}", source=file.name)
+    converter = FormatConverter(form, Request(Operation(moves=True)), Style("json"), file.name, answers)
+    numbers: list[Any] = []
+    beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
+    lines: list[int] = []
+    frames: set[str | None] = set()
+
+    def gathered() -> Iterator[Outcome]:
+        first = int(converter.is_table)
+        for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
+            if size := len(poses.numbers):
+                if poses.numbers.shape[1] < 3 or not converter.placed:
+                    raise FormatError("no positions in it: rotations alone are no points", source=file.name)
+                numbers.append(poses.numbers[:, :3])
+                lines.extend((poses.lines + first).tolist())
+                frames.update(poses.parents)
+                given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in beside}
+                if poses.names[0] is not None:
+                    given[IDS[1]] = [*poses.names] if len(poses.names) == size else [*poses.names] * size
+                for key, cells in beside.items():
+                    cells.extend(given.get(key, [None] * size))
+            first += outcome.lines
+            yield outcome
+
+    run(gathered(), lambda _: None, bad, lambda *_: None)
+    if not numbers:
+        raise FormatError("no points in it", source=file.name)
+    on_lines = "arrays" not in FORMATS[form].reads
+    places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in enumerate(lines, 1)]
+    return _points(file.name, np.concatenate(numbers), beside, places, frames)
+
+
+def _of_documents(file: InputFile) -> Points:
+    """Gather the points of YAML or JSON."""
+    source, request = file.source, Request()
+    xyz: list[Any] = []
+    beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
+    paths: list[Path] = []
+    frames: set[str | None] = set()
+    for document, records in documents(source, request):
+        for record in records:
+            position = pose_of(record, request).position
+            if position is None:
+                raise placed(Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path), source)
+            xyz.append(position)
+            paths.append(record.path)
+            frames.add(record.parent.text)
+            around = _around(document, record.path)
+            for key, cells in beside.items():
+                cells.append(around.get(key))
+    if not xyz:
+        raise FormatError("no points in it; each is {id: .., xyz: [x, y, z]}", source=source.name)
+    places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
+    return _points(source.name, np.array(xyz, float), beside, places, frames)
+
+
+def _around(document: Document, path: Path) -> dict[str, Any]:
+    """Return the members of a record and of the mappings that hold it, up to the item of a list that it is."""
+    found: dict[str, Any] = {}
+    for depth in range(len(path), 0, -1):
+        value = value_at(document.value, path[1:depth])
+        if type(value) is dict:
+            found = {key: each for key, each in value.items() if type(each) is str} | found
+        if depth > 1 and type(path[depth - 1]) is int:
+            break
+    return found
+
+
+def _points(
+    file: str, xyz: Array, beside: dict[str, list[Any]], places: list[str], frames: set[str | None]
+) -> Points:
+    """Check ids and weights."""
+    key = next((key for key in IDS if any(each is not None for each in beside[key])), None)
+    ids = None if key is None else [str(each) for each in beside[key]]
+    if key is not None and ids is not None:
+        first: dict[str, str] = {}
+        for given, place in zip(beside[key], places, strict=True):
+            if given is None:
+                raise ValueInvalid(f"{place}: no {key}, the others have one")
+            if (before := first.setdefault(given, place)) is not place:
+                raise ValueInvalid(f"{place}: {key} {shown(str(given))} stands twice, first at {before}")
+    weights = None
+    if any(each is not None for each in beside[WEIGHT]):
+        weights = [_weight(each, place) for each, place in zip(beside[WEIGHT], places, strict=True)]
+    frame = frames.pop() if len(frames) == 1 else None
+    return Points(file, xyz, ids, weights, places, frame)
+
+
+def _weight(text: Any, place: str) -> float:
+    try:
+        weight = parse_number(str(text))
+    except ValueInvalid as error:
+        raise ValueInvalid(f"{place}: weight: {error}") from None
+    if weight < 0.0:
+        raise ValueInvalid(f"{place}: weight is negative: {text}")
+    return weight
+
+
+class Matched(NamedTuple):
+    """Points of two files that belong together, (n, 3) each.
+
+    places, ids: of each in the first file; told: sentences on what has no partner
+    """
+
+    target: Array
+    source: Array
+    weights: list[float] | None
+    places: list[str]
+    ids: list[str] | None
+    told: list[str]
+
+
+def matched(a: Points, b: Points) -> Matched:
+    """Match points by their ids, or row by row where one file has none.
+
+    Raises ValueInvalid where nothing matches.
+    """
+    told = []
+    if a.ids is not None and b.ids is not None:
+        of_b = {name: at for at, name in enumerate(b.ids)}
+        rows = [at for at, name in enumerate(a.ids) if name in of_b]
+        others = [of_b[a.ids[at]] for at in rows]
+        if not rows:
+            raise ValueInvalid(f"{a.file} and {b.file} have no id in common: {_some(a.ids)} | {_some(b.ids)}")
+        for one, other in ((a, b), (b, a)):
+            known = {*(other.ids or ())}
+            if alone := [name for name in one.ids or () if name not in known]:
+                count = f"{len(alone)} of {len(one.xyz)} points have no partner in {other.file}"
+                told.append(f"{one.file}: {count}: {_some(alone)}")
+    elif len(a.xyz) != len(b.xyz):
+        raise ValueInvalid(f"{a.file} has {len(a.xyz)} points, {b.file} {len(b.xyz)}, and no ids to match them")
+    else:
+        rows = others = [*range(len(a.xyz))]
+        if a.ids is not None or b.ids is not None:
+            told.append(f"{(a if a.ids is None else b).file} has no ids: points are matched row by row")
+    weights = _weights(a, b, rows, others)
+    ids = a.ids or b.ids
+    return Matched(
+        a.xyz[rows], b.xyz[others], weights, [a.places[at] for at in rows], ids and [ids[at] for at in rows], told
+    )
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(map(bare, names[:MOST_NAMED])) + more
+
+
+def _weights(a: Points, b: Points, rows: Sequence[int], others: Sequence[int]) -> list[float] | None:
+    of_a = None if a.weights is None else [a.weights[at] for at in rows]
+    of_b = None if b.weights is None else [b.weights[at] for at in others]
+    if of_a and of_b and of_a != of_b:
+        raise ValueInvalid(f"{a.file} and {b.file} have different weights; keep one column {WEIGHT}")
+    return of_a or of_b

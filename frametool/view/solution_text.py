@@ -1,0 +1,235 @@
+"""What a solution says of itself: for people in 80 columns, for programs as a report."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import cells, printable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.geometry.types import Components, Rigid
+
+WIDTH = 80
+NAMED, LONGEST = 9, 18  # characters of a frame beside its numbers
+PLACED, LONGEST_PLACE = 30, 44  # characters of a place before its numbers
+MOST = 50  # frames
+LARGE, NOTHING = 1e5, 1e-6  # millimetres, degrees
+
+
+class SolvedFrame(NamedTuple):
+    """A frame of the result.
+
+    parent: None for a root; components: its pose there; covariance: 36 numbers, None where they are not known
+    rows: how many measurements of it are used; checked: whether its pose rests on loops only
+    fixed: whether its entry is one of --fix
+    """
+
+    name: str
+    parent: str | None
+    components: Rigid
+    covariance: Components | None
+    rows: int
+    checked: bool
+    fixed: bool = False
+
+
+class SolvedRow(NamedTuple):
+    """A measurement and how far it is off: metres, radians, and in sigmas (`u`).
+
+    counted: used or left out by the fit, not by its own weight of 0; fits: the blunder that explains it
+    """
+
+    place: str
+    row: int
+    id: str | None
+    parent: str
+    child: str
+    distance: float
+    angle: float | None
+    u: float
+    used: bool
+    checked: bool
+    fits: str | None = None
+    counted: bool = True
+
+    @property
+    def is_left_out(self) -> bool:
+        """Tell whether it was left out because it does not agree with the rest."""
+        return self.counted and not self.used
+
+
+class Solution(NamedTuple):
+    """What was solved: `shape` tree, hand-eye or points; sigma: of one axis, estimated, metres and radians.
+
+    turns: rms about the two main axes, radians; scale_sigma: of the scale, where it was solved for
+    """
+
+    shape: str
+    root: str | None
+    dof: int
+    rms_distance: float
+    rms_angle: float | None
+    sigma: tuple[float, float | None] | None
+    frames: list[SolvedFrame]
+    rows: list[SolvedRow]
+    noise_at: str | None = None
+    scale: float = 1.0
+    scale_sigma: float | None = None
+    turns: tuple[float, float] | None = None
+
+    @property
+    def used(self) -> int:
+        """Return how many measurements are used."""
+        return sum(each.used for each in self.rows)
+
+    @property
+    def left_out(self) -> list[SolvedRow]:
+        """Return the measurements that were left out."""
+        return [each for each in self.rows if each.is_left_out]
+
+
+def row_report(each: SolvedRow, *, in_cells: bool = False) -> dict[str, Any]:
+    """Return a measurement for programs; in_cells: as a row of a table."""
+    row = {key: value for key, value in each._asdict().items() if key != "counted"}
+    return {key: str(value).lower() if in_cells and isinstance(value, bool) else value for key, value in row.items()}
+
+
+def report(found: Solution) -> dict[str, Any]:
+    """Return a solution for programs."""
+    sigma = found.sigma and {"xyz": found.sigma[0], "rpy": found.sigma[1]}
+    frames = [
+        {"name": each.name, "parent": each.parent, "sigma": _sigmas(each), "rows": each.rows, "checked": each.checked}
+        for each in found.frames
+    ]
+    return {
+        "shape": found.shape, "root": found.root, "count": len(found.rows), "used": found.used, "dof": found.dof,
+        "rms_distance": found.rms_distance, "rms_angle": found.rms_angle, "sigma": sigma, "noise_at": found.noise_at,
+        "scale_sigma": found.scale_sigma, "frames": frames, "measurements": [row_report(each) for each in found.rows],
+    }  # fmt: skip
+
+
+def _sigmas(each: SolvedFrame) -> dict[str, list[float]] | None:
+    if each.covariance is None:
+        return None
+    roots = [math.sqrt(max(entry, 0.0)) for entry in each.covariance[::7]]
+    return {"xyz": roots[:3], "rpy_deg": [math.degrees(root) for root in roots[3:]]}
+
+
+def write_solution(found: Solution) -> str:
+    """Write the summary, the frames, and what was left out."""
+    lines = [_first(found)]
+    if found.sigma is not None and found.dof > 0:
+        lines.append(f"noise of one axis{_noise(found)}, estimated")
+    if found.turns is not None:
+        first, second = map(math.degrees, found.turns)
+        lines.append(f"turns seen: {first:.1f} deg rms about the main axis, {second:.1f} deg about the second")
+    if found.scale_sigma is not None:
+        lines.append(f"scale {found.scale:.9g} sigma {found.scale_sigma:.2g}")
+    return "".join(f"{line}\n" for line in [*lines, *_frames(found), *_left_out(found)])
+
+
+def write_left_out(found: Solution) -> str:
+    """Write what was left out, a line for each; nothing where all was used."""
+    return "".join(f"{line}\n" for line in _left_out(found))
+
+
+def _first(found: Solution) -> str:
+    count = f"{found.used} of {len(found.rows)}"
+    rms = f"rms {_mm(found.rms_distance)}" + ("" if found.rms_angle is None else f" {_deg(found.rms_angle)}")
+    if found.shape == "tree":
+        loops = sum(each.used and each.checked for each in found.rows)
+        return f"{len(found.frames)} frames from {count} measurements, {loops} in loops; {rms}"
+    if found.shape == "points":
+        return f"{_pair(found.frames[-1], None)} from {count} matched points; {rms}"
+    noise = f"noise at the {found.noise_at}; " if found.noise_at else ""
+    return f"hand-eye from {count} samples; {noise}{rms}"
+
+
+def _noise(found: Solution) -> str:
+    place, turn = found.sigma or (0.0, None)
+    return f" {_mm(place)}" + ("" if turn is None else f" {_deg(turn)}")
+
+
+def _mm(metres: float) -> str:
+    return f"{_fixed(1e3 * metres, 1)} mm"
+
+
+def _deg(radians: float) -> str:
+    return f"{_degrees(math.degrees(radians))} deg"
+
+
+def _degrees(value: float) -> str:
+    """Write a sigma in at most five characters."""
+    return f"{value:.2f}" if value < NOTHING or 0.005 <= value < 100 else f"{value:.0e}"
+
+
+def _fixed(value: float, decimals: int) -> str:
+    is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
+    return f"{value:.{decimals}f}" if is_plain else f"{value:.1e}"
+
+
+def _metres(value: float) -> str:
+    decimals = 4 if abs(value) < 100 else 2
+    return f"{round(value, decimals) + 0.0:.{decimals}f}" if abs(value) < 10_000 else f"{value:.1e}"
+
+
+def _pair(each: SolvedFrame, root: str | None) -> str:
+    """Return a frame's name, with its parent where that is not the root."""
+    return printable(each.name if each.parent in (None, root) else f"{each.parent}<-{each.name}")
+
+
+def _frames(found: Solution) -> Iterator[str]:
+    root = found.root if found.shape == "tree" else None
+    shown = [each for each in found.frames if each.parent is not None or each.name == root][:MOST]
+    width = min(max([NAMED, *(cells(_pair(each, root)) for each in shown)]), LONGEST)
+    yield f"  {'frame':<{width}}{'x':>9}{'y':>9}{'z':>9}{'sigma mm':>10}{'deg':>6}{'rows':>6}"
+    for each in shown:
+        if each.parent is None:
+            yield from _aligned(_pair(each, root), width, f"{each.rows:>49}  root")
+            continue
+        place = "".join(f" {_metres(part):>8}" for part in each.components[:3])
+        sigmas = _sigmas(each)
+        worst = ("-", "-")
+        if sigmas is not None:
+            worst = _fixed(1e3 * max(sigmas["xyz"]), 1), _degrees(max(sigmas["rpy_deg"]))
+        mark = "  fixed" if each.fixed else "" if each.checked else "  unchecked"
+        numbers = f"{place} {worst[0]:>9} {worst[1]:>5} {each.rows:>5}"
+        yield from _aligned(_pair(each, root), width, numbers + mark)
+    if (more := len(found.frames) - len(shown)) > 0 and found.shape == "tree":
+        yield f"  .. and {more} more; --report FILE.json has all"
+
+
+def _left_out(found: Solution) -> Iterator[str]:
+    rows = found.left_out
+    if not rows:
+        return
+    in_sigmas = found.shape != "tree"
+    names = [printable(_row_name(each, in_sigmas=in_sigmas)) for each in rows]
+    width = min(max([PLACED, *map(cells, names)]), LONGEST_PLACE)
+    yield f"{'left out':<{width + 2}}{'off mm':>9}{'deg':>7}" + (f"{'u':>8}" if in_sigmas else "")
+    for each, name in zip(rows, names, strict=True):
+        angle = "-" if each.angle is None else f"{math.degrees(each.angle):.1f}"
+        numbers = f"{_fixed(1e3 * each.distance, 1):>9} {angle:>6}" + (f" {_fixed(each.u, 1):>7}" if in_sigmas else "")
+        lines = [*_aligned(name, width, numbers)]
+        if each.fits:
+            words = f"fits when {each.fits}"
+            fits_beside = len(lines[-1]) + 2 + len(words) <= WIDTH
+            lines = [*lines[:-1], f"{lines[-1]}  {words}"] if fits_beside else [*lines, f"    {words}"]
+        yield from lines
+
+
+def _row_name(each: SolvedRow, *, in_sigmas: bool) -> str:
+    """Return where a measurement stands, and what it measures: of samples and points all measure the same."""
+    return f"{each.place} {each.id or f'row {each.row}' if in_sigmas else f'{each.parent}<-{each.child}'}"
+
+
+def _aligned(name: str, width: int, rest: str) -> Sequence[str]:
+    """Put a name before numbers; one that is too long stands on a line of its own, cut at the width."""
+    if cells(name) <= width:
+        return [f"  {name}{' ' * (width - cells(name))}{rest}"]
+    while cells(name) > WIDTH - 2:
+        name = f"{name[:-3]}.."
+    return [f"  {name}", f"  {'':<{width}}{rest}"]
