@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 NAMED, LONGEST = 9, 18  # characters of a frame beside its numbers
-PLACED, LONGEST_PLACE = 30, 44  # characters of a place before its numbers
+PLACED, LONGEST_PLACE = 30, 61  # characters of a place before its numbers
+OF_SIGMAS = 8
 MOST = 50  # frames
 LARGE, NOTHING = 1e5, 1e-6  # millimetres, degrees
 
@@ -208,8 +209,8 @@ def _left_out(found: Solution) -> Iterator[str]:
         return
     in_sigmas = found.shape != "tree"
     names = [printable(_row_name(each, in_sigmas=in_sigmas)) for each in rows]
-    width = min(max([PLACED, *map(cells, names)]), LONGEST_PLACE)
-    yield f"{'left out':<{width + 2}}{'off mm':>9}{'deg':>7}" + (f"{'u':>8}" if in_sigmas else "")
+    width = min(max([PLACED, *map(cells, names)]), LONGEST_PLACE - OF_SIGMAS * in_sigmas)
+    yield f"{'left out':<{width + 2}}{'off mm':>9}{'deg':>7}" + (f"{'u':>{OF_SIGMAS}}" if in_sigmas else "")
     for each, name in zip(rows, names, strict=True):
         angle = "-" if each.angle is None else f"{math.degrees(each.angle):.1f}"
         numbers = f"{_fixed(1e3 * each.distance, 1):>9} {angle:>6}" + (f" {_fixed(each.u, 1):>7}" if in_sigmas else "")
