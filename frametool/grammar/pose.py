@@ -34,6 +34,7 @@ MOST_NAMED = 5  # unknown keys in one message, if they fit into
 MOST_CHARACTERS = 80
 SCALE = "scale"
 UNCERTAIN = frozenset(("sigma", "covariance"))
+NOT_BOTH = "the covariance cannot be carried through a scale; leave one of them out"
 SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
 POSE_KEYS = frozenset(
     (*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *UNCERTAIN, "inverse", "angles", SCALE, AXES_KEY)
@@ -73,7 +74,12 @@ class Pose(NamedTuple):
 
     @property
     def placed(self) -> Components:
-        """Return the components, with the covariance or the scale behind them: as `geometry.placed` has them."""
+        """Return the components, with the covariance or the scale behind them: as `geometry.placed` has them.
+
+        Raises ValueInvalid for what has both.
+        """
+        if self.covariance is not None and self.scale != 1.0:
+            raise ValueInvalid(NOT_BOTH)
         return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))
 
     @property

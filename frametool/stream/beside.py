@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import FormatError, warn
 from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar.covariance import COVARIANCE, SIGMA, check, entries_of, find_columns, read_covariance
-from frametool.grammar.pose import SCALE, read_angle_unit, read_scale, refuse_scale
+from frametool.grammar.pose import NOT_BOTH, SCALE, read_angle_unit, read_scale, refuse_scale
 from frametool.grammar.readers import Misfit, NotARotation, within
 from frametool.ros.messages import whole_list
 from frametool.stream.layout import Kept, New
@@ -106,12 +106,12 @@ def with_scale(record: Record, value: Any, around: Path, above: Path, request: R
     if not request.operation.similar or around != record.path[len(above) :] or type(value) in (dict, list):
         within(around, refuse_scale, value)
         return record
-    if record.shape.covariance:
-        raise Misfit("a covariance and a scale in one entry; leave one of them out", (*around, SCALE), key=True)
     scale = within(around, read_scale, value)
+    if record.shape.covariance and request.operation.of != "arguments":
+        raise NotARotation(NOT_BOTH, (*around, SCALE), key=True)
     return record._replace(
-        shape=record.shape._replace(covariance=(1,)), numbers=(*record.numbers, (*above, *around, SCALE)),
-        values=(*record.values, scale), covariances=(SCALE,),
+        shape=record.shape._replace(covariance=(*record.shape.covariance, 1)), numbers=(*record.numbers, (*above, *around, SCALE)),
+        values=(*record.values, scale), covariances=(*record.covariances, SCALE),
     )  # fmt: skip
 
 

@@ -105,10 +105,11 @@ def pose_of(record: Record, request: Request) -> Pose:
         rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
     placed_at = shape.whole or shape.unit is not None
     pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
-    if shape.covariance == (36,):
-        pose = pose._replace(covariance=record.values[-36:])
-    elif shape.covariance:
-        pose = pose._replace(scale=record.values[-1])
+    beside = record.values[shape.own_size :]
+    if 36 in shape.covariance:
+        pose = pose._replace(covariance=beside[:36])
+    if 1 in shape.covariance:
+        pose = pose._replace(scale=beside[-1])
     return inverted(pose) if shape.inverse else pose
 
 

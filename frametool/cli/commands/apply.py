@@ -282,7 +282,7 @@ def _way_by_pose(argument: str, task: PoseTask, *, uncertain: bool, multiples: b
 
     if uncertain and pose.covariance is None:
         raise click.UsageError("--covariance: POSE has neither sigma nor covariance")
-    moved_by = pose.placed if uncertain or pose.scale != 1.0 else pose.components
+    moved_by = (pose if uncertain else pose._replace(covariance=None)).placed
     if pose.covariance is not None and not uncertain:
         warn(f"{source.name}: its covariance is not used (--covariance)")
 
