@@ -13,7 +13,7 @@ from frametool.cli.options import FULL, pose_reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of
 from frametool.cli.streaming import OPTIONS, Stream, stream_options
-from frametool.errors import FormatError, heard_by
+from frametool.errors import FormatError, heard_by, warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -123,6 +123,8 @@ class PoseTask:
             raise usage_if_inline(error) from None
         if len(found) != 1:
             raise click.UsageError(f"--explain derives one pose, {source.name} holds {len(found)}")
+        if found[0].pose.covariance is not None:
+            warn(f"{source.name}: --explain derives the pose alone; its covariance is left out")
         return found[0]
 
     def write(self, explanation: Explanation) -> int:

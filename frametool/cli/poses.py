@@ -340,6 +340,7 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
     given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(given) if each and each.beside]
     at = [0, *says_more, *_several(given)][-1] if stream is None else stream
+    _tell_of_twins(arguments, given)
     rows, timed = given[at], None
     if rows is not None and len(rows.poses) == 1:
         from frametool.grammar.pose_algebra import shared_stamp
@@ -350,6 +351,16 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
         for side in (given[:at], given[at + 1 :])
     )
     return Rows(at, rows.source if rows else "-", before, behind, timed)
+
+
+def _tell_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | None]) -> None:
+    """Say that the same uncertain pose twice counts as two that are independent."""
+    uncertain = [
+        argument for argument, each in zip(arguments, given, strict=True)
+        if each and any(pose.covariance is not None for pose in each.poses)
+    ]  # fmt: skip
+    if twice := [each for each in dict.fromkeys(uncertain) if uncertain.count(each) > 1]:
+        warn(f"{shown(twice[0])} stands twice: the two count as independent, as all poses do")
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:

@@ -107,9 +107,9 @@ def loops(
         else:
             near = tolerance or NEAR
             agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
-            # so that what is within `FITTING` sigmas is within the tolerance
-            halves = np.maximum(np.repeat([near.metres, near.radians], 3), LEAST) / FITTING / 6**0.5
-            information = np.diag(halves**-2.0)
+            # `FITTING` sigmas are reached where both halves reach the tolerance
+            sigma = np.maximum(np.repeat([near.metres, near.radians], 3), LEAST) / FITTING / 3**0.5
+            information = np.diag(sigma**-2.0)
         if not agrees:
             words = best_blunder(each, pose, information)
             off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg{sigmas} off the tree"

@@ -168,7 +168,7 @@ def taken(given: Any, size: int = POSE) -> Components:
 def wrong_count(count: int, sizes: Sequence[int]) -> str:
     """Say how many numbers there are and how many it takes."""
     each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
-    return f"covariance has {count} numbers; {' or '.join(each)}"
+    return f"covariance has {count} number{'s' * (count != 1)}; {' or '.join(each)}"
 
 
 def check(entries: Sequence[float]) -> None:
@@ -212,11 +212,12 @@ def bad_rows(entries: Sequence[Any]) -> dict[int, str]:
 
     size = 6 if len(entries) == 36 else 3
     rows = [[np.asarray(entries[size * i + j]) for j in range(size)] for i in range(size)]
-    suspect = rows[0][0] == UNKNOWN
+    wrong = rows[0][0] == UNKNOWN
     for i in range(size):
         for j in range(i):
             both = np.sqrt(abs(rows[i][i] * rows[j][j]))
-            suspect = suspect | (abs(rows[i][j] - rows[j][i]) > ASYMMETRY * both)
+            wrong = wrong | (abs(rows[i][j] - rows[j][i]) > ASYMMETRY * both)
+    suspect = wrong
     for k in range(size):  # as `_is_positive`, all rows at once
         below = [rows[i][k] for i in range(k + 1, size)]
         empty = (rows[k][k] == 0.0) & ~np.any([each != 0.0 for each in below], axis=0) if below else rows[k][k] == 0.0
@@ -225,8 +226,12 @@ def bad_rows(entries: Sequence[Any]) -> dict[int, str]:
         for i in range(k + 1, size):
             factor = rows[i][k] / pivot
             rows[i] = [*rows[i][: k + 1], *(rows[i][j] - factor * rows[k][j] for j in range(k + 1, size))]
+    doubtful = np.flatnonzero(suspect & ~wrong)
+    whole = np.stack([np.asarray(entry)[doubtful] for entry in entries], -1).reshape(-1, size, size)
+    values = np.linalg.eigvalsh(whole)
+    negative = doubtful[values[:, 0] < -NEGATIVE * abs(values[:, -1])]
     found = {}
-    for row in np.flatnonzero(suspect).tolist():
+    for row in (*np.flatnonzero(wrong).tolist(), *negative.tolist()):
         try:
             check([float(entry[row]) for entry in entries])
         except ValueInvalid as error:

@@ -12,7 +12,6 @@ from frametool.errors import ValueInvalid, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from typing import Any
 
 HEADER_FRAME = "header.frame_id"
 PARENT_KEYS = ("parent", "parent_frame_id", "frame_id", "frame")  # the frame that something is given in
@@ -84,21 +83,6 @@ def on_earth(names: Iterable[str]) -> str:
 def may_be_uncertain(name: str) -> bool:
     """Tell whether a column may be the first of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
     return name == "c11" or name.startswith(("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p"))
-
-
-def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
-    """Return numbers by name with those of a covariance, c11 .. c33 or c66, as the one list that mappings have."""
-    if not any(name.endswith("c11") for name in extras):
-        return extras
-    first = next(name for name in extras if name.endswith("c11"))
-    prefix = first.removesuffix("c11")
-    axes = "123456" if f"{prefix}c66" in extras else "123"
-    names = [f"{prefix}c{i}{j}" for i in axes for j in axes]
-    if not extras.keys() >= {*names}:
-        return extras
-    entries = [extras[name] for name in names]
-    whole = {f"{prefix}covariance": None if entries[0] is None else entries}
-    return {name: value for name, value in extras.items() if name not in names} | whole
 
 
 def without_mark(name: str) -> str:

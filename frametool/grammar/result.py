@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.representations import notation
-from frametool.grammar.names import with_entries
 from frametool.grammar.pose import NAMES, SCALE, Pose
 from frametool.grammar.rotation_spelling import spelled
 
@@ -125,6 +124,21 @@ class NoResult(Result):
             return dict(self.extras)
         entry = Result(self.pose).mapping(style)
         return {key: value if key in NAMES else None for key, value in entry.items()} | with_entries(self.extras)
+
+
+def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
+    """Return numbers by name with those of a covariance, c11 .. c33 or c66, as the one list that mappings have."""
+    if not any(name.endswith("c11") for name in extras):
+        return extras
+    first = next(name for name in extras if name.endswith("c11"))
+    prefix = first.removesuffix("c11")
+    axes = "123456" if f"{prefix}c66" in extras else "123"
+    names = [f"{prefix}c{i}{j}" for i in axes for j in axes]
+    if not extras.keys() >= {*names}:
+        return extras
+    entries = [extras[name] for name in names]
+    whole = {f"{prefix}covariance": None if entries[0] is None else entries}
+    return {name: value for name, value in extras.items() if name not in names} | whole
 
 
 def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:

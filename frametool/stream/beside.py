@@ -49,7 +49,7 @@ def with_covariances(
         request.gathered.uncertain = True
     if request.gathered is not None or is_left_out:
         return record._replace(others=(*record.others, *there, *[SIGMA] * has_sigma))
-    if operation.keeps_frames:
+    if operation.keeps_frames and not (shape.inverse or (has_sigma and request.canonical)):
         return record
     if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"

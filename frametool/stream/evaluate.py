@@ -10,10 +10,20 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats
 from frametool.geometry.batch_validation import read_rotations
-from frametool.geometry.uncertainty import bad_rows
+from frametool.geometry.uncertainty import FIRST_ORDER, WIDE, WIDE_RULE, bad_rows, widest_turn
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
-from frametool.stream.row_layout import FLAT, IDENTITY, LEAVES_PLANE, TURN, checked_rotation, doubt, wrong_tail
+from frametool.stream.row_layout import (
+    FLAT,
+    IDENTITY,
+    LEAVES_PLANE,
+    POSE,
+    TURN,
+    Shape,
+    checked_rotation,
+    doubt,
+    wrong_tail,
+)
 from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
 from frametool.stream.stamp_columns import (
     NOWHERE,
@@ -34,7 +44,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.gathering import Gathered
     from frametool.stream.request import Operation
-    from frametool.stream.row_layout import Shape, Target
+    from frametool.stream.row_layout import Target
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.stream.text_parts import Piece
@@ -117,6 +127,7 @@ class Run:
         self.columns = list(np.ascontiguousarray(numbers.T))
         with np.errstate(all="ignore"):
             moved = self._compute(self.columns, movers, state)
+            self._doubt_turns(moved)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
@@ -163,6 +174,17 @@ class Run:
                         self._blame(row, self.plan.names[at], reason)
                 at += size
             first += shape.size
+
+    def _doubt_turns(self, moved: Sequence[Components]) -> None:
+        """Tell of the first row whose turn is too uncertain for the first order."""
+        operation = self.plan.operation
+        for shape, parts in zip(self.plan.shapes or (Shape(POSE),), moved, strict=False):
+            if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
+                continue
+            entries = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
+            for row in np.flatnonzero(entries[21] + entries[28] + entries[35] > WIDE * WIDE)[:1].tolist():
+                if (width := widest_turn([float(entry[row]) for entry in entries])) > WIDE:
+                    self.rounded.append(RowNote(self.block.line_of(row), WIDE_RULE, FIRST_ORDER.format(width)))
 
     def _unit_of(self, column: int) -> bool | None:
         """Tell whether a number is in degrees; None if it is no angle."""

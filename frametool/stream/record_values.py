@@ -17,10 +17,10 @@ from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
 from frametool.formats.table import holds_arrays
 from frametool.geometry import floats
-from frametool.grammar.names import in_nanoseconds, stamp_column, with_entries
+from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
-from frametool.grammar.readers import Misfit, tell
-from frametool.grammar.result import NoResult, Result
+from frametool.grammar.readers import Misfit, NotARotation, Note, tell
+from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.documents.document import Document
-    from frametool.grammar.readers import Note, Path
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
     from frametool.stream.answers import Answer, Entry
     from frametool.stream.faults import BadRows
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
+SIX_BY_SIX = 36  # entries of the covariance of a pose
+WIDE_RULE = "wide"
 MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
@@ -150,14 +152,15 @@ def results(
     memory: of the records before this text; teller: of what was told before.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
-    own, memory = teller or Teller(), memory or Memory()
+    own, memory, request = teller or Teller(), memory or Memory(), request._replace(canonical=True)
     nodes: list[Node] = []
     spliced = _Spliced(source, request)
     units: dict[Path, tuple[Document, list[Answer]]] = {}
     documents = parse_documents(source.text, source.name)
     for document in documents:
         entries = read_entries(document, request, source, partial(own.tell, source))
-        answers = [each for entry in entries if (each := _answer(document, entry, request, source, memory)) is not None]
+        found = (_answer(document, entry, request, source, memory, own) for entry in entries)
+        answers = [each for each in found if each is not None]
         for each in answers:
             units.setdefault(_unit(each.entry.record, document.value), (document, []))[1].append(each)
         spliced.add(entries, answers)
@@ -182,7 +185,7 @@ def _unit(record: Record, document: Any) -> Path:
 
 
 def _answer(
-    document: Document, entry: Entry, request: Request, source: Source, memory: Memory
+    document: Document, entry: Entry, request: Request, source: Source, memory: Memory, own: Teller
 ) -> Answer | None:
     """Apply the operation to one record; the first of all has no velocity and so no result."""
     record = entry.record
@@ -190,11 +193,24 @@ def _answer(
         warn(f"{source.name}: frame {shown(entry.lost)} is left out: the frames of the result are not known")
     try:
         asked = request.for_kind(record.shape.kind)
-        return answer(entry, record.values, texts_of_stamp(document, entry), asked, memory)
+        found = answer(entry, record.values, texts_of_stamp(document, entry), asked, memory)
     except Misfit as misfit:
         raise placed(misfit, source) from misfit
     except ValueInvalid as error:
-        raise placed(Misfit(str(error), record.path), source) from error
+        bad = NotARotation(str(error), record.path)  # what was read well has no result
+        raise placed(bad, source) from bad
+    is_new = not (own.counts[WIDE_RULE] or asked.operation.uncertain)  # of what moves others that is told elsewhere
+    if found is not None and is_new and len(asked.operation.carried(record.shape)) == SIX_BY_SIX:
+        own.tell(source, [Note(WIDE_RULE, message, record.path) for message in too_wide(found.parts[-36:])])
+    return found
+
+
+def too_wide(entries: Sequence[float]) -> list[str]:
+    """Say that a turn is too uncertain for the first order, if it is."""
+    from frametool.geometry.uncertainty import FIRST_ORDER, WIDE, widest_turn
+
+    width = widest_turn(entries)
+    return [FIRST_ORDER.format(width)] if width > WIDE else []
 
 
 class _Spliced:

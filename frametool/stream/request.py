@@ -107,13 +107,15 @@ class Operation(NamedTuple):
 
     def carried(self, shape: Shape) -> tuple[str, ...]:
         """Name the entries of the covariance, or the scale, that the results of rows of a shape have."""
-        passes = self.formula is not None or (self.keeps_frames and not self.uncertain)
+        stays = self.keeps_frames and not (self.uncertain or shape.inverse or shape.rewritten)
+        passes = self.formula is not None or stays
         if passes or shape.kind not in (POSE, POINT, VECTOR):
             return ()
         sizes = {len(each) for each in (self.left, *self.right, self.fixed) if each is not None}
         if SCALED in sizes or 1 in shape.covariance or shape.multiple:
             return () if self.moves else (SCALE,)
-        if not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
+        of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
+        if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
             return ()
         from frametool.grammar.covariance import columns
 
@@ -299,6 +301,7 @@ class Request(NamedTuple):
     extra_column: the column or key of a stamp or weight that is read beside the pose; "" is the usual stamp
     gathered: takes the poses, nothing is written then
     all_numbers: all numbers of a result are wanted, also those that do not change
+    canonical: results are written anew rather than in the text of their records
     """
 
     operation: Operation = Operation()
@@ -327,6 +330,7 @@ class Request(NamedTuple):
     gathered: Gathered | None = None
     on_error: str = STOP
     all_numbers: bool = False
+    canonical: bool = False
 
     @property
     def in_order(self) -> bool:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.yaml_writer import quoted
 from frametool.geometry.representations import REPRESENTATIONS
-from frametool.grammar.names import PARENT_KEYS, with_entries
+from frametool.grammar.names import PARENT_KEYS
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result, Style
+from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR

@@ -32,9 +32,8 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
-from frametool.grammar.names import with_entries
 from frametool.grammar.pose import SCALE, Pose
-from frametool.grammar.result import Result
+from frametool.grammar.result import Result, with_entries
 from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, SIX, Target
 from frametool.stream.row_poses import (

@@ -48,7 +48,8 @@ def test_an_example_of_a_subject_runs(example: str, tmp_path: Path) -> None:
         ["bash", "-o", "pipefail", "-c", example], cwd=tmp_path, env=environment, capture_output=True, text=True,
         check=False, stdin=subprocess.DEVNULL,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    leaves_out = "frametool solve" in example or "--robust" in example
+    assert done.returncode in ((0, 3) if leaves_out else (0,)), done.stderr
     assert done.stdout or "|| true" in example or "check" in example
 
 

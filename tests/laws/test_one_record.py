@@ -87,7 +87,7 @@ SAME, NAMED, TIMED = range(3)
 INSIDE = "names: an inverse streamed as messages has its name inside the pose, where messages have none"
 SEAMS: list[tuple[str, int, str, str, str]] = [
     ("writing: a table of points is refused as JSON", SAME, "convert", "point, PointStamped, position, flat point", "table"),
-    (INSIDE, NAMED, "invert", "PoseStamped, PoseArray, Path", "lines"),
+    (INSIDE, NAMED, "invert", "PoseStamped, PoseWithCovarianceStamped, PoseArray, Path", "lines"),
 ]
 
 

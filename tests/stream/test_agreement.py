@@ -24,7 +24,7 @@ H = math.sqrt(0.5)
 HEADER = {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "a"}
 XYZ, NEW = {"x": 1, "y": 2, "z": 3}, {"x": 0, "y": 0, "z": H, "w": H}
 TURNS = {"linear": XYZ, "angular": {"x": 0, "y": 0, "z": 1}}
-COVARIANCE = [float(at % 7 == 0) for at in range(36)]
+COVARIANCE = [0.015625 * (at % 7 == 0) for at in range(36)]
 RECORDS: dict[str, dict[str, Any]] = {
     "point": {"frame": "a", "point": [1, 2, 3], "k": 1},
     "vector": {"vector": [1, 2, 3]},

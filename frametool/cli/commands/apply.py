@@ -29,6 +29,7 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.pose_algebra import looked_up
 from frametool.text.numbers import NotFinite, parse_number
 
@@ -52,7 +53,8 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     "kinds",
     type=click.Choice(CHOICES),
     multiple=True,
-    help="what the records are, once for each --columns",
+    metavar="KIND",
+    help="point, vector, pose, twist, wrench; once a --columns",
 )
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @pose_result_options("points", "trajectory")
@@ -89,8 +91,8 @@ def command(
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
-    A RECORD with a rotation is a pose, {vector: [x, y, z]} is rotated only, three numbers are a point (help records).
-    Without SOURCE records say their own frame. Without records -i FILE, also a cloud's, or stdin is read.
+    A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its
+    frame. -i FILE or stdin holds many.
     """
     task = PoseTask(options, "points", "trajectory")
     stream, output = task.stream, task.output
@@ -289,7 +291,10 @@ def _way_by_pose(argument: str, task: PoseTask, *, uncertain: bool, multiples: b
         return moved_by
 
     explained = partial(task.written, source, warned=True)
-    return Way(pose.parent, from_frame, None, lambda _own: False, explained, has_source=True, uncertain=uncertain)
+    tell = partial(warn_if_wide, [pose.covariance or ()] * uncertain)
+    return Way(
+        pose.parent, from_frame, None, lambda _own: False, explained, has_source=True, uncertain=uncertain, tell=tell
+    )
 
 
 def _settled(own: str | None, source: str | None) -> str | None:

@@ -37,7 +37,7 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
       frametool mean '{rpy_deg: [0, 0, 80]}' '{rpy_deg: [0, 0, 100]}'
       frametool mean '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' --weights 1,3
       printf 'x,y,z,weight\\n0,0,0,1\\n4,0,0,3\\n' | frametool mean --weights weight
-      frametool mean poses.csv --robust
+      frametool mean tag_seen.csv --robust
 
     Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
     of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
