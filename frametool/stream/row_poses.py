@@ -128,7 +128,7 @@ class TablePoses:
         self.mended += len(run.mended)
         self.off = max(self.off, run.off)
         self.notes = notes_of(run, block)
-        self.given = np.array(run.columns)[:, run.rows]
+        self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, run.rows]
         self.rows += len(block.places) + len(block.broken)
         rows, results, lines = run.rows, run.results, block.places
         if nulls and self.faults:

@@ -96,11 +96,20 @@ def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
         lines = [line._replace(branch=re.sub("(.)..(.)", r"\1\2", line.branch)) for line in lines]
         names = _widest(lines)
     if names + poses > WIDEST:
-        yield from ((line, "  " * bool(line.label)) for line in lines)
+        yield from ((part, "  " * bool(part.label)) for line in lines for part in _folded(line))
         return
     for line in lines:
         label = (f"{line.label[0]:<{positions}}", *line.label[1:]) if line.label else ()
         yield line._replace(label=label), " " * bool(label) * (names - len(line.branch) - cells(line.frame) + 2)
+
+
+def _folded(line: DrawnFrame) -> Iterator[DrawnFrame]:
+    """Yield a line, what comes behind its pose on one of its own where they are too long for one."""
+    if len(line.label) <= 2 or len(line.branch) + cells(line.frame) + sum(2 + cells(p) for p in line.label) <= WIDEST:
+        yield line
+        return
+    yield line._replace(label=line.label[:2])
+    yield DrawnFrame(re.sub("[└─]", " ", line.branch).replace("├", "│"), "", line.label[2:])
 
 
 def _widest(lines: Sequence[DrawnFrame]) -> int:

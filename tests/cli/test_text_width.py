@@ -44,6 +44,8 @@ tree examples/finger.xml -f text
 view examples/robot.yaml
 diff examples/robot.yaml examples/drive.yaml
 static examples/lidar.launch -f text
+solve examples/measurements.yaml -f text
+solve --hand-eye examples/hand_eye_samples.json -f text
 formats
 formats urdf
 sim follow --duration 3 -f text
@@ -71,7 +73,7 @@ def test_text_fits_eighty_columns_and_loses_nothing_in_fewer_or_more(
     for columns in (80, 40, 20, 200):
         monkeypatch.setitem(os.environ, "COLUMNS", str(columns))
         outcome = run(*shlex.split(line), stdin=STREAMS[name])
-        assert outcome.status in (0, 1), outcome.err
+        assert outcome.status in (0, 1, 3 * line.startswith("solve")), outcome.err  # that leaves out a wrong row
         assert "Traceback" not in outcome.err
         printed[columns] = outcome.out
     assert [each for each in printed[80].split("\n") if len(each) > 80] == []
