@@ -161,11 +161,8 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
         from frametool.grammar.pose import Pose
         from frametool.grammar.result import Result, uncertain
 
-        is_pose = found.scale == 1.0
-        if not is_pose:  # as the grammar has it
-            warn("covariance left out: it has no place beside a scale; --report has the sigmas")
         poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
-        covariances = [uncertain(each.covariance if is_pose else None) for each in entries]
+        covariances = [uncertain(each.covariance) for each in entries]
         output.poses([Result(*each) for each in zip(poses, covariances, strict=True)])
     elif output.style.form == "handeye" and found.shape == "hand-eye":
         from frametool.formats.trees.handeye import write_mount
