@@ -7,11 +7,11 @@ say why.  Knows numbers only; components are floats or arrays of one shape.
 
 from __future__ import annotations
 
-from math import nan, sqrt
+from math import nan
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
-from frametool.geometry.floats import RADIAN, bearing, half_sincos_deg, incline
+from frametool.geometry.floats import RADIAN, SQRT_HALF, bearing, half_sincos_deg, incline
 from frametool.geometry.quaternion import TINY
 
 TYPE_CHECKING = False
@@ -22,7 +22,6 @@ A, F = 6378137.0, 1.0 / 298.257223563  # the equator's radius in metres, and the
 E2, EC = F * (2.0 - F), 1.0 - F  # the eccentricity squared; the polar radius over the equator's
 NEAREST, FURTHEST = 1e5**2, 1e20**2  # m^2 from the centre: nearer normals cross (to 43 km), farther powers overflow
 STEPS = 3  # of Halley: after the third nothing changes from 100 km to beyond 1e9 km
-ENU_FROM_NED = sqrt(0.5), sqrt(0.5), 0.0, 0.0
 AXES = "enu", "ned", "grid", "ecef"
 
 
@@ -106,24 +105,25 @@ def ecef_from_enu(lat: N, lon: N, xp: Functions[N]) -> Four[N]:
     return quaternion.settled(back * down, ahead * down, ahead * up, back * up)
 
 
-def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N | float = 0.0) -> Seven[N]:
+def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Seven[N]:
     """Return ecef_from_axes at a place: x, y, z and the quaternion with the canonical sign.
 
     axes: one of `AXES`
     convergence_deg: of grid axes, how far grid north lies clockwise of true north there
     """
-    x, y, z = ecef(lat, lon, alt, xp)
+    tx, ty, tz = ecef(lat, lon, alt, xp)
     if axes == "ecef":
-        zero = 0.0 * x
-        return x, y, z, zero, zero, zero, zero + 1.0
-    turn = ecef_from_enu(lat, lon, xp)
-    if axes == "ned":
-        turn = quaternion.compose(*turn, *ENU_FROM_NED)
-    elif axes == "grid":
-        sine, cosine = half_sincos_deg(convergence_deg, xp)
-        turn = quaternion.compose(*turn, 0.0, 0.0, 0.0 - sine, cosine)
-    qx, qy, qz, qw = turn
-    return (x, y, z, *xp.canonical_sign(qx + 0.0, qy + 0.0, qz + 0.0, qw + 0.0))
+        zero = 0.0 * tx
+        return tx, ty, tz, zero, zero, zero, zero + 1.0
+    x, y, z, w = ecef_from_enu(lat, lon, xp)
+    if axes == "ned":  # the product with enu_from_ned
+        x, y, z, w = SQRT_HALF * x, SQRT_HALF * y, SQRT_HALF * z, SQRT_HALF * w
+        x, y, z, w = quaternion.settled(w - z, w + z, x - y, 0.0 - x - y)
+    elif convergence_deg is not None:  # with enu_from_grid, a turn about z by minus the convergence
+        s, c = half_sincos_deg(convergence_deg, xp)
+        x, y, z, w = quaternion.settled(x * c - y * s, y * c + x * s, z * c - w * s, w * c + z * s)
+    x, y, z, w = xp.canonical_sign(x + 0.0, y + 0.0, z + 0.0, w + 0.0)
+    return tx, ty, tz, x, y, z, w
 
 
 def seen_from(
@@ -147,6 +147,6 @@ def check_ecef(x: float, y: float, z: float) -> None:
     squared = x * x + y * y + z * z
     shown = f"ecef {x:.9g} {y:.9g} {z:.9g}"
     if squared < NEAREST:
-        raise ValueInvalid(f"{shown} is within 100 km of the Earth's centre and has no lat, lon, alt; are these metres?")
+        raise ValueInvalid(f"{shown} is within 100 km of the Earth's centre and has no lat; are these metres?")
     if not squared <= FURTHEST:
         raise ValueInvalid(f"{shown} is farther than 1e+20 m from the Earth; are these metres?")

@@ -9,7 +9,7 @@ Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few
 
 from __future__ import annotations
 
-from math import factorial
+from math import factorial, isnan
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth, floats
@@ -20,7 +20,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.types import Five, Four, Functions, N, Seven, Two
+    from frametool.geometry.types import Condition, Four, Functions, N, Seven, Two
 
 SOUTH, NORTH, REACH = -80.0, 84.0, 30.0  # degrees: where UTM ends, and how far a zone that is held may reach
 SLACK = 1e-9  # degrees, 0.1 mm: what rounding, also of printed digits, may take a place back beyond them
@@ -97,13 +97,13 @@ SINH = tuple(1.0 / factorial(2 * k + 1) for k in range(11))  # sinh(y)/y in y^2,
 def standard_zone(lat: N, lon: N, xp: Functions[N]) -> N:
     """Return the zone of a place: six degrees each, but 32V of Norway wider and four zones over Svalbard."""
     lon = earth.eastward(lon, xp)
-    zone = _floor(lon / 6.0, xp) + 31.0
-    zone = xp.where(zone > 60.0, 1.0, zone)  # lon 180
+    sixth = _floor(lon / 6.0, xp) + 31.0
+    zone = xp.where(sixth > 60.0, 1.0, sixth)  # lon 180
     high = (lat >= 56.0) & (lon >= 0.0) & (lon < 42.0)
     if xp.some(high):
         norway = high & (lat < 64.0) & (lon >= 3.0) & (lon < 12.0)
-        zone = xp.where(norway, 32.0, zone)
-        zone = xp.where(high & (lat >= 72.0), 31.0 + 2.0 * _floor((lon + 3.0) / 12.0, xp), zone)
+        svalbard = xp.where(high & (lat >= 72.0), 31.0 + 2.0 * _floor((lon + 3.0) / 12.0, xp), zone)
+        zone = xp.where(norway, 32.0, svalbard)
     return xp.where(lat < 0.0, 0.0 - zone, zone)
 
 
@@ -136,14 +136,7 @@ def beside_meridian(lon: N, zone: N) -> N:
     return lon - (meridian + 360.0 * nearest((lon - meridian) / 360.0))
 
 
-def utm(lat: N, lon: N, xp: Functions[N]) -> Five[N]:
-    """Return zone by the rule, easting, northing, convergence in degrees and grid scale of a place."""
-    lat, lon = within(lat, SOUTH, NORTH, xp), within(lon, -180.0, 360.0, xp)
-    zone = standard_zone(lat, lon, xp)
-    return (zone, *utm_in(zone, lat, lon, xp))
-
-
-def utm_in(zone: N, lat: N, lon: N, xp: Functions[N]) -> Four[N]:
+def utm(zone: N, lat: N, lon: N, xp: Functions[N]) -> Four[N]:
     """Return easting, northing, convergence in degrees and grid scale of a place in a zone.
 
     Convergence is how far grid north lies clockwise of true north.  Zone by zone exact to 5e-9 m, 30 degrees wide.
@@ -223,34 +216,29 @@ def _complex_polynomial(x: N, y: N, coefficients: tuple[float, ...]) -> Two[N]:
     return first + x * now - squared * before, y * now
 
 
-def grid_pose(lat: N, lon: N, alt: N, zone: N, xp: Functions[N]) -> Seven[N]:
+def grid_pose(zone: N, lat: N, lon: N, alt: N, xp: Functions[N]) -> Seven[N]:
     """Return ecef_from_axes of the axes of a zone's grid at a place: x along grid east, y along grid north, z up."""
-    return earth.pose(lat, lon, alt, "grid", xp, utm_in(zone, lat, lon, xp)[2])
+    return earth.pose(lat, lon, alt, "grid", xp, utm(zone, lat, lon, xp)[2])
 
 
-def check_utm(lat: float, lon: float) -> None:
-    """Raise ValueInvalid unless finite numbers are a place that UTM has."""
-    earth.check_lla(lat, lon)
+def check_utm(zone: float, lat: float, lon: float, alt: float = 0.0) -> None:
+    """Raise ValueInvalid unless finite numbers are a place that UTM has, within 30 degrees of the zone's meridian."""
+    earth.check_lla(lat, lon, alt)
     if not SOUTH <= lat <= NORTH:
         raise ValueInvalid(f"lat {lat!r}: UTM ends at 84 N and 80 S; use lla, ecef or enu")
-
-
-def check_utm_in(zone: float, lat: float, lon: float) -> None:
-    """Raise ValueInvalid unless a place is within 30 degrees of a zone's meridian."""
-    check_utm(lat, lon)
     off = abs(beside_meridian(lon, zone))
     if off > REACH:
-        raise ValueInvalid(f"lon {lon!r} is {off:.6g} degrees from the meridian of {_named(zone)}; it reaches 30")
+        name = ZONES[int(zone)]
+        raise ValueInvalid(f"lon {lon!r} is {off:.6g} degrees from the meridian of zone {name}; it reaches 30")
 
 
 def check_grid(zone: float, easting: float, northing: float) -> None:
     """Raise ValueInvalid unless a position in a zone is a place that UTM has."""
-    lat, lon = lat_lon(zone, easting, northing, floats)
-    if lat + lon != lat + lon:  # noqa: PLR0124 - NaN is out of reach
-        raise ValueInvalid(
-            f"utm {_named(zone)} {easting!r} {northing!r} is beyond 84 N, 80 S or 30 degrees from the meridian"
-        )
+    if isnan(sum(lat_lon(zone, easting, northing, floats))):
+        place = f"utm {ZONES[int(zone)]} {easting!r} {northing!r}"
+        raise ValueInvalid(f"{place} is beyond 84 N, 80 S or 30 degrees of the meridian; easting and northing swapped?")
 
 
-def _named(zone: float) -> str:
-    return f"zone {ZONES[int(zone)]}"
+def looks_like_band(zone: N, northing: N) -> Condition:
+    """Tell whether the S of a zone may be the letter of the band that lies north of the equator, from 32 to 40."""
+    return (zone < 0.0) & (northing >= 3.5e6) & (northing <= 4.5e6)
