@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth, validation
 from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.transform import Transform
@@ -83,12 +83,8 @@ def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) 
 
 def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
     """Return lat, lon of positions in a zone, as `32N` (`32S` south of the equator), or in a zone each."""
-    given = _columns(easting=easting, northing=northing)
-    zoned = _zone(zone), *given
-    doubtful = mercator.looks_like_band(zoned[0], zoned[2])
-    if doubtful if isinstance(doubtful, bool) else doubtful.any():
-        warn("a zone with S is south of the equator; band S, with a northing of 3.5e6 to 4.5e6, lies north: write N")
-    return validation.checked(mercator.lat_lon, 2, zoned, "utm", mercator.check_grid)
+    given = _zone(zone), *_columns(easting=easting, northing=northing)
+    return validation.checked(mercator.lat_lon, 2, given, "utm", mercator.check_grid)
 
 
 def _columns(**values: Numbers) -> Components:

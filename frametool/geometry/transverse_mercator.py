@@ -20,7 +20,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.types import Condition, Four, Functions, N, Seven, Two
+    from frametool.geometry.types import Four, Functions, N, Seven, Two
 
 SOUTH, NORTH, REACH = -80.0, 84.0, 30.0  # degrees: where UTM ends, and how far a zone that is held may reach
 SLACK = 1e-9  # degrees, 0.1 mm: what rounding, also of printed digits, may take a place back beyond them
@@ -237,8 +237,3 @@ def check_grid(zone: float, easting: float, northing: float) -> None:
     if isnan(sum(lat_lon(zone, easting, northing, floats))):
         place = f"utm {ZONES[int(zone)]} {easting!r} {northing!r}"
         raise ValueInvalid(f"{place} is beyond 84 N, 80 S or 30 degrees of the meridian; easting and northing swapped?")
-
-
-def looks_like_band(zone: N, northing: N) -> Condition:
-    """Tell whether the S of a zone may be the letter of the band that lies north of the equator, from 32 to 40."""
-    return (zone < 0.0) & (northing >= 3.5e6) & (northing <= 4.5e6)
