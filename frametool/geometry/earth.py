@@ -55,7 +55,7 @@ def lla(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
     """
     squared = x * x + y * y
     beside = xp.sqrt(squared)
-    run, rise = xp.maximum(beside / A, 1e-30), (EC / A) * z
+    run, rise = xp.maximum(beside / A, 1e-18), (EC / A) * z
     sine, cosine = rise, EC * run
     for step in range(STEPS):
         if step:

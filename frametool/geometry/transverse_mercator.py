@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Four, Functions, N, Seven, Two
 
 SOUTH, NORTH, REACH = -80.0, 84.0, 30.0  # degrees: where UTM ends, and how far a zone that is held may reach
-SLACK = 1e-9  # degrees, 0.1 mm: what rounding, also of printed digits, may take a place back beyond them
+SLACK = 1e-4  # degrees, 11 m: a place at the edge that was written in whole metres still comes back
 WIDEST = 0.6  # Krueger's eta in radians, above that of 30 degrees on the equator, 0.55
 FALSE_EASTING, FALSE_NORTHING = 5e5, 1e7
 ZONES = "", *(f"{zone}N" for zone in range(1, 61)), *(f"{zone}S" for zone in range(60, 0, -1))  # -32 is 32S too
@@ -97,12 +97,12 @@ SINH = tuple(1.0 / factorial(2 * k + 1) for k in range(11))  # sinh(y)/y in y^2,
 def standard_zone(lat: N, lon: N, xp: Functions[N]) -> N:
     """Return the zone of a place: six degrees each, but 32V of Norway wider and four zones over Svalbard."""
     lon = earth.eastward(lon, xp)
-    sixth = _floor(lon / 6.0, xp) + 31.0
+    sixth = _steps(lon, 6.0, xp) + 31.0
     zone = xp.where(sixth > 60.0, 1.0, sixth)  # lon 180
     high = (lat >= 56.0) & (lon >= 0.0) & (lon < 42.0)
     if xp.some(high):
         norway = high & (lat < 64.0) & (lon >= 3.0) & (lon < 12.0)
-        svalbard = xp.where(high & (lat >= 72.0), 31.0 + 2.0 * _floor((lon + 3.0) / 12.0, xp), zone)
+        svalbard = xp.where(high & (lat >= 72.0), 31.0 + 2.0 * _steps(lon + 3.0, 12.0, xp), zone)
         zone = xp.where(norway, 32.0, svalbard)
     return xp.where(lat < 0.0, 0.0 - zone, zone)
 
@@ -125,9 +125,10 @@ def zone_number(name: object) -> float:
     raise ValueInvalid(f"unknown zone {shown(name)}; zones: 1N to 60N, and 1S to 60S south of the equator")
 
 
-def _floor(x: N, xp: Functions[N]) -> N:
-    whole = nearest(x)
-    return whole - xp.where(whole > x, 1.0, 0.0)
+def _steps(x: N, width: float, xp: Functions[N]) -> N:
+    """Return how many whole steps of a width a number is from 0, rounded down; exact at every edge."""
+    whole = nearest(x / width)
+    return whole - xp.where(whole * width > x, 1.0, 0.0)
 
 
 def beside_meridian(lon: N, zone: N) -> N:
