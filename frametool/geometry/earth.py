@@ -126,9 +126,7 @@ def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N
     return tx, ty, tz, x, y, z, w
 
 
-def seen_from(
-    tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, px: N, py: N, pz: N,
-) -> Three[N]:  # fmt: skip
+def seen_from(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, px: N, py: N, pz: N) -> Three[N]:
     """Return a point of ecef in the axes of a pose in ecef; subtracted first, then rotated: half the rounding."""
     qx, qy, qz, qw = quaternion.conjugate(x, y, z, w)
     return quaternion.rotate(qx, qy, qz, qw, px - tx, py - ty, pz - tz)

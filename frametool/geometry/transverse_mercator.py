@@ -4,7 +4,8 @@ A zone is a number, 1 to 60, negative for the south: 32.0 is 32N, -32.0 is 32S; 
 n^6, whose truncation is below a nanometre 30 degrees from the meridian.  Only + - * / and roots, and the project's own
 sines and arc tangents; what is out of UTM's reach becomes NaN, and `check_utm` and `check_grid` say why.
 
-Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few nanometers, eq. 7 to 36.
+Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few nanometers, eq. 7 to 36; Karney 2024, On auxiliary
+latitudes, for the conformal one.
 """
 
 from __future__ import annotations
@@ -31,11 +32,6 @@ N3 = F / (2.0 - F)  # the third flattening, called n
 RADIUS = 0.9996 * A / (1.0 + N3) * (1.0 + N3**2 / 4 + N3**4 / 64 + N3**6 / 256)  # of the meridian, scaled
 
 
-def _series(*rows: tuple[float, ...]) -> list[float]:
-    """Return the coefficients of sin 2kx, k = 1 to 6, from those of n^k and the powers after it."""
-    return [N3**power * polynomial(N3, (*row, 0.0)) for power, row in enumerate(rows, 1)]
-
-
 def _in_powers(factors: Sequence[float], slope: float) -> tuple[float, ...]:
     """Return the polynomial sum of f_k p_k(x), where p_0 = 1, p_1 = slope x and p_k+1 = 2x p_k - p_k-1.
 
@@ -51,45 +47,36 @@ def _in_powers(factors: Sequence[float], slope: float) -> tuple[float, ...]:
 
 
 def _sums(*rows: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the polynomials in cos 2x that are the sum of a series over sin 2x, and the derivative of the sum."""
-    series = _series(*rows)
+    """Return the polynomials in cos 2x that are the sum of c_k sin 2kx over sin 2x, and its derivative.
+
+    Row k holds what c_k has of n^k and of the powers after it.
+    """
+    series = [N3**power * polynomial(N3, (*row, 0.0)) for power, row in enumerate(rows, 1)]
     return _in_powers(series, 2.0), _in_powers([0.0, *(2.0 * k * part for k, part in enumerate(series, 1))], 1.0)
 
 
 # of conformal coordinates along the meridian, and back (Karney 2011, eq. 35 and 36)
 ALONG, ALONG_SLOPE = _sums(
     (1 / 2, -2 / 3, 5 / 16, 41 / 180, -127 / 288, 7891 / 37800),
-    (13 / 48, -3 / 5, 557 / 1440, 281 / 630, -1983433 / 1935360),
-    (61 / 240, -103 / 140, 15061 / 26880, 167603 / 181440),
-    (49561 / 161280, -179 / 168, 6601661 / 7257600),
-    (34729 / 80640, -3418889 / 1995840),
-    (212378941 / 319334400,),
-)
+    (13 / 48, -3 / 5, 557 / 1440, 281 / 630, -1983433 / 1935360), (61 / 240, -103 / 140, 15061 / 26880, 167603 / 181440),
+    (49561 / 161280, -179 / 168, 6601661 / 7257600), (34729 / 80640, -3418889 / 1995840), (212378941 / 319334400,),
+)  # fmt: skip
 BACK, _ = _sums(
     (-1 / 2, 2 / 3, -37 / 96, 1 / 360, 81 / 512, -96199 / 604800),
-    (-1 / 48, -1 / 15, 437 / 1440, -46 / 105, 1118711 / 3870720),
-    (-17 / 480, 37 / 840, 209 / 4480, -5569 / 90720),
-    (-4397 / 161280, 11 / 504, 830251 / 7257600),
-    (-4583 / 161280, 108847 / 3991680),
-    (-20648693 / 638668800,),
-)
-# the conformal latitude less the latitude, and the latitude less the conformal one (Karney 2011, after Krueger)
+    (-1 / 48, -1 / 15, 437 / 1440, -46 / 105, 1118711 / 3870720), (-17 / 480, 37 / 840, 209 / 4480, -5569 / 90720),
+    (-4397 / 161280, 11 / 504, 830251 / 7257600), (-4583 / 161280, 108847 / 3991680), (-20648693 / 638668800,),
+)  # fmt: skip
+# the conformal latitude less the latitude, and the latitude less the conformal one (Karney 2024)
 CONFORMAL, _ = _sums(
-    (-2, 2 / 3, 4 / 3, -82 / 45, 32 / 45, 4642 / 4725),
-    (5 / 3, -16 / 15, -13 / 9, 904 / 315, -1522 / 945),
-    (-26 / 15, 34 / 21, 8 / 5, -12686 / 2835),
-    (1237 / 630, -12 / 5, -24832 / 14175),
-    (-734 / 315, 109598 / 31185),
-    (444337 / 155925,),
-)
+    (-2, 2 / 3, 4 / 3, -82 / 45, 32 / 45, 4642 / 4725), (5 / 3, -16 / 15, -13 / 9, 904 / 315, -1522 / 945),
+    (-26 / 15, 34 / 21, 8 / 5, -12686 / 2835), (1237 / 630, -12 / 5, -24832 / 14175),
+    (-734 / 315, 109598 / 31185), (444337 / 155925,),
+)  # fmt: skip
 GEODETIC, _ = _sums(
-    (2, -2 / 3, -2, 116 / 45, 26 / 45, -2854 / 675),
-    (7 / 3, -8 / 5, -227 / 45, 2704 / 315, 2323 / 945),
-    (56 / 15, -136 / 35, -1262 / 105, 73814 / 2835),
-    (4279 / 630, -332 / 35, -399572 / 14175),
-    (4174 / 315, -144838 / 6237),
-    (601676 / 22275,),
-)
+    (2, -2 / 3, -2, 116 / 45, 26 / 45, -2854 / 675), (7 / 3, -8 / 5, -227 / 45, 2704 / 315, 2323 / 945),
+    (56 / 15, -136 / 35, -1262 / 105, 73814 / 2835), (4279 / 630, -332 / 35, -399572 / 14175),
+    (4174 / 315, -144838 / 6237), (601676 / 22275,),
+)  # fmt: skip
 HYPERBOLIC = tuple(1.0 / (2 * k + 1) for k in range(15))  # atanh(t)/t in t^2, t <= tanh 0.3
 SINH = tuple(1.0 / factorial(2 * k + 1) for k in range(11))  # sinh(y)/y in y^2, y <= 1.2
 
@@ -113,7 +100,7 @@ def zone_number(name: object) -> float:
     Raises:
         ValueInvalid: no zone, one without its hemisphere, or one with the letter of a band.
     """
-    text = name.strip().lstrip("0").upper() if isinstance(name, str) else str(name)
+    text = "".join(name.split()).lstrip("0").upper() if isinstance(name, str) else str(name)
     if text in ZONES[1:]:
         place = ZONES.index(text)
         return float(place if place <= 60 else place - len(ZONES))

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import earth_oracles
+import mpmath
 import numpy as np
 from bench_geometry import processor
 from mpmath import mpf
@@ -105,7 +106,7 @@ def accuracy_table() -> list[str]:
             off = max(abs(a - b) for a, b in zip(frametool.ecef_from_lla(lat, lon, alt), exact, strict=True))
             found, (lat_rad, lon_rad, height_) = frametool.lla_from_ecef(xyz), earth_oracles.lla(xyz, lat)
             turned = abs(mpf(found[1]) * earth_oracles.DEGREE - lon_rad)
-            arc = min(turned, 2 * earth_oracles.mp.pi - turned) * earth_oracles.sine_cosine(lat)[1]
+            arc = min(turned, 2 * mpmath.pi - turned) * earth_oracles.sine_cosine(lat)[1]
             lat_off = abs(mpf(found[0]) * earth_oracles.DEGREE - lat_rad)
             alt_off = abs(found[2] - height_) / radius
             errors = (off / radius / earth_oracles.EPS, lat_off, arc, alt_off / earth_oracles.EPS)
