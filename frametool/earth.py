@@ -96,10 +96,13 @@ def _zone(given: Any, *place: Any) -> Any:
     """Return the number of a zone, or those of many; where none is given that of the place, if it is known."""
     if given is None and place:
         return validation.number(mercator.standard_zone, place)
-    if isinstance(given, str) or not hasattr(given, "__len__"):
+    if not isinstance(given, (list, tuple)) and not getattr(given, "shape", ()):
         return mercator.zone_number(given)
     import numpy as np
 
-    names = np.asarray(given)
+    try:
+        names = np.asarray(given).astype(str)
+    except ValueError:
+        raise ValueInvalid("zone: the rows differ in length; expected an array of names such as 32N") from None
     numbers = {name: mercator.zone_number(name) for name in dict.fromkeys(names.ravel().tolist())}
     return np.array([numbers[name] for name in names.ravel().tolist()]).reshape(names.shape)

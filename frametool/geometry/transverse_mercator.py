@@ -4,8 +4,8 @@ A zone is a number, 1 to 60, negative for the south: 32.0 is 32N, -32.0 is 32S; 
 n^6, whose truncation is below a nanometre 30 degrees from the meridian.  Only + - * / and roots, and the project's own
 sines and arc tangents; what is out of UTM's reach becomes NaN, and `check_utm` and `check_grid` say why.
 
-Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few nanometers, eq. 7 to 36; Karney 2024, On auxiliary
-latitudes, for the conformal one.
+Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few nanometers, eq. 7 to 36;
+Karney 2024, On auxiliary latitudes, for the conformal one.
 """
 
 from __future__ import annotations
@@ -58,8 +58,9 @@ def _sums(*rows: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...
 # of conformal coordinates along the meridian, and back (Karney 2011, eq. 35 and 36)
 ALONG, ALONG_SLOPE = _sums(
     (1 / 2, -2 / 3, 5 / 16, 41 / 180, -127 / 288, 7891 / 37800),
-    (13 / 48, -3 / 5, 557 / 1440, 281 / 630, -1983433 / 1935360), (61 / 240, -103 / 140, 15061 / 26880, 167603 / 181440),
-    (49561 / 161280, -179 / 168, 6601661 / 7257600), (34729 / 80640, -3418889 / 1995840), (212378941 / 319334400,),
+    (13 / 48, -3 / 5, 557 / 1440, 281 / 630, -1983433 / 1935360),
+    (61 / 240, -103 / 140, 15061 / 26880, 167603 / 181440), (49561 / 161280, -179 / 168, 6601661 / 7257600),
+    (34729 / 80640, -3418889 / 1995840), (212378941 / 319334400,),
 )  # fmt: skip
 BACK, _ = _sums(
     (-1 / 2, 2 / 3, -37 / 96, 1 / 360, 81 / 512, -96199 / 604800),

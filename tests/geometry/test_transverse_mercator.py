@@ -159,6 +159,9 @@ REFUSED: list[tuple[Any, str]] = [
     (lambda: frametool.lla_from_utm("61N", 5e5, 0), "unknown zone '61N'; zones: 1N to 60N, and 1S to 60S south of the equator"),
     (lambda: frametool.lla_from_utm("", 5e5, 0), "unknown zone ''; zones: 1N to 60N, and 1S to 60S south of the equator"),
     (lambda: frametool.lla_from_utm(NO_ZONE, 5e5, 0), "unknown zone None; zones: 1N to 60N, and 1S to 60S south of the equator"),
+    (lambda: frametool.lla_from_utm([32], 5e5, 0), "zone '32' has no hemisphere; write 32N, or 32S south of the equator"),
+    (lambda: frametool.lla_from_utm([["32N"], ["32N", "33N"]], 5e5, 0), "zone: the rows differ in length; expected an array of names such as 32N"),
+    (lambda: frametool.lla_from_utm({}, 5e5, 0), "unknown zone {}; zones: 1N to 60N, and 1S to 60S south of the equator"),  # type: ignore[arg-type]
     (lambda: frametool.lla_from_utm("32N", 5334760.4, 691607.86), f"utm 32N 5334760.4 691607.86 {BEYOND}"),
     (lambda: frametool.lla_from_utm("32N", 5e5, [1.0, 9.5e6]), f"utm[1]: utm 32N 500000.0 9500000.0 {BEYOND}"),
     (lambda: frametool.lla_from_utm("32S", 5e5, 0.0), f"utm 32S 500000.0 0.0 {BEYOND}"),
