@@ -78,7 +78,7 @@ def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) 
     import numpy as np
 
     names = np.array(mercator.ZONES)[np.asarray(zoned[0]).astype(np.int64)]
-    return (np.broadcast_to(names, found[0].shape), *found)
+    return (np.full(found[0].shape, names), *found)
 
 
 def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
