@@ -18,6 +18,11 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool import covariance as covariance
     from frametool.calc.api import calc as calc
+    from frametool.earth import earth_pose as earth_pose
+    from frametool.earth import ecef_from_lla as ecef_from_lla
+    from frametool.earth import lla_from_ecef as lla_from_ecef
+    from frametool.earth import lla_from_utm as lla_from_utm
+    from frametool.earth import utm_from_lla as utm_from_lla
     from frametool.errors import FrametoolError as FrametoolError
     from frametool.explain.api import explain as explain
     from frametool.fit.api import align as align
@@ -67,8 +72,12 @@ _HOMES = {
     "compare": "frametool.fit.api",
     "covariance": "frametool.covariance",
     "diff": "frametool.lint.tree_diff",
+    "earth_pose": "frametool.earth",
+    "ecef_from_lla": "frametool.earth",
     "explain": "frametool.explain",
     "follow_steps": "frametool.sim.followed",
+    "lla_from_ecef": "frametool.earth",
+    "lla_from_utm": "frametool.earth",
     "load": "frametool.formats.load",
     "load_robot": "frametool.formats.robots.urdf",
     "load_trajectory": "frametool.stream.trajectories",
@@ -82,6 +91,7 @@ _HOMES = {
     "solve_points": "frametool.fit.api",
     "sql": "frametool.stream.engines",
     "tutorial": "frametool.sim.scene",
+    "utm_from_lla": "frametool.earth",
 }
 __all__ = ["__version__", *_HOMES]  # noqa: PLE0604 - its keys are strings
 

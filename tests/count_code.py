@@ -15,7 +15,7 @@ from pathlib import Path
 LATER = (
     "fit", "frames/trajectory.py", "stream/trajectories.py", "view/comparison_text.py", "view/comparison_page.py",
     "geometry/placed.py", "geometry/uncertainty.py", "grammar/covariance.py", "covariance.py",
-    "stream/beside.py", "stream/carried.py",
+    "stream/beside.py", "stream/carried.py", "geometry/earth.py", "geometry/transverse_mercator.py", "earth.py",
     "cli/commands/solve.py", "cli/solving.py", "stream/measurements.py", "stream/samples.py", "view/solution_text.py",
     "cli/comparing.py", "cli/commands/compare.py", "cli/commands/align.py", "cli/commands/resample.py",
 )  # fmt: skip

@@ -210,7 +210,14 @@ def checked(kernel: Kernel, count: int, given: Components, name: str, check: Cal
         return kernel(*given, floats)
     from frametool.geometry import arrays
 
-    return arrays.run(arrays.guarded(kernel, lambda: _recheck(kernel, count, given, name, check)), count, given, arrays)
+    return arrays.run(watched(kernel, count, given, name, check), count, given, arrays)
+
+
+def watched(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Kernel:
+    """Make the kernel for arrays that lets `check` say why the first row that fails does."""
+    from frametool.geometry import arrays
+
+    return arrays.guarded(kernel, lambda: _recheck(kernel, count, given, name, check))
 
 
 def _recheck(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> None:

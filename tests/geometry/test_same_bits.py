@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import samples
 
-from frametool.geometry import arrays, euler, floats, matrix, quaternion, rigid
+from frametool.geometry import arrays, earth, euler, floats, matrix, quaternion, rigid
+from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -122,6 +123,20 @@ PAIRS = joined(QUATERNIONS, OTHERS)
 NEAR = [[*row, *(part + gap for part, gap in zip(row, (1e-9, -2e-9, 1e-10, 0.0), strict=True))] for row in QUATERNIONS]
 POSES, WAYS = poses(QUATERNIONS), joined(poses(QUATERNIONS), poses(OTHERS))
 TWISTS = joined(SHIFTS, samples.rotation_vectors())
+PLACES = [
+    *zip(DRAWN.uniform(-90, 90, 3000).tolist(), DRAWN.uniform(-180, 360, 3000).tolist(), DRAWN.uniform(-1e4, 1e7, 3000).tolist(), strict=True),
+    *itertools.product((-95.0, -90.0, -0.0, 45.0, 84.0, 90.0), (-200.0, -180.0, -0.0, 1e-300, 180.0, 360.0), (-1e7, -0.0, 1e9)),
+]  # fmt: skip
+FAR_PLACES = [*SHIFTS, *([1e7 * part for part in row] for row in SHIFTS), *itertools.product((-7e6, -0.0, 1e-9, 6e5), repeat=3)]
+ZONED = [
+    [float(zone * side), lat, 6.0 * zone - 183.0 + aside]
+    for zone, side, (lat, lon, _) in zip(DRAWN.integers(1, 61, 3000).tolist(), itertools.cycle((1, -1)), PLACES, strict=False)
+    for aside in (lon % 60.0 - 29.0,)
+]
+POSITIONS = [
+    [row[0], easting, northing]
+    for row, easting, northing in zip(ZONED, DRAWN.uniform(-3e6, 4e6, 3000).tolist(), DRAWN.uniform(-1e6, 11e6, 3000).tolist(), strict=True)
+]
 KERNELS: dict[str, tuple[Callable[..., Any], Sequence[Row]]] = {
     "angle": (quaternion.angle, QUATERNIONS),
     "canonical": (quaternion.canonical, [*QUATERNIONS, *(tuple(-part for part in row) for row in QUATERNIONS)]),
@@ -146,6 +161,15 @@ KERNELS: dict[str, tuple[Callable[..., Any], Sequence[Row]]] = {
     "rigid distance": (rigid.distance, WAYS),
     "interpolate": (rigid.interpolate, joined(WAYS, MANY_FRACTIONS)),
     "prepare": (rigid.prepare, WAYS),
+    "ecef": (earth.ecef, PLACES),
+    "lla": (earth.lla, FAR_PLACES),
+    "lla of places": (lambda *place: earth.lla(*earth.ecef(*place), place[-1]), PLACES),
+    "enu": (lambda lat, lon, alt, xp: earth.pose(lat, lon, alt, "enu", xp), PLACES),
+    "ned": (lambda lat, lon, alt, xp: earth.pose(lat, lon, alt, "ned", xp), PLACES),
+    "grid": (lambda zone, lat, lon, xp: mercator.grid_pose(zone, lat, lon, 0.5 * lat, xp), ZONED),
+    "zone": (lambda lat, lon, _, xp: mercator.standard_zone(lat, lon, xp), PLACES),
+    "utm": (mercator.utm, ZONED),
+    "utm back": (mercator.lat_lon, POSITIONS),
 }
 
 

@@ -1,0 +1,108 @@
+"""Places on the Earth (WGS84): latitude and longitude to and from ECEF and UTM, and the axes at a place.
+
+    import frametool
+    ecef_from_map = frametool.earth_pose(48.1, 11.5, 520.0)            # axes east, north, up at this place
+    xyz = frametool.ecef_from_lla(48.1, 11.5, 521.0)
+    ecef_from_map.inverse().apply(xyz)                                  # 1 m up
+
+lat and lon are degrees, lat in [-90, 90], lon read in [-180, 360] and given in (-180, 180]; alt is metres above the
+ellipsoid, as in NavSatFix, not above the sea.  ECEF is the Earth's frame: x to lat 0 lon 0, z to the north pole.
+One place is plain floats, without numpy; arrays broadcast, and results are arrays of their shape.  Raise ValueInvalid
+for what is no place.  The rooms below use the kernels, `geometry.earth` and `geometry.transverse_mercator`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from frametool.errors import ValueInvalid, shown
+from frametool.geometry import earth, validation
+from frametool.geometry import transverse_mercator as mercator
+from frametool.geometry.transform import Transform
+
+if TYPE_CHECKING:
+    from frametool.geometry.types import Components, Numbers
+
+__all__ = ["earth_pose", "ecef_from_lla", "lla_from_ecef", "lla_from_utm", "utm_from_lla"]
+
+
+def ecef_from_lla(lat: Numbers, lon: Numbers, alt: Numbers = 0.0) -> Any:
+    """Return x, y, z in metres: three floats of one place, an array (..., 3) of many."""
+    given = _columns(lat=lat, lon=lon, alt=alt)
+    if validation.single(given):
+        return validation.checked(earth.ecef, 3, given, "place", earth.check_lla)
+    from frametool.geometry import arrays
+
+    return arrays.rows(validation.watched(earth.ecef, 3, given, "place", earth.check_lla), (3,), given, arrays)
+
+
+def lla_from_ecef(xyz: Numbers) -> Any:
+    """Return lat, lon, alt of x, y, z in metres, shape (..., 3), 100 km or more from the centre; lon of a pole is 0."""
+    return validation.checked(earth.lla, 3, validation.columns(xyz, 3, "xyz"), "xyz", earth.check_ecef)
+
+
+def earth_pose(
+    lat: Numbers, lon: Numbers, alt: Numbers = 0.0, axes: str = "enu", *, zone: Numbers | str | None = None
+) -> Transform:
+    """Return ecef_from_axes: the pose in ECEF of axes at a place; at a pole lon tells them.
+
+    axes: `enu` (x east, y north, z up), `ned` (north, east, down), `grid` (along the grid of UTM, z up) or `ecef`
+    zone: that of the grid, as `32N`; by the rule if there is none
+    """
+    given = _columns(lat=lat, lon=lon, alt=alt)
+    if axes not in earth.AXES:
+        raise ValueInvalid(f"unknown axes {shown(axes)}; axes: {', '.join(earth.AXES)}")
+    if axes == "grid":
+        zoned = _zone(zone, *given[:2]), *given
+        return Transform.of(*validation.checked(mercator.grid_pose, 7, zoned, "place", mercator.check_utm))
+    if zone is not None:
+        raise ValueInvalid(f"zone {shown(zone)} is one of a grid; axes {axes!r} have none")
+
+    def kernel(lat: Any, lon: Any, alt: Any, xp: Any) -> Components:
+        return earth.pose(lat, lon, alt, axes, xp)
+
+    return Transform.of(*validation.checked(kernel, 7, given, "place", earth.check_lla))
+
+
+def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) -> Any:
+    """Return zone, easting, northing, convergence in degrees and grid scale.
+
+    zone: held where it is given, as `32N`, up to 30 degrees of its meridian; else by the rule, Norway and Svalbard
+    included.  Convergence is how far grid north lies clockwise of true north: yaw in grid = yaw in enu + convergence.
+    """
+    given = _columns(lat=lat, lon=lon)
+    zoned = _zone(zone, *given), *given
+    found = validation.checked(mercator.utm, 4, zoned, "place", mercator.check_utm)
+    if validation.single(found):
+        return (mercator.ZONES[int(zoned[0])], *found)
+    import numpy as np
+
+    names = np.array(mercator.ZONES)[np.asarray(zoned[0]).astype(np.int64)]
+    return (np.full(found[0].shape, names), *found)
+
+
+def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
+    """Return lat, lon of positions in a zone, as `32N` (`32S` south of the equator), or in a zone each."""
+    given = _zone(zone), *_columns(easting=easting, northing=northing)
+    return validation.checked(mercator.lat_lon, 2, given, "utm", mercator.check_grid)
+
+
+def _columns(**values: Numbers) -> Components:
+    """Return numbers of one place as floats, of many as arrays that broadcast; checked to be finite."""
+    return tuple(validation.scalars(value, name) for name, value in values.items())
+
+
+def _zone(given: Any, *place: Any) -> Any:
+    """Return the number of a zone, or those of many; where none is given that of the place, if it is known."""
+    if given is None and place:
+        return validation.number(mercator.standard_zone, place)
+    if not isinstance(given, (list, tuple)) and not getattr(given, "shape", ()):
+        return mercator.zone_number(given)
+    import numpy as np
+
+    try:
+        names = np.asarray(given).astype(str)
+    except ValueError:
+        raise ValueInvalid("zone: the rows differ in length; expected an array of names such as 32N") from None
+    numbers = {name: mercator.zone_number(name) for name in dict.fromkeys(names.ravel().tolist())}
+    return np.array([numbers[name] for name in names.ravel().tolist()]).reshape(names.shape)
