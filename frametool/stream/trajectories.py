@@ -115,7 +115,7 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     row = FORMATS[form].poses
     counts = row is not None and bool(row.counted)
     own = answers if counts or form == "csv" else answers._replace(stamps="")
-    request = asked._replace(operation=Operation(moves=True))
+    request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(form, request, Style("tum"), file.name, own)
     numbers: list[Any] = []
     stamps: list[Any] = []

@@ -575,3 +575,15 @@ def test_help_is_one_screen(run: Run) -> None:
 
 def test_exact_data_come_out_to_1e_12(run: Run) -> None:
     assert math.isclose(json.loads(run("solve", "--hand-eye", "s.json", "-f", "json", files=samples_file("exact")).out)["frames"][2]["xyz"][0], RIGS["exact"]["x"]["xyz"][0], abs_tol=1e-12)
+
+
+def test_the_names_of_rows_are_those_of_the_frames(run: Run) -> None:
+    """Columns parent and name name base, gripper, camera and target, as --names would."""
+    files = {}
+    for file, parent, name in (("gripper.csv", "base_link", "tool0"), ("target.csv", "cam", "board")):
+        header, *rows = (Path(__file__).parents[2] / "examples" / file).read_text().splitlines()
+        files[f"g_{file}"] = "\n".join([f"parent,name,{header}", *(f"{parent},{name},{row}" for row in rows)]) + "\n"
+    done = run("solve", "--hand-eye", "g_gripper.csv", "g_target.csv", "-f", "json", files=files)
+    entries = json.loads(done.out)["frames"]
+    assert [(each["name"], each.get("parent")) for each in entries if "parent" in each] == [("cam", "tool0"), ("board", "base_link")]
+    assert "left out: the frames" not in done.err
