@@ -110,7 +110,8 @@ def with_scale(record: Record, value: Any, around: Path, above: Path, request: R
     if record.shape.covariance and request.operation.of != "arguments":
         raise NotARotation(NOT_BOTH, (*around, SCALE), key=True)
     return record._replace(
-        shape=record.shape._replace(covariance=(*record.shape.covariance, 1)), numbers=(*record.numbers, (*above, *around, SCALE)),
+        shape=record.shape._replace(covariance=(*record.shape.covariance, 1)),
+        numbers=(*record.numbers, (*above, *around, SCALE)),
         values=(*record.values, scale), covariances=(*record.covariances, SCALE),
     )  # fmt: skip
 
