@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, warn
 from frametool.geometry.uncertainty import UNKNOWN
-from frametool.grammar.covariance import COVARIANCE, SIGMA, check, entries_of, find_columns, read_covariance
+from frametool.grammar.covariance import (
+    COVARIANCE,
+    SIGMA,
+    check,
+    entries_of,
+    find_columns,
+    in_unit,
+    of_sigmas,
+    read_covariance,
+)
 from frametool.grammar.pose import NOT_BOTH, SCALE, read_angle_unit, read_scale, refuse_scale
-from frametool.grammar.readers import Misfit, NotARotation, within
+from frametool.grammar.readers import Misfit, NotARotation, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.stream.layout import Kept, New
 from frametool.stream.row_layout import PARTS, POINT, POSE, VECTOR
@@ -19,6 +28,7 @@ from frametool.stream.row_layout import PARTS, POINT, POSE, VECTOR
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.geometry.types import Components
     from frametool.grammar.readers import Path, Reading
     from frametool.stream.layout import Column
     from frametool.stream.record import Place, Record
@@ -27,6 +37,7 @@ if TYPE_CHECKING:
     from frametool.stream.table import Table
 
 PLACED = (POSE, POINT, VECTOR)
+POINT_ENTRIES = 9
 LEFT_OUT = "covariances left out: calc has none"
 
 
@@ -40,7 +51,10 @@ def with_covariances(
     """
     operation, shape, path = request.operation, record.shape, place.path
     there = [key for key in place.covariances if key in holder]
-    has_sigma = SIGMA in holder and shape.kind in PLACED and around == path
+    is_own = shape.kind in PLACED and around == path
+    flat = _flat(holder, shape) if is_own and SIGMA not in holder and not there else ()
+    has_sigma = is_own and (SIGMA in holder or bool(flat))
+    said = (*there, *(flat or [SIGMA] * has_sigma))
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
     if is_left_out:
         reading.here = (*above, *path)
@@ -48,14 +62,14 @@ def with_covariances(
     if request.gathered is not None:
         request.gathered.uncertain = True
     if request.gathered is not None or is_left_out:
-        return record._replace(others=(*record.others, *there, *[SIGMA] * has_sigma))
+        return record._replace(others=(*record.others, *said))
     if operation.keeps_frames and not (shape.inverse or (has_sigma and request.canonical)):
         return record
     if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
         raise Misfit(what, (*around, there[0]))
     if has_sigma:
-        return _with_sigmas(record, holder, path, reading)
+        return _with_sigmas(record, holder, path, reading, flat)
     sizes = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)
     for key in there:
         below = (*around, key)
@@ -83,21 +97,43 @@ def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
     return _entries(value, sizes)[0][1] == UNKNOWN
 
 
-def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading) -> Record:
+def _flat(own: dict[str, Any], shape: Shape) -> tuple[str, ...]:
+    """Return the keys that say a covariance or sigmas as columns do: `c11` .. `c66`, `sigma_x` .."""
+    names = [*own]
+    return tuple(names[place] for place in find_columns(names, 36 if shape.kind == POSE else 9)[0])
+
+
+def _of_flat(own: dict[str, Any], flat: Sequence[str], reading: Reading) -> Components:
+    """Read the covariance that such keys say."""
+    numbers = [within((key,), read_number, own[key]) for key in flat]
+    _, sigma = find_columns(flat, 36 if len(flat) != POINT_ENTRIES else POINT_ENTRIES)
+    if not sigma:
+        within((flat[0],), check, numbers)
+        return tuple(numbers)
+    if negative := next((key for key, number in zip(flat, numbers, strict=True) if number < 0.0), ""):
+        raise NotARotation(f"sigma is negative: {own[negative]}", (negative,))
+    found = [0.0] * 6
+    for axis, (at, unit) in enumerate(sigma):
+        bare = "deg" if reading.degrees and axis > 2 else ""
+        found[axis] = 0.0 if at < 0 else in_unit(numbers[at], unit or bare)
+    return of_sigmas(found)
+
+
+def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
     """Add the covariance that sigmas say; none of its entries stands in the text, and the result names them anew."""
     size = 36 if record.shape.kind == POSE else 9
     degrees = reading.degrees
     reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
     try:
-        entries = within(path, read_covariance, own, reading)
+        entries = within(path, _of_flat, own, flat, reading) if flat else within(path, read_covariance, own, reading)
     finally:
         reading.degrees = degrees
-    if size == 9 and any(entries[18:]):
+    if size < len(entries) and any(entries[18:]):
         raise Misfit("a point does not turn; its sigma has xyz alone", (*path, SIGMA))
-    entries = entries if size == 36 else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
+    entries = entries if size == len(entries) else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
     return record._replace(
         shape=record.shape._replace(covariance=(size,), rewritten=True), numbers=(*record.numbers, *[None] * size),
-        values=(*record.values, *entries), others=(*record.others, SIGMA),
+        values=(*record.values, *entries), others=(*record.others, *(flat or (SIGMA,))),
     )  # fmt: skip
 
 

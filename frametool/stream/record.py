@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, on_earth
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain, on_earth
 from frametool.grammar.pose import (
     POSE_KEYS,
     POSITION_KEYS,
@@ -689,7 +689,8 @@ def holders(document: Any, place: Place, shape: Shape) -> list[Path]:
     """Return which mappings say a covariance: that of a record, or the one around it where a message has it so."""
     around = (place.path, place.path[:-1])[: 1 + (place.path[-1:] == (shape.kind,))]
     keys = {*place.covariances, *UNCERTAIN}
-    return [path for path in around if type(held := value_at(document, path)) is dict and not keys.isdisjoint(held)]
+    maps = [(path, held) for path in around if type(held := value_at(document, path)) is dict]
+    return [path for path, held in maps if not keys.isdisjoint(held) or any(map(may_be_uncertain, held))]
 
 
 def value_at(value: Any, path: Path) -> Any:

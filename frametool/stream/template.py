@@ -15,7 +15,7 @@ from frametool.documents.document import Aliased, Document, Node, parse_document
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
@@ -209,6 +209,8 @@ class Template:
                 yield leaf, f"{leaf.quote}[0-9]++{leaf.quote}"
             elif path in stamps:
                 yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
+            elif "sigma" in path or may_be_uncertain(key):
+                continue  # they say a covariance, and are no numbers of ours
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue
             else:

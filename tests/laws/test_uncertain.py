@@ -28,10 +28,13 @@ OTHER: dict[str, Any] = {"xyz": [0.5, -1.0, 0.25], "quaternion": {"x": 0.0, "y":
 ROW, B = (Transform.from_arrays(each["xyz"], list(each["quaternion"].values())) for each in (POSE, OTHER))
 NAMES = [f"c{i}{j}" for i in range(1, 7) for j in range(1, 7)]
 SIGMA_CELLS = dict(zip(("sigma_x", "sigma_y", "sigma_z", "sigma_roll", "sigma_pitch", "sigma_yaw"), SIGMAS, strict=True))
+MIXED = {"sigma_x_mm": 10.0, "sigma_y": 0.02, "sigma_z [cm]": 3.0, "sigma_roll": 0.04, "sigma_pitch": 0.05, "sigma_yaw": 0.06}
 SPELLINGS: dict[str, tuple[dict[str, Any], dict[str, Any], list[float]]] = {
     "none": ({}, {}, [0.0] * 36),
     "entries": ({"covariance": WHOLE}, dict(zip(NAMES, WHOLE, strict=True)), WHOLE),
     "rows": ({"covariance": np.reshape(WHOLE, (6, 6)).tolist()}, {}, WHOLE),
+    "keys of sigmas": (MIXED, MIXED, DIAGONAL),
+    "keys of entries": (dict(zip(NAMES, WHOLE, strict=True)), {}, WHOLE),
     "sigmas": ({"sigma": {"xyz": SIGMAS[:3], "rpy": SIGMAS[3:]}}, SIGMA_CELLS, DIAGONAL),
 }
 EXACT, UNSURE = json.dumps(OTHER), json.dumps(OTHER | {"covariance": DIAGONAL})
@@ -74,7 +77,7 @@ def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str
     beside, cells, own = SPELLINGS[spelling]
     if form == "file" and command.startswith("apply"):
         return  # its files are those of -i, as streams
-    if (spelling == "none" and "UNSURE" not in repr(arguments) and UNSURE not in arguments) or (form == "table" and spelling == "rows"):
+    if (spelling == "none" and "UNSURE" not in repr(arguments) and UNSURE not in arguments) or (form == "table" and spelling in ("rows", "keys of entries")):
         return
     expected = wanted(command, own)
     record, row = {"id": 7} | POSE | beside | {"note": "x"}, {"id": 7} | CELLS | cells | {"note": "x"}
@@ -89,6 +92,7 @@ def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str
             assert np.allclose(found, expected, rtol=1e-14, atol=1e-17), (way, out)
             bits |= {tuple(map(repr, each)) for each in found}
             assert "sigma" not in done.out
+            assert out == "csv" or form == "table" or "c11" not in done.out
             assert "note" in done.out
             if command not in ("axes", "apply"):
                 assert all(np.array_equal(np.reshape(each, (6, 6)), np.reshape(each, (6, 6)).T) for each in found)
@@ -257,3 +261,15 @@ def test_the_same_pose_twice_counts_as_two_and_that_is_told(run: Run) -> None:
     done = run("compose", "a.json", "inv(a.json)", files={"a.json": json.dumps(POSE | {"covariance": WHOLE})})
     assert done.err == "frametool: warning: 'a.json' stands twice: the two count as independent, as all poses do\n"
     assert run("compose", "a.json", "inv(a.json)", files={"a.json": json.dumps(POSE)}).err == ""
+
+
+@pytest.mark.parametrize(
+    "sigma", [{"sigma": {"xyz": "@"}}, {"sigma": {"xyz_cm": "@"}}, {"sigma": {"xyz": {"x": "@", "y": 1}}}, {"sigma": {"xyz": ["@", 0, 0], "rpy_deg": 1}}, {"sigma_x": "@"}],
+)  # fmt: skip
+def test_each_row_has_its_own_sigma(run: Run, sigma: Any) -> None:
+    """What is learned of one record holds for those that are alike; sigmas decide."""
+    lines = [json.dumps(POSE | sigma).replace('"@"', str(at % 7 + 1)) for at in range(40)]
+    done = run("compose", EXACT, "-", stdin="\n".join(lines) + "\n")
+    alone = [run("compose", EXACT, "-", stdin=line + "\n").out for line in lines[:7]]
+    assert done.out == "".join(alone[at % 7] for at in range(40))
+    assert len({*alone}) == 7
