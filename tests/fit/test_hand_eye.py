@@ -86,6 +86,7 @@ def test_exact_samples_give_x_and_z_to_twelve_digits(count: int, turn: float, ey
         assert found.z.is_close(made.z, angle=1e-12, distance=2e-12)
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("cut", CUTS)
 def test_it_is_seen_where_the_noise_is(cut: str) -> None:
     found = [solved(rig(cut, seed=seed, count=25)).noise_at for seed in range(8)]
@@ -151,6 +152,7 @@ def test_the_order_of_samples_does_not_matter() -> None:
     assert (back.used[::-1] == solved(made).used).all()
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("cut", CUTS)
 def test_covariances_are_those_of_many_draws(cut: str) -> None:
     made = rig(None, seed=6, count=12)

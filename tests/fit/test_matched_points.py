@@ -76,6 +76,7 @@ def test_wrong_pairs_are_left_out_and_told(count: int, wrong: int, scale: float)
     assert solve_points(target, source, scale=scale != 1.0, robust=False).used.all()
 
 
+@pytest.mark.large
 def test_sets_of_any_size_without_wrong_pairs_keep_all() -> None:
     for seed in range(10):
         target, source, _, _ = matched(seed=seed, count=4 + 2 * seed)

@@ -101,12 +101,14 @@ def test_the_inverted_row_is_named_and_no_other(frames: int, rows: int, seed: in
     assert left_out(solve_tree(truth.measurements)) == dict.fromkeys(truth.wrong, "inverted")
 
 
+@pytest.mark.large
 def test_two_rows_of_a_hundred_may_be_wrong_in_each_of_many_frames() -> None:
     truth = world(200, 500, 1).with_inverted(20)
     assert len(truth.wrong) == 20
     assert left_out(solve_tree(truth.measurements)) == dict.fromkeys(truth.wrong, "inverted")
 
 
+@pytest.mark.large
 def test_loops_are_worth_three_times_a_spanning_tree() -> None:
     ratios = []
     for seed in range(40):
@@ -191,6 +193,7 @@ def test_another_root_moves_the_tree_as_a_whole() -> None:
     assert np.allclose(one.u, two.u, atol=1e-8)
 
 
+@pytest.mark.large
 def test_covariances_are_those_of_many_draws() -> None:
     truth = world(5, 9, 2, noise=0.0, sigmas=True)
     generator = np.random.default_rng(0)
@@ -332,6 +335,7 @@ def test_a_long_loop_is_named_on_one_line() -> None:
     assert len(str(error.value)) <= 200
 
 
+@pytest.mark.large
 def test_noise_that_adds_up_around_a_loop_is_not_undecided() -> None:
     for seed in range(30):
         assert solve_tree(world(10, 15, seed).measurements).used.all()
@@ -445,6 +449,7 @@ def test_unknown_frames_are_named_with_the_nearest() -> None:
 # size, and the same bytes
 
 
+@pytest.mark.large
 def test_a_thousand_frames_come_to_an_end() -> None:
     truth = world(1000, 2500, 1, near=20).with_inverted(25)
     told: list[float] = []
