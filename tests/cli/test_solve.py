@@ -21,7 +21,7 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from conftest import Outcome
 
@@ -81,8 +81,13 @@ def tree_file(world: dict[str, Any], form: str) -> dict[str, str]:
     return {f"m.{form}": text, "fix.json": json.dumps({"frames": world["fix"]})}
 
 
-@pytest.mark.parametrize("form", ["yaml", "json", "jsonl"])
-@pytest.mark.parametrize("name", TREES)
+def each_in_turn(names: Iterable[str], forms: Sequence[str]) -> list[Any]:
+    """Pair names with forms: each with one of them in turn, the other pairs are large tests."""
+    pairs = [(name, form, at % len(forms) == place) for at, name in enumerate(names) for place, form in enumerate(forms)]
+    return [pytest.param(name, form, marks=() if is_turn else pytest.mark.large) for name, form, is_turn in pairs]
+
+
+@pytest.mark.parametrize(("name", "form"), each_in_turn(TREES, ["yaml", "json", "jsonl"]))
 def test_golden_worlds_are_solved_whatever_form_they_are_written_in(name: str, form: str, run: Run) -> None:
     world = TREES[name]
     fixed = ["--fix", "fix.json"] if world["fix"] else []
@@ -289,8 +294,7 @@ def flags(name: str) -> Sequence[str]:
     return ("--eye-to-hand",) if RIGS[name]["eye_to_hand"] else ()
 
 
-@pytest.mark.parametrize("form", ["csv", "tum", "jsonl", "samples"])
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize(("name", "form"), each_in_turn(RIGS, ["csv", "tum", "jsonl", "samples"]))
 def test_golden_rigs_are_solved_whatever_form_they_are_written_in(name: str, form: str, run: Run) -> None:
     rig = RIGS[name]
     files = samples_file(name) if form == "samples" else pose_files(name, form)
@@ -445,8 +449,7 @@ def points_files(name: str, form: str) -> dict[str, str]:
     return files
 
 
-@pytest.mark.parametrize("form", ["csv", "jsonl", "yaml"])
-@pytest.mark.parametrize("name", POINTS)
+@pytest.mark.parametrize(("name", "form"), each_in_turn(POINTS, ["csv", "jsonl", "yaml"]))
 def test_golden_points_are_solved_whatever_form_they_are_written_in(name: str, form: str, run: Run) -> None:
     case, files = POINTS[name], points_files(name, form)
     scale = ("--scale",) if case["scaled"] else ()

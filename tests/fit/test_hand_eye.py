@@ -252,6 +252,7 @@ def test_small_turns_are_warned_of() -> None:
     assert found.warnings == ["turns about a second axis are small (2.7 deg rms beside 1.000 -0.008 -0.008 in gripper): turn more"]
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("wrong", [0, 3])
 @pytest.mark.parametrize("turn", [0.1, 0.4, 1.0])
 @pytest.mark.parametrize("inverted", ["gripper", "target"])

@@ -83,6 +83,7 @@ def test_sets_of_any_size_without_wrong_pairs_keep_all() -> None:
         assert solve_points(target, source).used.all()
 
 
+@pytest.mark.large
 def test_moving_both_sides_moves_the_transform() -> None:
     target, source, _, rows = matched(wrong=3)
     plain, there = solve_points(target, source), solve_points(MOVED.apply(target), source)

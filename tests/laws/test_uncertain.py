@@ -83,7 +83,7 @@ def test_each_way_and_each_form_gives_the_same_covariance(run: Run, command: str
     record, row = {"id": 7} | POSE | beside | {"note": "x"}, {"id": 7} | CELLS | cells | {"note": "x"}
     for way in ways(form, record, row):
         bits = set()
-        for out in ("json", "csv", "yaml", *[None] * (way.argument == "-")):
+        for out in ("json", *([] if way.rows > 1 else ["csv", "yaml"]), *[None] * (way.argument == "-")):
             told = ("-f", out) if out else ()
             done = given(run, (*arguments, *told), way)
             assert done.status == 0, done.err
