@@ -21,7 +21,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
-from frametool.grammar.pose import UNCERTAIN, read_pose
+from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 TAKEN = frozenset(FUNCTIONS)
 PI = 3.141592653589793
 NAME = "literal"
-LEFT_OUT = "covariances left out: calc has none"
 AXES = ("x", "y", "z")
 PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("vx", "vy", "vz", "wx", "wy", "wz"))}
 
@@ -87,9 +86,10 @@ class Scope:
 
     def leave_out(self, covariances: object) -> None:
         """Tell once that no expression calculates with covariances, where there are any."""
-        if covariances and LEFT_OUT not in self.told:
-            self.told.add(LEFT_OUT)
-            warn(LEFT_OUT)
+        told = LEFT_OUT.format("calc")
+        if covariances and told not in self.told:
+            self.told.add(told)
+            warn(told)
 
     def with_row(self, row: Type) -> Scope:
         """Return the same scope for rows of a type, its names its own."""
@@ -236,7 +236,7 @@ class _Walk:
             raise CalcError(error.message) from None
         except Misfit as misfit:
             raise CalcError(str(misfit)) from None
-        self.scope.leave_out(not UNCERTAIN.isdisjoint(document.value))
+        self.scope.leave_out(not COVARIANCE_KEYS.isdisjoint(document.value))
         for note in reading.notes:
             warn(note.message)
         return term

@@ -18,7 +18,7 @@ import click
 
 from frametool.cli.commands import TROUBLE
 from frametool.cli.group import answered, called, called_in, group
-from frametool.cli.shell_words import NAME, Words, split
+from frametool.cli.shell_words import NAME, ShellWords, split
 from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.cli.trees import TreeCache
 from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
@@ -46,7 +46,7 @@ class CommandLine(NamedTuple):
 
     number: int
     name: str
-    words: Words
+    words: ShellWords
 
 
 def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
@@ -65,17 +65,17 @@ def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
             if joined > MOST_JOINED:
                 raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
             name, words = _taken_apart(text)
-        yield CommandLine(number, name, Words([], problem) if problem else words)
+        yield CommandLine(number, name, ShellWords([], problem) if problem else words)
 
 
-def _taken_apart(text: str) -> tuple[str, Words]:
+def _taken_apart(text: str) -> tuple[str, ShellWords]:
     """Return the name before `=`, if there is one, and the words behind it."""
     found = _ASSIGNMENT.match(text)
     if found is None:
         return "", split(text)
     words = split(text[found.end() :])
     if not (words.words or words.problem or words.goes_on):
-        words = Words([], f"no command behind {found[1]} =")
+        words = ShellWords([], f"no command behind {found[1]} =")
     return found[1], words
 
 

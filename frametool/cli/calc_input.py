@@ -30,7 +30,7 @@ from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 from frametool.formats.table import FORMATS, is_trajectory
-from frametool.grammar.pose import UNCERTAIN
+from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
@@ -98,7 +98,7 @@ def _values(source: Source, scope: Scope) -> Term | None:
         return None
     if len(documents) == 1 and type(documents[0]) is dict and not PLACED.keys().isdisjoint(documents[0]):
         try:
-            scope.leave_out(not UNCERTAIN.isdisjoint(documents[0]))
+            scope.leave_out(not COVARIANCE_KEYS.isdisjoint(documents[0]))
             return literal(documents[0], scope.reading(source))
         except Misfit as misfit:
             raise misfit.placed(source, 0) from None

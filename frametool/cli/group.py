@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SETTINGS = "frametool.settings"  # the key in a context's `meta`
 
 
-class Settings:
+class CommandSettings:
     """What the options of the running command say about its inputs, each under its parameter's name.
 
     These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
@@ -55,13 +55,13 @@ class Settings:
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
 
 
-def settings(context: click.Context | None = None) -> Settings:
+def settings(context: click.Context | None = None) -> CommandSettings:
     """Return the settings of a context, or of the running command; where none runs, nothing is set but --quiet."""
     context = context or click.get_current_context(silent=True)
     if context is not None:
-        found: Settings = context.meta.setdefault(SETTINGS, Settings())
+        found: CommandSettings = context.meta.setdefault(SETTINGS, CommandSettings())
         return found
-    silent = Settings()
+    silent = CommandSettings()
     silent.quiet = True
     return silent
 
@@ -322,7 +322,7 @@ class Prepared(NamedTuple):
     parser: Any
     absent: Mapping[str, Any]
     values: Mapping[str, Any]
-    settings: Settings
+    settings: CommandSettings
 
 
 class Reused(click.Command):

@@ -52,7 +52,7 @@ class WordPart(NamedTuple):
     is_name: bool = False
 
 
-class Words(NamedTuple):
+class ShellWords(NamedTuple):
     """The words of a line, each in its pieces.
 
     problem: why they cannot be taken; "" if they can
@@ -68,10 +68,10 @@ class Words(NamedTuple):
         return ["".join(value_of(part.text) if part.is_name else part.text for part in word) for word in self.words]
 
 
-def split(line: str) -> Words:
+def split(line: str) -> ShellWords:
     """Take a line apart; a `#` that begins a word begins a comment."""
     if not _SPECIAL.search(line):
-        return Words([[WordPart(word)] for word in line.replace("\t", " ").split(" ") if word])
+        return ShellWords([[WordPart(word)] for word in line.replace("\t", " ").split(" ") if word])
     words: list[list[WordPart]] = []
     word: list[WordPart] | None = None
     problem = ""
@@ -83,9 +83,9 @@ def split(line: str) -> Words:
         if text == "#" and word is None:
             break
         if kind == "special" and (text == "\\" or (text in "'\"" and _ends_in_backslash(line))):
-            return Words(words, problem, goes_on=True)
+            return ShellWords(words, problem, goes_on=True)
         if kind == "special" and text in "'\"":
-            return Words(words, problem or f"the {text} in column {token.start() + 1} is not closed")
+            return ShellWords(words, problem or f"the {text} in column {token.start() + 1} is not closed")
         try:
             parts = list(_parts(kind, token[kind], is_first=word is None))
         except Misused as refused:
@@ -95,7 +95,7 @@ def split(line: str) -> Words:
             word = []
             words.append(word)
         word += parts
-    return Words(words, problem)
+    return ShellWords(words, problem)
 
 
 def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Components
     from frametool.stream.measurements import Measurement
-    from frametool.stream.samples import Samples
+    from frametool.stream.samples import HandEyeSamples
     from frametool.view.solution_text import Solution, SolvedFrame, SolvedRow
 
 NAMES = ("base", "gripper", "camera", "target")
@@ -187,7 +187,7 @@ def _count(samples: Sequence[object]) -> str:
     return f"{len(samples)} sample{'s'[: len(samples) != 1]}"
 
 
-def _paired(files: Sequence[str], max_gap_ns: int | None, *, normalize: bool) -> Samples:
+def _paired(files: Sequence[str], max_gap_ns: int | None, *, normalize: bool) -> HandEyeSamples:
     from frametool.cli.comparing import forms_of, trajectory
     from frametool.fit.pairs import paired_samples
 
@@ -209,7 +209,7 @@ def _hand_eye_names(said: Sequence[str] | None, found: Sequence[str | None]) -> 
     return base, gripper, camera, target
 
 
-def _hand_eye_solution(found: HandEye, samples: Samples, names: tuple[str, str, str, str]) -> Solution:
+def _hand_eye_solution(found: HandEye, samples: HandEyeSamples, names: tuple[str, str, str, str]) -> Solution:
     from frametool.view.solution_text import Solution
 
     holder, other, camera, target = names

@@ -76,7 +76,7 @@ class Elimination:
         part = matrix.reshape(len(rows), SIX, len(columns), SIX).swapaxes(1, 2)
         blocks[self._slot[np.ix_(rows, columns)]] = part
 
-    def factored(self, blocks: Array) -> Factor:
+    def factored(self, blocks: Array) -> BlockFactor:
         """Eliminate all bodies of a positive definite matrix."""
         left = blocks.copy()
         pivots: list[Any] = []
@@ -88,10 +88,10 @@ class Elimination:
                 self.scattered(left, seen, seen, self.gathered(left, seen, seen) - beside.T @ gain)
             pivots.append(pivot)
             gains.append(gain)
-        return Factor(self, pivots, gains)
+        return BlockFactor(self, pivots, gains)
 
 
-class Factor(NamedTuple):
+class BlockFactor(NamedTuple):
     """A matrix after elimination.
 
     pivots: of each step, the matrix of its bodies when their turn came; gains: inv(pivot) times what they see

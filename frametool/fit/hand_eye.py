@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.rigid_arrays import Poses, inverse_left_jacobian, skew
+from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.rigid_arrays import log as rotvecs_of
 from frametool.fit.robust import KEPT, LEAST, deviations, draws, fitted_sigmas, lengths, require_near, settled
 
@@ -40,7 +40,7 @@ CLEARLY = 2.0  # times, that both metres and radians must be better
 FLAT, FLAT_SHARE = radians(0.5), 0.02  # turns about the second axis: none, also as a part of those about the first
 SLIGHT = radians(5.0)
 CLEAR = (radians(1.0), radians(175.0))  # turns of a pair whose axis is certain
-ONE = Poses(np.eye(3), np.zeros(3))
+ONE = PoseArrays(np.eye(3), np.zeros(3))
 
 
 class HandEye(NamedTuple):
@@ -85,7 +85,7 @@ def solve_hand_eye(
         raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
     if (count := len(gripper)) < FEWEST:
         raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
-    given, camera = Poses.of(gripper), Poses.of(target)
+    given, camera = PoseArrays.of(gripper), PoseArrays.of(target)
     require_near(given.places, "gripper")
     require_near(camera.places, "target")
     hand = given.inverse if eye_to_hand else given
@@ -147,8 +147,8 @@ class _Model(NamedTuple):
     ratio: sigmas that the fit may only scale
     """
 
-    x: Poses
-    z: Poses
+    x: PoseArrays
+    z: PoseArrays
     cut: str = "target"
     ratio: Array | None = None
     sigmas: Array = np.ones(2)
@@ -159,13 +159,13 @@ class _Model(NamedTuple):
 class _Loop(NamedTuple):
     """The same errors E = left X right = before inv(Z) after: how X and how Z stand in them."""
 
-    left: Poses
-    right: Poses
-    before: Poses
-    after: Poses
+    left: PoseArrays
+    right: PoseArrays
+    before: PoseArrays
+    after: PoseArrays
 
 
-CUTS: dict[str, Callable[[Poses, Poses, Poses, Poses], _Loop]] = {
+CUTS: dict[str, Callable[[PoseArrays, PoseArrays, PoseArrays, PoseArrays], _Loop]] = {
     "target": lambda g, c, x, z: _Loop(z.inverse @ g, c, ONE, g @ x @ c),
     "camera": lambda g, c, x, z: _Loop(c @ z.inverse @ g, ONE, c, g @ x),
     "gripper": lambda g, c, x, z: _Loop(ONE, c @ z.inverse @ g, x @ c, g),
@@ -175,8 +175,8 @@ CUTS: dict[str, Callable[[Poses, Poses, Poses, Poses], _Loop]] = {
 class _Samples(NamedTuple):
     """Pairs of poses: of the gripper, and of the target in the camera."""
 
-    gripper: Poses
-    camera: Poses
+    gripper: PoseArrays
+    camera: PoseArrays
 
     def at(self, index: Rows) -> _Samples:
         return _Samples(self.gripper.at(index), self.camera.at(index))
@@ -223,7 +223,7 @@ class _Samples(NamedTuple):
         return model._replace(sigmas=sigmas, hessian=weighted @ slopes, misfit=misfit), weighted @ errors.reshape(-1)
 
 
-def _errors(loop: _Loop, x: Poses) -> Array:
+def _errors(loop: _Loop, x: PoseArrays) -> Array:
     off = loop.left @ x @ loop.right
     return np.concatenate([off.places, rotvecs_of(off.turns)], 1)
 
@@ -252,13 +252,13 @@ def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
         if _turns(chosen.gripper).rms[1] < FLAT:
             continue
         x = park_martin(*chosen)
-        z = Poses.of((chosen.gripper @ x @ chosen.camera).transform.mean())
+        z = PoseArrays.of((chosen.gripper @ x @ chosen.camera).transform.mean())
         medians = np.maximum(np.median(lengths(samples.residuals(_Model(x, z))), axis=0), LEAST)
         best = min(best, (log(medians[0]) + log(medians[1]), _Model(x, z), medians), key=lambda each: each[0])
     return best[1:]
 
 
-def park_martin(gripper: Poses, camera: Poses) -> Poses:
+def park_martin(gripper: PoseArrays, camera: PoseArrays) -> PoseArrays:
     """Return the X of A X = X B, in closed form: first the rotation, then the place; source: Park and Martin 1994.
 
     A and B are the motions of gripper and camera between two samples: R_X turns the rotation vectors of B onto those
@@ -272,15 +272,15 @@ def park_martin(gripper: Poses, camera: Poses) -> Poses:
     u, _, v = np.linalg.svd(alpha.T @ beta)
     turn = u * [1.0, 1.0, np.sign(np.linalg.det(u @ v))] @ v
     place, _ = _least_squares((a.turns - np.eye(3)).reshape(-1, 3), (b.places @ turn.T - a.places).reshape(-1))
-    return Poses(turn, place)
+    return PoseArrays(turn, place)
 
 
-def _motions(gripper: Poses, camera: Poses) -> tuple[Poses, Poses]:
+def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
     i, j = _pairs(len(gripper.places))
     return gripper.at(i).inverse @ gripper.at(j), camera.at(i) @ camera.at(j).inverse
 
 
-def _scale_warnings(samples: _Samples, x: Poses) -> list[str]:
+def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
     """Say of a factor on the target's places that would fit much better which: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
     lever, turned = (a.turns - np.eye(3)).reshape(-1, 3), (b.places @ x.turns.T).reshape(-1)
@@ -313,7 +313,7 @@ class _Turns(NamedTuple):
     axis: str
 
 
-def _turns(gripper: Poses) -> _Turns:
+def _turns(gripper: PoseArrays) -> _Turns:
     i, j = _pairs(len(gripper.places))
     turns = rotvecs_of(np.swapaxes(gripper.turns[i], 1, 2) @ gripper.turns[j])
     squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))

@@ -11,8 +11,8 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.bodies import bodies_of, require_connected
 from frametool.fit.graph import bridges
-from frametool.fit.rigid_arrays import Poses
-from frametool.fit.tree_solver import Fitted, Rows, TreeProblem
+from frametool.fit.rigid_arrays import PoseArrays
+from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
 from frametool.fit.uncertainty import Uncertainty
 from frametool.fit.verdicts import judged, place_of
 from frametool.geometry.transform import Transform
@@ -62,7 +62,7 @@ def solve_tree(
         raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
 
 
-def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> Rows:
+def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
     """Return measurements as arrays."""
     parents, children = [m.parent for m in measurements], [m.child for m in measurements]
     information = np.zeros((len(measurements), 6, 6))
@@ -71,7 +71,7 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> Rows:
             covariance = np.array(each.covariance, float).reshape(6, 6)
             _require_regular(covariance, place_of(measurements, row))
             information[row] = np.linalg.inv(covariance)
-    return Rows(
+    return TreeRows(
         np.array([bodies.number[name] for name in parents]),
         np.array([bodies.number[name] for name in children]),
         _poses([bodies.pose[name] for name in parents]),
@@ -88,9 +88,9 @@ def _require_regular(covariance: Array, place: str) -> None:
         raise ValueInvalid(f"{place}: the covariance is exact in some direction; exact: --fix")
 
 
-def _poses(transforms: list[Transform]) -> Poses:
+def _poses(transforms: list[Transform]) -> PoseArrays:
     parts = zip(*(each.components for each in transforms), strict=True)
-    return Poses.of(Transform.of(*(np.array(part, float) for part in parts)))
+    return PoseArrays.of(Transform.of(*(np.array(part, float) for part in parts)))
 
 
 class TreeSolution:
@@ -173,7 +173,7 @@ class TreeSolution:
             raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
         return frame
 
-    def _at(self, frame: str) -> tuple[int, Poses]:
+    def _at(self, frame: str) -> tuple[int, PoseArrays]:
         return self._of.number[self._known(frame)], self._poses.at(self.frames.index(frame))
 
     def _entries(self) -> dict[str, str]:

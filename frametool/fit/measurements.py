@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import NotConnected, printable
-from frametool.fit.rigid_arrays import Poses
+from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.robust import KEPT
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
@@ -61,7 +61,7 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
 }
 
 
-def best_blunder(measurement: Measurement, pose: Poses, information: Array) -> str | None:
+def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array) -> str | None:
     """Name the blunder that best explains a measurement of a pose; None where none does.
 
     pose: where the child is in the parent; information: the inverse covariance (6, 6) of the measurement
@@ -70,7 +70,7 @@ def best_blunder(measurement: Measurement, pose: Poses, information: Array) -> s
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
-    poses = Poses.of(Transform.of(*map(np.array, zip(*(each.components for each in tried), strict=True))))
+    poses = PoseArrays.of(Transform.of(*map(np.array, zip(*(each.components for each in tried), strict=True))))
     errors = pose.at(None).errors(poses)
     u = _sigmas(errors, information)
     best = int(u[:-1].argmin())
@@ -94,11 +94,11 @@ def loops(
         if unknown:
             continue
         try:
-            pose = Poses.of(tree.lookup(each.parent, each.child))
+            pose = PoseArrays.of(tree.lookup(each.parent, each.child))
         except NotConnected:
             apart += 1
             continue
-        error = pose.errors(Poses.of(each.transform))
+        error = pose.errors(PoseArrays.of(each.transform))
         metres, radians = (float(np.linalg.norm(half)) for half in (error[:3], error[3:]))
         if tolerance is None and each.covariance is not None:
             information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)

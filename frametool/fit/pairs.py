@@ -12,7 +12,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.trajectory import BODY, WORLD
-from frametool.stream.samples import Samples
+from frametool.stream.samples import HandEyeSamples
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,7 +106,9 @@ def _inside(stamps_ns: Array, span: Array) -> int:
     return int(np.count_nonzero((span[0] <= stamps_ns) & (stamps_ns <= span[-1])))
 
 
-def paired_samples(gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None) -> Samples:
+def paired_samples(
+    gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None
+) -> HandEyeSamples:
     """Pair poses: the gripper's at the target's stamps, or row by row where not both have stamps.
 
     Between two that are no more than a gap apart it is interpolated, else the nearest within the gap is taken.
@@ -121,7 +123,8 @@ def paired_samples(gripper: Trajectory, target: Trajectory, files: tuple[str, st
         if gripper.size != target.size:
             counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
             raise ValueInvalid(f"{counts}, and no stamps to pair them")
-        return Samples(gripper.poses, target.poses, _places(files[1], target, range(target.size)), tuple(names), files)
+        places = _places(files[1], target, range(target.size))
+        return HandEyeSamples(gripper.poses, target.poses, places, tuple(names), files)
     gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
     made, is_between = between(dense, target.stamps_ns, gap_ns)
     index = np.searchsorted(dense.stamps_ns, target.stamps_ns).clip(1, max(dense.size - 1, 1))
@@ -138,7 +141,7 @@ def paired_samples(gripper: Trajectory, target: Trajectory, files: tuple[str, st
     if alone := target.size - len(kept):
         told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
     sides = chosen.at(kept).poses, target.at(kept).poses
-    return Samples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", told)
+    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", told)
 
 
 def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
 
 
-class Poses(NamedTuple):
+class PoseArrays(NamedTuple):
     """Many poses, or one without the first axis."""
 
     turns: Any
     places: Any
 
     @classmethod
-    def of(cls, transform: Transform) -> Poses:
+    def of(cls, transform: Transform) -> PoseArrays:
         """Take transforms."""
         whole = transform.as_matrix()
         return cls(whole[..., :3, :3].copy(), whole[..., :3, 3].copy())
@@ -40,29 +40,29 @@ class Poses(NamedTuple):
         return Transform.of(x, y, z, *as_quaternion(self.turns))
 
     @property
-    def inverse(self) -> Poses:
+    def inverse(self) -> PoseArrays:
         """The poses the other way round."""
         back = np.swapaxes(self.turns, -1, -2)
-        return Poses(back, -np.einsum("...ij,...j->...i", back, self.places))
+        return PoseArrays(back, -np.einsum("...ij,...j->...i", back, self.places))
 
-    def __matmul__(self, other: Poses) -> Poses:
+    def __matmul__(self, other: PoseArrays) -> PoseArrays:
         """Compose: a_from_c = a_from_b @ b_from_c."""
-        return Poses(self.turns @ other.turns, self.apply(other.places))
+        return PoseArrays(self.turns @ other.turns, self.apply(other.places))
 
     def apply(self, points: Array) -> Array:
         """Move points."""
         moved: Array = np.einsum("...ij,...j->...i", self.turns, points) + self.places
         return moved
 
-    def at(self, index: Any) -> Poses:
+    def at(self, index: Any) -> PoseArrays:
         """Choose poses as numpy does."""
-        return Poses(self.turns[index], self.places[index])
+        return PoseArrays(self.turns[index], self.places[index])
 
-    def stepped(self, steps: Array) -> Poses:
+    def stepped(self, steps: Array) -> PoseArrays:
         """Add small steps: place + d[:3], Exp(d[3:]) turn."""
-        return Poses(exp(steps[..., 3:]) @ self.turns, self.places + steps[..., :3])
+        return PoseArrays(exp(steps[..., 3:]) @ self.turns, self.places + steps[..., :3])
 
-    def errors(self, measured: Poses) -> Array:
+    def errors(self, measured: PoseArrays) -> Array:
         """Return [place - measured place, Log(turn measured turn')]."""
         turned = log(self.turns @ np.swapaxes(measured.turns, -1, -2))
         return np.concatenate([self.places - measured.places, turned], -1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.rigid_arrays import Poses
+from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.robust import LEAST, draws, lengths, require_near, settled
 from frametool.geometry import validation
 from frametool.geometry.spread import Spread, mean_and_spread
@@ -51,14 +51,14 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
     require_near(poses.xyz, "poses")
     mass = validation.masses(weights, poses.shape)
     counts = mass > 0.0
-    heavy, rows, roots = poses[counts], Poses.of(poses[counts]), np.sqrt(mass[counts])[:, None]
+    heavy, rows, roots = poses[counts], PoseArrays.of(poses[counts]), np.sqrt(mass[counts])[:, None]
 
     def mean(kept: Array | Mask) -> tuple[Transform, Spread]:
         chosen = kept > 0.0
         return mean_and_spread(heavy[chosen], None if weights is None else mass[counts][chosen])
 
     def residuals(middle: Transform) -> Array:
-        found: Array = roots * rows.errors(Poses.of(middle))
+        found: Array = roots * rows.errors(PoseArrays.of(middle))
         return found
 
     robust = robust and len(heavy) >= FEWEST_ROBUST
@@ -72,7 +72,7 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
     )
     used, count = counts.copy(), int(found.kept.sum())
     used[used] = found.kept
-    off = Poses.of(poses).errors(Poses.of(found.model))
+    off = PoseArrays.of(poses).errors(PoseArrays.of(found.model))
     s_t, s_r = map(float, found.sigmas)
     kept = found.residuals[found.kept]
     return MeanFit(

@@ -14,7 +14,7 @@ import numpy as np
 
 from frametool.fit.elimination import Elimination
 from frametool.fit.graph import SpanningTree, bridges, spanning_tree
-from frametool.fit.rigid_arrays import Poses, inverse_left_jacobian, skew
+from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.robust import KEPT, LEAST, MEDIAN_OF_SIX, first_weights, median_sigma, rms_sigma
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Noise(NamedTuple):
     factor: float = 1.0
 
 
-class Rows(NamedTuple):
+class TreeRows(NamedTuple):
     """Measurements as arrays.
 
     parent, child: the bodies; in_parent, in_child: where the measured frames are in them
@@ -49,9 +49,9 @@ class Rows(NamedTuple):
 
     parent: Indices
     child: Indices
-    in_parent: Poses
-    in_child: Poses
-    measured: Poses
+    in_parent: PoseArrays
+    in_child: PoseArrays
+    measured: PoseArrays
     given: Any
     information: Array
 
@@ -59,18 +59,18 @@ class Rows(NamedTuple):
 class Fitted(NamedTuple):
     """Bodies that fit the kept rows best; estimated: whether these rows tell their own noise."""
 
-    bodies: Poses
+    bodies: PoseArrays
     kept: Any
     noise: Noise
     estimated: bool
 
 
-def identities(count: int) -> Poses:
+def identities(count: int) -> PoseArrays:
     """Return poses that are all at the root."""
-    return Poses(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
+    return PoseArrays(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
 
 
-def jacobians(parent: Poses, child: Poses, turned: Array) -> tuple[Array, Array]:
+def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Array, Array]:
     """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
     back = np.swapaxes(parent.turns, -1, -2)
     turn = inverse_left_jacobian(turned) @ back
@@ -81,7 +81,7 @@ def jacobians(parent: Poses, child: Poses, turned: Array) -> tuple[Array, Array]
     return by_parent, by_child
 
 
-def of_body(jacobian: Array, body: Poses, frame: Poses) -> Array:
+def of_body(jacobian: Array, body: PoseArrays, frame: PoseArrays) -> Array:
     """Return the Jacobian by the step of a body from that by the step of a frame in it: the lever arm turns along."""
     moved = jacobian.copy()
     moved[..., 3:] -= jacobian[..., :3] @ skew(frame.places - body.places)
@@ -91,7 +91,7 @@ def of_body(jacobian: Array, body: Poses, frame: Poses) -> Array:
 class TreeProblem:
     """Rows between bodies, and the poses that fit them."""
 
-    def __init__(self, rows: Rows, count: int) -> None:
+    def __init__(self, rows: TreeRows, count: int) -> None:
         """Order the unknown poses for elimination."""
         self.rows, self.count, self.size = rows, count, len(rows.parent)
         self.unknown = count - 1
@@ -103,12 +103,12 @@ class TreeProblem:
         self._of_child = np.flatnonzero(between & (rows.child > 0))
         self._of_both = np.flatnonzero(between & (rows.parent > 0) & (rows.child > 0))
 
-    def ends(self, bodies: Poses) -> tuple[Poses, Poses]:
+    def ends(self, bodies: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
         """Return where the frames are that each row is between."""
         rows = self.rows
         return bodies.at(rows.parent) @ rows.in_parent, bodies.at(rows.child) @ rows.in_child
 
-    def errors(self, bodies: Poses) -> Array:
+    def errors(self, bodies: PoseArrays) -> Array:
         """Return the residuals, (n, 6)."""
         parent, child = self.ends(bodies)
         return (parent.inverse @ child).errors(self.rows.measured)
@@ -129,7 +129,7 @@ class TreeProblem:
 
     # the start
 
-    def start(self, trees: int) -> Poses:
+    def start(self, trees: int) -> PoseArrays:
         """Place the bodies by the spanning tree that the other rows, wrong ones too, agree with most.
 
         Tried are the rows in their order, shuffled, and last by how well each ever closed a loop: wrong rows never do.
@@ -152,7 +152,7 @@ class TreeProblem:
                 orders, trees = [np.argsort(closest, kind="stable").tolist()], 1
         return best
 
-    def placed(self, trees: list[SpanningTree]) -> Poses:
+    def placed(self, trees: list[SpanningTree]) -> PoseArrays:
         """Return where the rows of trees put the bodies, (trees, bodies): ways to the root by doubling."""
         rows = self.rows
         above, row = np.array([tree.above for tree in trees]), np.array([tree.row for tree in trees])
@@ -162,7 +162,7 @@ class TreeProblem:
         turns = np.where(down[..., None, None], forth.turns, back.turns)
         places = np.where(down[..., None], forth.places, back.places)
         turns[:, 0], places[:, 0] = np.eye(3), 0.0
-        poses = Poses(turns, places)
+        poses = PoseArrays(turns, places)
         each = np.arange(len(trees))[:, None]
         while above.any():
             poses = poses.at((each, above)) @ poses
@@ -171,7 +171,7 @@ class TreeProblem:
 
     # Gauss-Newton
 
-    def normal_equations(self, bodies: Poses, information: Array) -> tuple[Array, Array, float]:
+    def normal_equations(self, bodies: PoseArrays, information: Array) -> tuple[Array, Array, float]:
         """Return J'LJ as blocks, J'Lr (unknown, 6) and r'Lr."""
         rows, (parent, child) = self.rows, self.ends(bodies)
         errors = (parent.inverse @ child).errors(rows.measured)
@@ -193,7 +193,7 @@ class TreeProblem:
     def _add(self, blocks: Array, a: Indices, b: Indices, by_a: Array, information: Array, by_b: Array) -> None:
         np.add.at(blocks, self.elimination.slots(a - 1, b - 1), by_a.swapaxes(1, 2) @ information @ by_b)
 
-    def improved(self, bodies: Poses, information: Array, damping: float) -> tuple[Poses, float, float]:
+    def improved(self, bodies: PoseArrays, information: Array, damping: float) -> tuple[PoseArrays, float, float]:
         """Take one step, damped until it helps; returns the bodies, the size of the step and the damping."""
         blocks, gradient, before = self.normal_equations(bodies, information)
         every = np.arange(self.unknown)
@@ -212,7 +212,7 @@ class TreeProblem:
             damping = max(damping * 10, 1e-6)
         return bodies, 0.0, 0.0
 
-    def settled(self, bodies: Poses, kept: Any, noise: Noise, *, estimate: bool) -> tuple[Poses, Noise]:
+    def settled(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool) -> tuple[PoseArrays, Noise]:
         """Return the least squares of the kept rows, and their noise, both at rest."""
         damping = 0.0
         for _ in range(STEPS):
@@ -255,7 +255,7 @@ class TreeProblem:
             noise = noise._replace(place=place, turn=turn)
         return noise
 
-    def weighed_down(self, bodies: Poses, looped: Any) -> tuple[Poses, Noise]:
+    def weighed_down(self, bodies: PoseArrays, looped: Any) -> tuple[PoseArrays, Noise]:
         """Return the fit with first weights and the noise by medians, both at rest."""
         noise, weights, damping = self.medians(self.errors(bodies), looped), np.ones(self.size), 0.0
         for _ in range(FIRST_ROUNDS):
@@ -280,7 +280,7 @@ class TreeProblem:
         told(0.6)
         return self.selected(bodies, kept, noise, robust=robust)
 
-    def selected(self, bodies: Poses, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
+    def selected(self, bodies: PoseArrays, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
         """Fit the kept rows and test all of them again, until the set stays."""
         for _ in range(ROUNDS):
             found = self.refitted(bodies, kept, noise)
@@ -289,7 +289,7 @@ class TreeProblem:
                 break
         return found
 
-    def refitted(self, bodies: Poses, kept: Any, noise: Noise) -> Fitted:
+    def refitted(self, bodies: PoseArrays, kept: Any, noise: Noise) -> Fitted:
         """Fit the kept rows, and the nearest of the others where frames would be cut off without."""
         u = self.u(self.errors(bodies), noise)
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))

@@ -11,8 +11,8 @@ from frametool.fit.graph import Groups
 from frametool.fit.tree_solver import Fitted, TreeProblem, jacobians, of_body
 
 if TYPE_CHECKING:
-    from frametool.fit.elimination import Factor
-    from frametool.fit.rigid_arrays import Poses
+    from frametool.fit.elimination import BlockFactor
+    from frametool.fit.rigid_arrays import PoseArrays
     from frametool.geometry.types import Array
 
 
@@ -28,7 +28,7 @@ class Uncertainty:
         known = np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist()
         self._known = Groups(problem.count, (problem.pairs[row] for row in known))
 
-    def between(self, target: tuple[int, Poses], source: tuple[int, Poses]) -> Array | None:
+    def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
         """Return that of source in target, each a body and where the frame is."""
         (t, a), (s, b) = target, source
         if t == s:
@@ -40,7 +40,7 @@ class Uncertainty:
             right[body] = of_body(by, self._found.bodies.at(body), frame).T
         return _symmetric(np.einsum("nij,nik->jk", right[1:], self._factor.solve(right[1:])))
 
-    def in_root(self, body: int, frame: Poses) -> Array | None:
+    def in_root(self, body: int, frame: PoseArrays) -> Array | None:
         """Return that of a frame in the root."""
         if not body:
             return np.zeros((6, 6))
@@ -50,7 +50,7 @@ class Uncertainty:
         return _symmetric(arm @ self._of_bodies[body - 1] @ arm.T)
 
     @cached_property
-    def _factor(self) -> Factor:
+    def _factor(self) -> BlockFactor:
         information = self._problem.information(self._found.noise) * self._found.kept[:, None, None]
         return self._problem.elimination.factored(self._problem.normal_equations(self._found.bodies, information)[0])
 

@@ -16,7 +16,7 @@ from frametool.fit.uncertainty import Uncertainty
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.fit.rigid_arrays import Poses
+    from frametool.fit.rigid_arrays import PoseArrays
     from frametool.fit.tree_solver import Fitted, TreeProblem
     from frametool.geometry.types import Array
     from frametool.stream.measurements import Measurement
@@ -115,7 +115,7 @@ class _Case:
         doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
         return information if doubt is None else np.asarray(np.linalg.inv(np.linalg.inv(information) + doubt))
 
-    def _pose_without(self, rival: int, row: int) -> Poses:
+    def _pose_without(self, rival: int, row: int) -> PoseArrays:
         """Return the pose that a rival would measure, were the bodies that hang by it placed by a row left out."""
         measured, pairs = self.problem.rows.measured.at(row), self.problem.pairs
         hanging = set(self.tree.beyond(rival))

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import rigid
+from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Components, Number, Rigid
 
-RIGID, SCALED, UNCERTAIN = 7, 8, 43  # components
+NOT_BOTH = "the covariance cannot be carried through a scale; leave one of them out"
 SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
 
 
 def compose(a: Components, b: Components) -> Components:
     """Return a_from_c of a_from_b and b_from_c: s = s1 s2, R = R1 R2, t = t1 + s1 R1 t2."""
-    if len(a) == len(b) == RIGID:
+    if len(a) == len(b) == EXACT:
         return rigid.compose(*a, *b)
     first, second = pose_of(a), pose_of(b)
     if SCALED in (len(a), len(b)):
@@ -41,18 +42,18 @@ def inverse(a: Components) -> Components:
     if len(a) == SCALED:
         s = scale_of(a)
         return (x / s, y / s, z / s, *rotation, 1.0 / s)
-    if len(a) == RIGID:
+    if len(a) == EXACT:
         return (x, y, z, *rotation)
     from frametool.geometry import uncertainty
 
-    return (x, y, z, *rotation, *uncertainty.inverted(pose, a[RIGID:]))
+    return (x, y, z, *rotation, *uncertainty.inverted(pose, a[EXACT:]))
 
 
 def relative(a: Components, b: Components) -> Components:
     """Return b seen from a: inverse(a) b."""
     first, second = pose_of(a), pose_of(b)
     pose = rigid.relative(*first, *second)
-    if len(a) == len(b) == RIGID:
+    if len(a) == len(b) == EXACT:
         return pose
     _refuse_scales(a, b)
     from frametool.geometry import uncertainty
@@ -65,23 +66,23 @@ def relative(a: Components, b: Components) -> Components:
 
 def pose_of(a: Components) -> Rigid:
     """Return the seven components of a pose."""
-    tx, ty, tz, x, y, z, w = a[:RIGID]
+    tx, ty, tz, x, y, z, w = a[:EXACT]
     return tx, ty, tz, x, y, z, w
 
 
 def covariance_of(a: Components) -> Components | None:
     """Return the covariance of a pose; None where it is exact."""
-    return a[RIGID:] if len(a) == UNCERTAIN else None
+    return a[EXACT:] if len(a) == UNCERTAIN else None
 
 
 def scale_of(a: Components) -> Number:
     """Return the scale of a similarity; 1 of a pose."""
-    return a[RIGID] if len(a) == SCALED else 1.0
+    return a[EXACT] if len(a) == SCALED else 1.0
 
 
 def _refuse_both(a: Components, b: Components) -> None:
     if UNCERTAIN in (len(a), len(b)):
-        raise ValueInvalid("the covariance cannot be carried through a scale; leave one of them out")
+        raise ValueInvalid(NOT_BOTH)
 
 
 def _refuse_scales(a: Components, b: Components) -> None:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         Vector,
     )
 
+EXACT, SCALED, UNCERTAIN = 7, 8, 43  # components of a pose: alone, with a scale, with a covariance
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 SERIES_EXP = 1.5  # rad: above, a - sin(a) loses less than a digit; below, ten terms of its series are exact
 SERIES_LOG = 0.6  # rad: the same for 1 - (a/2) cot(a/2) and six terms

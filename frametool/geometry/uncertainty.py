@@ -257,8 +257,13 @@ def widest_turn(entries: Sequence[float]) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(whole[3:, 3:])[-1], 0.0)))
 
 
+def doubt(entries: Sequence[float]) -> str:
+    """Say that a turn is too uncertain for the first order; "" where it is not."""
+    width = widest_turn(entries)
+    return FIRST_ORDER.format(width) if width > WIDE else ""
+
+
 def warn_if_wide(found: Iterable[Sequence[float]]) -> None:
     """Warn once if a turn is so uncertain that the first order is off by some per cent."""
-    widest = max(map(widest_turn, found), default=0.0)
-    if widest > WIDE:
-        warn(FIRST_ORDER.format(widest), rule=WIDE_RULE)
+    if told := doubt(max(found, key=widest_turn, default=())):
+        warn(told, rule=WIDE_RULE)

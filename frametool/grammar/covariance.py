@@ -26,14 +26,13 @@ if TYPE_CHECKING:
 
 COVARIANCE, SIGMA = "covariance", "sigma"
 warn_if_wide, widest_turn = uncertainty.warn_if_wide, uncertainty.widest_turn
-KEYS = frozenset((COVARIANCE, SIGMA))
 LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and how many make a metre
 ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are degrees
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 RADIANS = 3.141592653589793 / 180.0
 
 
-class Whole(float):
+class Unrounded(float):
     """A number that --precision leaves whole: some digits after the point make nothing of a small square."""
 
     __slots__ = ()

@@ -33,11 +33,10 @@ NAMES = frozenset(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit into
 MOST_CHARACTERS = 80
 SCALE = "scale"
-UNCERTAIN = frozenset(("sigma", "covariance"))
-NOT_BOTH = "the covariance cannot be carried through a scale; leave one of them out"
-SIMILARITY = "scale: a similarity, not a pose; apply --transform, compose and invert take it"
+COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
+LEFT_OUT = "covariances left out: {} has none"  # of what a command does
 POSE_KEYS = frozenset(
-    (*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *UNCERTAIN, "inverse", "angles", SCALE, AXES_KEY)
+    (*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS, "inverse", "angles", SCALE, AXES_KEY)
 )
 
 
@@ -79,6 +78,8 @@ class Pose(NamedTuple):
         Raises ValueInvalid for what has both.
         """
         if self.covariance is not None and self.scale != 1.0:
+            from frametool.geometry.placed import NOT_BOTH
+
             raise ValueInvalid(NOT_BOTH)
         return (*self.components, *(self.covariance or ()), *([self.scale] * (self.scale != 1.0)))
 
@@ -106,7 +107,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
         reading.degrees = read_angle_unit(mapping["angles"])
     key, uncertain = "", None
     try:
-        if not UNCERTAIN.isdisjoint(mapping):
+        if not COVARIANCE_KEYS.isdisjoint(mapping):
             from frametool.grammar.covariance import read_covariance
 
             uncertain = read_covariance(mapping, reading)
@@ -191,6 +192,8 @@ def refuse_scale(value: Any) -> None:
     except (ValueInvalid, TypeError):
         is_one = False
     if not is_one:
+        from frametool.geometry.placed import SIMILARITY
+
         raise NotARotation(SIMILARITY, (SCALE,))
 
 

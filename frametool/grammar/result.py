@@ -178,9 +178,9 @@ def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
     """Return what a result says of its covariance: nothing where it is exact."""
     if entries is None:
         return {}
-    from frametool.grammar.covariance import COVARIANCE, Whole
+    from frametool.grammar.covariance import COVARIANCE, Unrounded
 
-    return {COVARIANCE: [Whole(entry + 0.0) for entry in entries]}
+    return {COVARIANCE: [Unrounded(entry + 0.0) for entry in entries]}
 
 
 def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:

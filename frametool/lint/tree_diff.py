@@ -165,7 +165,7 @@ def entry(each: Difference) -> dict[str, Any]:
     }
 
 
-class Comparison(NamedTuple):
+class TreeComparison(NamedTuple):
     """What differs between two trees.
 
     differences: by kind, the farthest first
@@ -183,7 +183,7 @@ class Comparison(NamedTuple):
 def diff(
     a: Frames, b: Frames, *, at_ns: int | None = None, seen_from: str | None = None,
     tolerance: tuple[float, float] = Tolerance(),
-) -> Comparison:  # fmt: skip
+) -> TreeComparison:  # fmt: skip
     """Compare two trees, or two recordings at one time: a frame moves from its pose in A to its pose in B.
 
     at_ns: the time; None is the latest of each.  seen_from: a frame of both; None is the root of each part of A, or
@@ -204,7 +204,7 @@ def diff(
         return order[each.kind], -own, -limit.times(each.seen)
 
     found.sort(key=rank)
-    return Comparison(
+    return TreeComparison(
         [each for each in found if each.kind != SAME],
         [each for each in found if each.kind == SAME],
         [*pair.notes, *_times(a, b, at_ns), *_covariances(a, b)],

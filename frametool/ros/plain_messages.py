@@ -84,7 +84,7 @@ JSON_GROUPS = {
 }
 
 
-class Layout(NamedTuple):
+class MessageLayout(NamedTuple):
     """How a tool writes messages of transforms: the pattern of one transform, and of what stands around it.
 
     opening: of a message, with a group if it names a topic; closing: of the last one; gap: between two transforms
@@ -106,20 +106,20 @@ def _pattern(layout: str, groups: Mapping[str, str]) -> str:
     return layout
 
 
-def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -> Layout:
+def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -> MessageLayout:
     """Make a layout from the patterns of its parts."""
     gap, end = f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing
     first, each, inner, last = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
-    return Layout(first, each, inner, last, *lines)
+    return MessageLayout(first, each, inner, last, *lines)
 
 
-def _echoed(entry: str) -> Layout:
+def _echoed(entry: str) -> MessageLayout:
     """Make the layout of documents that a tool prints."""
     opening, pattern = (_pattern(part, ECHO_GROUPS) for part in ("transforms:\n", entry))
     return _layout(opening, pattern, "", "---\n", entry.count("\n"), entry[: entry.index("header")].count("\n"))
 
 
-def _on_lines(opening: str, between: str, closing: str) -> list[Layout]:
+def _on_lines(opening: str, between: str, closing: str) -> list[MessageLayout]:
     """Make the layouts of a kind of lines, in ROS 2 and in ROS 1."""
     entries = (JSON_FIELDS.replace("STAMP", stamp) for stamp in STAMPS)
     return [_layout(_pattern(opening, JSON_GROUPS), _pattern(each, JSON_GROUPS), between, closing) for each in entries]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import FormatError, warn
+from frametool.geometry.placed import NOT_BOTH
 from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar.covariance import (
     COVARIANCE,
@@ -19,7 +20,7 @@ from frametool.grammar.covariance import (
     of_sigmas,
     read_covariance,
 )
-from frametool.grammar.pose import NOT_BOTH, SCALE, read_angle_unit, read_scale, refuse_scale
+from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit, read_scale, refuse_scale
 from frametool.grammar.readers import Misfit, NotARotation, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.stream.layout import Kept, New
@@ -31,18 +32,17 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
     from frametool.grammar.readers import Path, Reading
     from frametool.stream.layout import Column
-    from frametool.stream.record import Place, Record
+    from frametool.stream.record import Record, RecordPlace
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.table import Table
 
 PLACED = (POSE, POINT, VECTOR)
 POINT_ENTRIES = 9
-LEFT_OUT = "covariances left out: calc has none"
 
 
 def with_covariances(
-    record: Record, holder: Any, around: Path, place: Place, above: Path, request: Request, reading: Reading
+    record: Record, holder: Any, around: Path, place: RecordPlace, above: Path, request: Request, reading: Reading
 ) -> Record:
     """Add the numbers of the covariances of a record, or the one that its sigmas say.
 
@@ -58,7 +58,7 @@ def with_covariances(
     is_left_out = operation.formula is not None and around == path and not operation.only_adds
     if is_left_out:
         reading.here = (*above, *path)
-        reading.note(LEFT_OUT, rule="left-out")
+        reading.note(LEFT_OUT.format("calc"), rule="left-out")
     if request.gathered is not None:
         request.gathered.uncertain = True
     if request.gathered is not None or is_left_out:
@@ -165,7 +165,7 @@ def covariance_columns(
     except NotARotation as error:
         raise FormatError(str(error), source=source, line=1) from None
     if places and request.operation.formula is not None:
-        warn(f"{source}: {LEFT_OUT}", rule="left-out")
+        warn(f"{source}: {LEFT_OUT.format('calc')}", rule="left-out")
     if places and request.gathered is not None:
         request.gathered.uncertain = True
     if not places or request.gathered is not None or request.operation.formula is not None:

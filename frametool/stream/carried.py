@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, uncertainty
-from frametool.geometry.placed import RIGID, SCALED, inverse, pose_of, scale_of
+from frametool.geometry.placed import inverse, pose_of, scale_of
 from frametool.geometry.quaternion import TOLERATED
+from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.covariance import in_unit, of_sigmas
 from frametool.stream.row_layout import MOVERS, POINT, POSE, TWIST, VECTOR, WRENCH
 
@@ -36,7 +37,7 @@ def with_own(
     if shape.sigma:
         given = expanded(shape, given)
     elif size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
-        if mover is not None and len(mover) > RIGID:
+        if mover is not None and len(mover) > EXACT:
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
         count = sum(shape.covariance)
         parts = [beside[at : at + size] for at in range(0, count, size)]
@@ -44,7 +45,7 @@ def with_own(
         return pose, (*chain.from_iterable(turned), *beside[count:])
     if shape.inverse:
         back = inverse((*rigid.inverse(*pose), *given))
-        return (back if size == 1 else (*pose, *back[RIGID:])), rest
+        return (back if size == 1 else (*pose, *back[EXACT:])), rest
     return (*pose, *given), rest
 
 
@@ -85,12 +86,12 @@ def move(shape: Shape, own: Components, beside: Components, mover: Components, *
         x, y, z = own
         return (*MOVERS[kind](*pose, s * x, s * y, s * z), *beside)
     moved = MOVERS[kind](*pose, *own)
-    if len(mover) > RIGID:
+    if len(mover) > EXACT:
         if kind not in (POINT, VECTOR):
             raise ValueInvalid(f"the covariance cannot be carried through to a {kind}; leave --covariance out")
         carry = uncertainty.of_point if kind == POINT else uncertainty.of_vector
         size = sum(shape.covariance[:1])
-        found = carry(pose, mover[RIGID:], own, beside[:size] or None)
+        found = carry(pose, mover[EXACT:], own, beside[:size] or None)
         return (*moved, *(found or ()), *beside[size:])
     for size in shape.covariance:
         by = MOVERS[kind] if kind in (TWIST, WRENCH) else None

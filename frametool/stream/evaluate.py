@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.geometry import arrays, floats
+from frametool.geometry import arrays, floats, uncertainty
 from frametool.geometry.batch_validation import read_rotations
-from frametool.geometry.uncertainty import FIRST_ORDER, WIDE, WIDE_RULE, bad_rows, widest_turn
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import (
@@ -170,7 +169,7 @@ class Run:
                     for row, column in np.argwhere((own < 0.0 if shape.sigma else own <= 0.0).T).tolist():
                         self._blame(row, self.plan.names[at + column], what.format(own[column, row]))
                 else:
-                    for row, reason in bad_rows([*own]).items():
+                    for row, reason in uncertainty.bad_rows([*own]).items():
                         self._blame(row, self.plan.names[at], reason)
                 at += size
             first += shape.size
@@ -182,9 +181,9 @@ class Run:
             if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
                 continue
             entries = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
-            for row in np.flatnonzero(entries[21] + entries[28] + entries[35] > WIDE * WIDE)[:1].tolist():
-                if (width := widest_turn([float(entry[row]) for entry in entries])) > WIDE:
-                    self.rounded.append(RowNote(self.block.line_of(row), WIDE_RULE, FIRST_ORDER.format(width)))
+            for row in np.flatnonzero(entries[21] + entries[28] + entries[35] > uncertainty.WIDE**2)[:1].tolist():
+                if told := uncertainty.doubt([float(entry[row]) for entry in entries]):
+                    self.rounded.append(RowNote(self.block.line_of(row), uncertainty.WIDE_RULE, told))
 
     def _unit_of(self, column: int) -> bool | None:
         """Tell whether a number is in degrees; None if it is no angle."""

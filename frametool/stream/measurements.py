@@ -23,7 +23,7 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.covariance import AXES, columns, find_columns, in_unit, is_sigma, of_sigmas
 from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
-from frametool.grammar.pose import UNCERTAIN, Pose, inverted, read_angle_unit
+from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
 from frametool.grammar.readers import Misfit, Reading, kind, read_number, tell, within
 from frametool.stream.record import INNER, KNOWN, find_records, placed, value_at
 from frametool.stream.record_values import pose_of, stamp_of
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 LISTS = ("measurements", "frames")
 CHILD = "child"
 OURS = frozenset((*KNOWN, *NAME_KEYS, *STAMP_KEYS, *INNER, CHILD, "id", "children", "samples", "header"))
-MISSPELT = ("parent", CHILD, *UNCERTAIN, "inverse", "angles")  # keys that nobody else would miss
+MISSPELT = ("parent", CHILD, *COVARIANCE_KEYS, "inverse", "angles")  # keys that nobody else would miss
 LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
 WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # of JSON that holds messages rather than rows
 TABLES = ("csv", "tsv", "semicolon")
@@ -90,7 +90,7 @@ class Measurement(NamedTuple):
         return self.turned(*read([change(angle) for angle in angles]).components)
 
 
-class Row(NamedTuple):
+class MeasuredRow(NamedTuple):
     """A measurement as read, its line, its time if it says one, and its column where that is known."""
 
     measurement: Measurement
@@ -112,8 +112,8 @@ def read_measurements(
     found: list[Measurement] = []
     try:
         for file in files:
-            first: dict[tuple[str, str], Row] = {}
-            rows: list[Row] = []
+            first: dict[tuple[str, str], MeasuredRow] = {}
+            rows: list[MeasuredRow] = []
             for row in _reader(file)(file, request):
                 if problem := _problem(row, first):
                     raise FormatError(problem, source=file.name, line=row.line)
@@ -154,14 +154,14 @@ def parted(place: str) -> tuple[str, int, int]:
     return file, int(line), int(column)
 
 
-def _reader(file: Recording) -> Callable[[Recording, Request], Iterator[Row]]:
+def _reader(file: Recording) -> Callable[[Recording, Request], Iterator[MeasuredRow]]:
     is_rows = file.form == "jsonl" and not re.search(WRAPPED, file.head())
     if is_rows or not file.holds_samples:
         return _of_documents
     return _of_table if file.form in TABLES else _of_edges
 
 
-def _problem(row: Row, first: dict[tuple[str, str], Row]) -> str:
+def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str:
     """Say what is wrong with a measurement; first: of each pair the first one that says a time."""
     parent, child, components, covariance = row.measurement[:4]
     if missing := [key for key, name in (("parent", parent), (CHILD, child)) if not name]:
@@ -182,17 +182,18 @@ def _problem(row: Row, first: dict[tuple[str, str], Row]) -> str:
     return ""
 
 
-def _of_edges(file: Recording, request: Request) -> Iterator[Row]:
+def _of_edges(file: Recording, request: Request) -> Iterator[MeasuredRow]:
     """Yield the edges of a file that holds a tree; what recordings say again at one time they say once."""
     edges = [edge for edge in file.edges(normalize=request.normalize) if edge.parent is not None]
     lines = lines_of([Place(file, edge) for edge in edges])
     said = {edge[:4] if edge.stamp_ns is not None else at: at for at, edge in reversed([*enumerate(edges)])}
     for at in sorted(said.values()):
         edge, (_, line) = edges[at], lines[at]
-        yield Row(Measurement(edge.parent or "", edge.child, edge.components, edge.covariance), line, edge.stamp_ns)
+        made = Measurement(edge.parent or "", edge.child, edge.components, edge.covariance)
+        yield MeasuredRow(made, line, edge.stamp_ns)
 
 
-def _of_table(file: Recording, request: Request) -> Iterator[Row]:
+def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
     from frametool.geometry.representations import notation
     from frametool.stream.row_poses import TablePoses, results_of
@@ -220,7 +221,7 @@ def _of_table(file: Recording, request: Request) -> Iterator[Row]:
             pose = pose._replace(covariance=cells.get("covariance"))
             made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
             written = None if inverse else _written(rows.shape, given)
-            yield Row(made._replace(written=written), line + at, cells.get("stamp_ns"))
+            yield MeasuredRow(made._replace(written=written), line + at, cells.get("stamp_ns"))
         line += text.count(b"\n")
     file.tally.rough += [1] * rows.mended
     file.tell()
@@ -232,7 +233,7 @@ def _read_flag(cell: str | None) -> bool:
     return cell == "true"
 
 
-def _of_documents(file: Recording, request: Request) -> Iterator[Row]:
+def _of_documents(file: Recording, request: Request) -> Iterator[MeasuredRow]:
     """Yield the measurements of a YAML or JSON text."""
     source = file.source
     reading = Reading(source, normalize=request.normalize)
@@ -250,7 +251,7 @@ def _of_documents(file: Recording, request: Request) -> Iterator[Row]:
     tell(source, reading.notes)
     places = locate_many(source.text, [path for _, path, _ in found], key=True)
     for (made, _, stamp_ns), (line, column) in zip(found, places, strict=True):
-        yield Row(made, line, stamp_ns, column)
+        yield MeasuredRow(made, line, stamp_ns, column)
 
 
 def _rows(value: Any, path: Path, reading: Reading) -> Iterator[tuple[Path, Any]]:
@@ -316,7 +317,7 @@ def _with_columns(row: dict[str, Any], request: Request) -> dict[str, Any]:
     if sigma:
         units = [(at, unit or "deg" * (request.degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma)]
         numbers = [*of_sigmas([in_unit(numbers[places[at]], unit) if at >= 0 else 0.0 for at, unit in units])]
-    if not UNCERTAIN.isdisjoint(row):
+    if not COVARIANCE_KEYS.isdisjoint(row):
         raise Misfit("sigma and covariance in one row; keep one")
     return row | {"covariance": [repr(number) for number in numbers]}
 

@@ -16,10 +16,10 @@ from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain, on_earth
 from frametool.grammar.pose import (
+    COVARIANCE_KEYS,
     POSE_KEYS,
     POSITION_KEYS,
     SCALE,
-    UNCERTAIN,
     read_angle_unit,
     read_position,
     unknown_keys,
@@ -94,7 +94,7 @@ class Record(NamedTuple):
     stamp_ns: int | None = None
 
 
-class Place(NamedTuple):
+class RecordPlace(NamedTuple):
     """What holds the numbers of a record, and the mappings around it; of a message its field, and the kind of that.
 
     covariances: the keys under which one may stand
@@ -119,9 +119,9 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
             reading.note("neither position nor rotation: taken as the identity", rule="identity")
-            found = [Place((), ())]
+            found = [RecordPlace((), ())]
         if not found and formula is not None and not formula.reads_row:
-            found = [Place(path, ()) for path in _mappings(document)]
+            found = [RecordPlace(path, ()) for path in _mappings(document)]
         if not found:
             raise _nothing_in(document)
     except Misfit as misfit:
@@ -167,13 +167,13 @@ def _bare_numbers(value: list[Any]) -> Misfit:
     return Misfit(f"a bare list of {len(value)} numbers does not say what it is; write {write}")
 
 
-def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[Place]:
+def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
     """Yield what holds numbers; where frames change, a mapping that does not move whole is refused."""
     if type(value) is list and value and not any(type(item) in (dict, list) for item in value):
-        yield Place(path, outer)
+        yield RecordPlace(path, outer)
     elif type(value) is list:
         if len(value) in (3, 4) and all(type(row) is list for row in value):
-            yield Place(path, outer)
+            yield RecordPlace(path, outer)
             return
         for index, item in enumerate(value):
             yield from _search(item, (*path, index), outer, request)
@@ -181,10 +181,10 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -
         operation = request.operation
         holds, stays = _message(value)
         if operation.moves and any(holds.values()):
-            found = [Place(path, outer, *field, (f"{field[0]}_covariance",)) for field in holds.items()]
+            found = [RecordPlace(path, outer, *field, (f"{field[0]}_covariance",)) for field in holds.items()]
         elif _holds_numbers(value):
             _refuse_several(value, ["the record's own keys"], path)
-            found = [Place(path, outer)]
+            found = [RecordPlace(path, outer)]
         else:
             found = list(_search_inside(value, path, outer, request, stays))
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
@@ -203,7 +203,7 @@ def _message(value: dict[str, Any]) -> tuple[dict[str, str], tuple[str, ...]]:
     return max(found, key=lambda row: len(there.intersection(row[1])), default=({}, ()))
 
 
-def _refuse_half(value: dict[str, Any], found: Sequence[Place], path: Path, stays: Sequence[str]) -> None:
+def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path, stays: Sequence[str]) -> None:
     """Stop where something beside what moves is given in the same frame, or may be, and would stay as it is."""
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
@@ -243,7 +243,7 @@ def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
 
 def _search_inside(
     value: dict[str, Any], path: Path, outer: tuple[Path, ...], request: Request, stays: Sequence[str]
-) -> Iterator[Place]:
+) -> Iterator[RecordPlace]:
     """Yield what the known keys of a message hold."""
     inner = [key for key in INNER if type(value.get(key)) in (dict, list)]
     if request.operation.moves:
@@ -293,7 +293,7 @@ def _is_rotation(key: str, value: Any) -> bool:
     return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
 
 
-def _record(document: Any, place: Place, request: Request, reading: Reading, above: Path) -> Record:
+def _record(document: Any, place: RecordPlace, request: Request, reading: Reading, above: Path) -> Record:
     """Read one record, with all its paths below `above`."""
     path = place.path
     value = value_at(document, path)
@@ -377,7 +377,7 @@ def _with_asked(record: Record, document: Any, path: Path, above: Path, request:
     return record._replace(shape=shape, numbers=numbers, values=values)
 
 
-def _of_message(value: Any, place: Place, path: Path, reading: Reading, request: Request) -> Record:
+def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, request: Request) -> Record:
     """Read a field of a message.
 
     An orientation with a covariance that begins with -1 is none: nothing of it is read, and it stays.
@@ -685,10 +685,10 @@ def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path)
     return record._replace(stamps=stamps, stamp_ns=record.stamp_ns if record.stamps else stamp_ns)
 
 
-def holders(document: Any, place: Place, shape: Shape) -> list[Path]:
+def holders(document: Any, place: RecordPlace, shape: Shape) -> list[Path]:
     """Return which mappings say a covariance: that of a record, or the one around it where a message has it so."""
     around = (place.path, place.path[:-1])[: 1 + (place.path[-1:] == (shape.kind,))]
-    keys = {*place.covariances, *UNCERTAIN}
+    keys = {*place.covariances, *COVARIANCE_KEYS}
     maps = [(path, held) for path in around if type(held := value_at(document, path)) is dict]
     return [path for path, held in maps if not keys.isdisjoint(held) or any(map(may_be_uncertain, held))]
 

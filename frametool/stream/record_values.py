@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 SIX_BY_SIX = 36  # entries of the covariance of a pose
-WIDE_RULE = "wide"
 MOST_TOLD = 3  # of what is odd by one rule in one text
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
@@ -200,18 +199,13 @@ def _answer(
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
         raise placed(bad, source) from bad
-    is_new = not (own.counts[WIDE_RULE] or asked.operation.uncertain)  # of what moves others that is told elsewhere
-    if found is not None and is_new and len(asked.operation.carried(record.shape)) == SIX_BY_SIX:
-        own.tell(source, [Note(WIDE_RULE, message, record.path) for message in too_wide(found.parts[-36:])])
+    is_told = asked.operation.uncertain  # of what moves others that is told elsewhere
+    if found is not None and not is_told and len(asked.operation.carried(record.shape)) == SIX_BY_SIX:
+        from frametool.geometry.uncertainty import WIDE_RULE, doubt
+
+        if not own.counts[WIDE_RULE] and (told := doubt(found.parts[-SIX_BY_SIX:])):
+            own.tell(source, [Note(WIDE_RULE, told, record.path)])
     return found
-
-
-def too_wide(entries: Sequence[float]) -> list[str]:
-    """Say that a turn is too uncertain for the first order, if it is."""
-    from frametool.geometry.uncertainty import FIRST_ORDER, WIDE, widest_turn
-
-    width = widest_turn(entries)
-    return [FIRST_ORDER.format(width)] if width > WIDE else []
 
 
 class _Spliced:

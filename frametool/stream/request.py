@@ -11,6 +11,7 @@ from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, vectors
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
 from frametool.stream.row_layout import MOVERS, POINT, POSE, SIX, TURNED, VECTOR, Shape, Target, pose_of
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from frametool.stream.stamp_source import Timed
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
-RIGID, SCALED, UNCERTAIN = 7, 8, 43  # components of a pose: alone, with a scale, with a covariance
 START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
 PAIR = "pair"  # the two poses of a row
 
@@ -171,7 +171,7 @@ class Operation(NamedTuple):
         mover = edge or self.left
         if self.mirrors:
             own = (own[0], -own[1], *own[2:])
-        if mover is not None and len(mover) == RIGID and not shape.covariance:
+        if mover is not None and len(mover) == EXACT and not shape.covariance:
             return (*MOVERS[shape.kind](*mover, *own), *beside)
         if mover is None:
             return (*own, *beside)
@@ -216,7 +216,7 @@ class Operation(NamedTuple):
             own, beside = with_own(shape, own, beside, edge or self.left, mirrors=self.mirrors)
         found = self.pose(compared(own), edge, xp)
         if self.velocity:
-            last = RIGID + len(RELATIVE_EXTRAS)
+            last = EXACT + len(RELATIVE_EXTRAS)
             found = (*self.with_velocity(found[:last], seconds(), xp), *found[last:])
         return (*found, *beside)
 
@@ -224,7 +224,7 @@ class Operation(NamedTuple):
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
         result = poses[0]
         if self.inverse:
-            result = rigid.inverse(*result) if len(result) == RIGID else _placed().inverse(result)
+            result = rigid.inverse(*result) if len(result) == EXACT else _placed().inverse(result)
         if self.mirrors:
             result = rigid.mirrored(*result)
         left = edge or self.left
@@ -233,14 +233,14 @@ class Operation(NamedTuple):
         for right in self.right:
             result = _product(result, right)
         if self.moves and len(result) == SCALED:
-            return result[:RIGID]  # a pose that is scaled is one
+            return result[:EXACT]  # a pose that is scaled is one
         if not self.of:
             return result
         first, second = self._pair([result, *poses[1:]])
-        exact = len(first) == len(second) == RIGID
+        exact = len(first) == len(second) == EXACT
         result = rigid.relative(*first, *second) if exact else _placed().relative(first, second)
-        metres, angle = rigid.extent(*pose_of(result[:3], result[3:RIGID]), xp)
-        return (*result[:RIGID], metres, angle, angle * RADIAN, *result[RIGID:])
+        metres, angle = rigid.extent(*pose_of(result[:3], result[3:EXACT]), xp)
+        return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])
 
     @staticmethod
     def with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
@@ -263,7 +263,7 @@ COMBINED = Operation(of="arguments")  # with each other, outside of here; they a
 
 
 def _product(a: Components, b: Components) -> Components:
-    return rigid.compose(*a, *b) if len(a) == len(b) == RIGID else _placed().compose(a, b)
+    return rigid.compose(*a, *b) if len(a) == len(b) == EXACT else _placed().compose(a, b)
 
 
 def _placed() -> Any:

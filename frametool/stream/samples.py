@@ -49,7 +49,7 @@ IDS, WEIGHT = ("id", "name"), "weight"
 MOST_NAMED = 5
 
 
-class Samples(NamedTuple):
+class HandEyeSamples(NamedTuple):
     """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
 
     places: where each stands; names: of base, gripper, camera and target, None where nothing says one
@@ -65,7 +65,7 @@ class Samples(NamedTuple):
     told: Sequence[str] = ()
 
 
-def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -> Samples:
+def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -> HandEyeSamples:
     """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2.
 
     eye_to_hand: easy_handeye has gripper_from_base as `robot` then; it is inverted.
@@ -99,7 +99,7 @@ def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -
     if any(ROBOT in value for value in values):
         ways = ("gripper<-base, inverted", "with") if eye_to_hand else ("base<-gripper", "without")
         taken = f"robot is taken for {ways[0]}, as easy_handeye has it {ways[1]} --eye-to-hand"
-    return Samples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), (source.name,), taken)
+    return HandEyeSamples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), (source.name,), taken)
 
 
 def _listed(value: Any) -> Iterator[tuple[Path, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.geometry.rigid import EXACT
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, kind
 
@@ -32,7 +33,7 @@ class Timed(NamedTuple):
     many: Callable[[str | None, Any], Components]
     one: Callable[[str | None, int], Components]
     moves: Callable[[str | None], bool] = bool
-    width: int = 7
+    width: int = EXACT
 
     @classmethod
     def of_rows(cls, name: str) -> Timed:

@@ -29,6 +29,7 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.pose_algebra import looked_up
 from frametool.text.numbers import NotFinite, parse_number
@@ -194,7 +195,7 @@ class Way(NamedTuple):
 
         has_source = self.has_source and frame_column is None
         timed = self.at_times and Timed(
-            time_column or "", self.at_times, self.from_frame, self.moves, 43 if self.uncertain else 7
+            time_column or "", self.at_times, self.from_frame, self.moves, UNCERTAIN if self.uncertain else EXACT
         )
         frames = () if has_source else (frame_column or "",)
 

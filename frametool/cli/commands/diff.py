@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frametool.formats.load import Place
-    from frametool.lint.tree_diff import Comparison
+    from frametool.lint.tree_diff import TreeComparison
 
 DIFFERENT, TROUBLE = 1, 2
 EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
@@ -80,7 +80,7 @@ def command(
     return DIFFERENT if comparison.differences else 0
 
 
-def _annotations(found: Comparison, places: Sequence[Mapping[str, Place]]) -> str:
+def _annotations(found: TreeComparison, places: Sequence[Mapping[str, Place]]) -> str:
     """Return workflow commands, each at the line where B says where the frame is, or else A."""
     in_a, in_b = places
     known = {each.frame: in_b.get(each.frame) or in_a.get(each.frame) for each in found.differences}

@@ -13,6 +13,7 @@ from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, warn
 from frametool.frames.lookups import checked_rate
+from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import result_at
 from frametool.text.numbers import parse_number
 
@@ -62,7 +63,7 @@ def command(
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)
     if frames.covariances:
-        warn("covariances left out: echo has none")
+        warn(LEFT_OUT.format("echo"))
     replayed = frames.replay(target, source, rate_hz=rate, start_ns=start, stop_ns=stop)
     skipped = Skipped(in_json=out.told == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))

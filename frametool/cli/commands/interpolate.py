@@ -10,6 +10,7 @@ from frametool.cli.explaining import PoseTask, explain_options
 from frametool.cli.options import TEXT, Command, Number, pose_result_options
 from frametool.cli.poses import combinations
 from frametool.errors import warn
+from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import interpolated, shared_stamp
 from frametool.grammar.result import Result
 
@@ -40,7 +41,7 @@ def command(a: str, b: str, fractions: tuple[float, ...], **options: Any) -> int
         return task.write(derive.interpolate(plan, task.written(a), task.written(b), fractions[0]))
     pairs = combinations((a, b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
-        warn("covariances left out: interpolate has none")
+        warn(LEFT_OUT.format("interpolate"))
     between = [interpolated(first, last, each) for first, last in pairs for each in fractions]
     task.output.poses([Result(pose, shared_stamp((pose,))) for pose in between])
     return 0

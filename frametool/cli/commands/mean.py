@@ -11,6 +11,7 @@ from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from
 from frametool.errors import ValueInvalid, warn
+from frametool.grammar.pose import LEFT_OUT
 from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
 
@@ -66,7 +67,7 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
         if given is not None and len(given) != len(gathered.transforms):
             raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
     if gathered.uncertain:
-        warn("covariances left out: mean has none")
+        warn(LEFT_OUT.format("mean"))
     result, left_out = _mean(gathered, given, robust=robust)
     task.output.poses([result])
     for line in left_out[:MOST]:

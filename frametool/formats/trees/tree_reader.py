@@ -19,7 +19,7 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
-from frametool.grammar.pose import POSE_KEYS, UNCERTAIN, Pose, read_angle_unit, read_name, read_pose
+from frametool.grammar.pose import COVARIANCE_KEYS, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import rotation_of
 from frametool.ros import messages
@@ -249,7 +249,7 @@ def read_samples(
 def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
     """Read one pose with its stamp.  uncertain: there is a covariance for all."""
     pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
-    if said := UNCERTAIN.intersection(sample):
+    if said := COVARIANCE_KEYS.intersection(sample):
         raise Misfit(f"{min(said)} is one for all samples; write it beside samples", (min(said),), key=True)
     if uncertain and sample.get("inverse") == "true":
         raise Misfit("a sample that is inverted has no part in one covariance for all; write its inverse", ("inverse",))
