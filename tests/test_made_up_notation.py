@@ -11,7 +11,7 @@ import pytest
 # Gibbs' vector, and position and quaternion in seven numbers: both get their columns, shape and label from the row
 ROWS = """
 import sys
-from frametool.geometry.representations import MAP, REPRESENTATIONS, Representation, Whole
+from frametool.geometry.representations import MAP, REPRESENTATIONS, ROTATIONS, Representation, Whole
 
 def to_quaternion(numbers, xp, _degrees, _axes):
     x, y, z = numbers
@@ -23,16 +23,16 @@ def from_quaternion(quaternion, _xp, _degrees, _axes):
     return x / w, y / w, z / w
 
 seven = Whole("s_1 s_2 s_3 s_4 s_5 s_6 s_7", lambda p, q: (*p, *q), lambda n: (tuple(n[:3]), tuple(n[3:])))
-REPRESENTATIONS["gibbs"] = Representation(
+REPRESENTATIONS["gibbs"] = ROTATIONS["gibbs"] = Representation(
     "gibbs_x gibbs_y gibbs_z", (), "Gibbs vector: axis times tan(angle/2)", label="Gibbs vector", overview=("",),
     forward=to_quaternion, backward=from_quaternion,
 )
-REPRESENTATIONS["seven"] = Representation(
+REPRESENTATIONS["seven"] = ROTATIONS["seven"] = Representation(
     "u_1 u_2 u_3 u_4", (), "position and quaternion in one", whole=seven,
     forward=lambda n, _xp, _degrees, _axes: n, backward=lambda q, _xp, _degrees, _axes: q,
 )
 for name in ("gibbs", "seven"):
-    REPRESENTATIONS[name].name = name
+    ROTATIONS[name].name = name
 from frametool.cli import run
 sys.exit(run(sys.argv[1:]))
 """

@@ -12,13 +12,13 @@ import samples
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import arrays, euler, floats, quaternion
-from frametool.geometry.representations import REPRESENTATIONS, Notation, axes_name, notation
+from frametool.geometry.representations import ROTATIONS, Notation, axes_name, notation
 from frametool.geometry.rotation import Rotation
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Quaternion
 
-SPECS = [*(name for name in REPRESENTATIONS if name != "euler"), "euler:rzyx", "euler:sxzx"]
+SPECS = [*(name for name in ROTATIONS if name != "euler"), "euler:rzyx", "euler:sxzx"]
 ROWS = samples.quaternions(10)
 COLUMNS: Quaternion = tuple(np.array(ROWS).T)
 
@@ -26,7 +26,7 @@ COLUMNS: Quaternion = tuple(np.array(ROWS).T)
 def spelled(spec: str, unit: str) -> Notation:
     """Bind a unit where there is an angle to carry it."""
     name, colon, axes = spec.partition(":")
-    return notation(f"{name}{unit}{colon}{axes}" if REPRESENTATIONS[name].angles else spec)
+    return notation(f"{name}{unit}{colon}{axes}" if ROTATIONS[name].angles else spec)
 
 
 @pytest.mark.parametrize(("start", "end"), list(itertools.permutations(SPECS, 2)))
@@ -56,9 +56,9 @@ def test_checked_input_is_the_input(spec: str) -> None:
         assert quaternion.distance(*found, *row, floats) <= 8e-15
 
 
-@pytest.mark.parametrize("name", REPRESENTATIONS)
+@pytest.mark.parametrize("name", ROTATIONS)
 def test_each_row_says_what_it_is(name: str) -> None:
-    row = REPRESENTATIONS[name]
+    row = ROTATIONS[name]
     assert row.name == name
     assert row.summary
     assert len(set(row.columns)) == len(row.columns)

@@ -62,8 +62,19 @@ class PoseTask:
 
         degrees = self.output.style.degrees
         made = Request(given=self.stream.given, degrees=degrees, normalize=self.normalize, **rest)
+        made = self.at_places(made)
         self.output.take_axes("", made.operation)
         return made
+
+    def at_places(self, request: Request) -> Request:
+        """Add what the options say of places on the Earth, where they say anything."""
+        said, place = settings(), self.output.style.place
+        if not (place or self.stream.given_place or said.origin or said.local_axes or said.zone):
+            return request
+        from frametool.cli.earth import earth
+
+        usual = request.by_default or not self.output.notations
+        return request._replace(place=place, given_place=self.stream.given_place, earth=earth(), by_default=usual)
 
     def has_table(self, argument: str) -> bool:
         """Tell whether an argument is a file of rows; it is then what -i FILE would be."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
+    from frametool.geometry.place import Earth
 
 SETTINGS = "frametool.settings"  # the key in a context's `meta`
 
@@ -51,6 +52,10 @@ class CommandSettings:
     stamps: str | None = None
     edges = False
     array: str | None = None
+    origin: str | None = None
+    local_axes: str | None = None
+    zone: str | None = None
+    earth: Earth | None = None
     reads_trees = False
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
 

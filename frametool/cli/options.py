@@ -410,6 +410,10 @@ rotation_options = together(
     ),
     click.option("--deg", is_flag=True, help="angles in degrees"),
     click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
+    _setting("--local-axes", "local_axes", type=click.Choice(("enu", "ned", "grid", "ecef")),
+             help="what rotations at a place on the Earth are given in (help earth)"),
+    _setting("--origin", "origin", type=TEXT, metavar="PLACE|first", help="where east north up 0 0 0 is"),
+    _setting("--zone", "zone", type=TEXT, metavar="32N", help="the one zone of UTM"),
 )  # fmt: skip
 # how poses are read; commands have it with `rotation_options`
 pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")

@@ -58,6 +58,11 @@ class Output:
         self.path = output
         self.force = force
         self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
+        place = None
+        if any(each.representation.is_place for each in notations or ()):
+            from frametool.cli.earth import places_of
+
+            notations, place = places_of(notations or ())
         self.notations = notations or ()
         self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
@@ -72,6 +77,7 @@ class Output:
         full = precision == FULL
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
+        self.style.put_at(place)
 
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
         """Keep the axes of the camera that poses are of: as --camera-axes says, else as their form has them."""

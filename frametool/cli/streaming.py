@@ -95,6 +95,9 @@ class Stream:
         self._tell = partial(say_error, in_json=options.get("format_name") == "json")
         self.options = {name: options.pop(name) for name in OPTIONS if name in options}
         self.given = one_notation(self.options.get("given"))
+        self.given_place = ""
+        if self.given is not None and self.given.representation.is_place:
+            self.given, self.given_place = None, self.given.representation.name
         self.path: str | None = self.options.get("input_path")
         if self.path == "-":
             self.path = None
@@ -212,6 +215,7 @@ class Stream:
             return self._as_poses if gathers and listed else self._as_text
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
+        no_room |= output.is_trajectory and output.style.place is not None
         no_room |= not output.notations and is_turned(output.style.in_form(output.told or form))
         return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
 
@@ -323,6 +327,8 @@ class Stream:
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,
+            place=output.style.in_form(output.told or form).place,
+            given_place=self.given_place,
             precision=output.style.precision,
             keep_sign=output.style.keep_sign,
             columns=options["columns"],

@@ -21,6 +21,7 @@ from frametool.documents.source import noting_files, states_of
 from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.grammar.edges import Answers
+from frametool.grammar.names import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -348,7 +349,9 @@ FRAME = Frame()
 
 
 def frame_name(name: str, tree: FrameTree | TransformBuffer | Robot) -> str:
-    """Return a frame's name without a leading `/`, which tf2 has given up, unless a frame is called so."""
+    """Return what a tree calls a frame: without the leading `/` that tf2 has given up; the Earth's by either name."""
+    if name in EARTH_FRAMES and name not in tree.frames:
+        return next((other for other in EARTH_FRAMES if other in tree.frames), name)
     if name.startswith("/") and name not in tree.frames:
         warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")
         return name[1:]

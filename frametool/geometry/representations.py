@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf, isfinite
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
-from frametool.geometry import euler, matrix, quaternion, vectors
+from frametool.geometry import euler, floats, matrix, quaternion, vectors
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -43,6 +43,10 @@ class Whole:
         self.join = join
         self.split = split
         self.tail = tail
+
+
+def _no_rotation(*_: Any) -> Any:
+    raise ValueInvalid("a place is no rotation")
 
 
 class BatchRule:
@@ -82,19 +86,21 @@ class Representation:
     alone: columns that say the last number where the others are missing and 0
     batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
     overview: the units in which an overview shows it ("" for no unit)
+    is_place: it says a position on the Earth and no rotation; `geometry.place` has its arithmetic
     """
 
     __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "label", "name",
-        "names", "overview", "searched", "shape", "summary", "whole",
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "is_place", "label",
+        "name", "names", "overview", "searched", "shape", "summary", "whole",
     )  # fmt: skip
 
     def __init__(
         self, columns: str, angles: tuple[int, ...], summary: str, *,
-        forward: Callable[..., Any], backward: Callable[..., Any], check: Check | None = None,
-        kept: Callable[..., Components] | None = None, shape: str | dict[str, int] = LIST, names: str = "",
-        label: str = "", axes: str = "", whole: Whole | None = None, searched: bool = True, alone: str = "",
-        overview: tuple[str, ...] = (), batch: BatchRule | None = None,
+        forward: Callable[..., Any] = _no_rotation, backward: Callable[..., Any] = _no_rotation,
+        check: Check | None = None, kept: Callable[..., Components] | None = None,
+        shape: str | dict[str, int] = LIST, names: str = "", label: str = "", axes: str = "",
+        whole: Whole | None = None, searched: bool = True, alone: str = "", overview: tuple[str, ...] = (),
+        batch: BatchRule | None = None,
     ) -> None:  # fmt: skip
         """Describe a notation.
 
@@ -119,6 +125,7 @@ class Representation:
         self._check = check
         self._kept = kept
         self.batch = batch
+        self.is_place = forward is _no_rotation
 
     def __repr__(self) -> str:
         """Show the name."""
@@ -291,7 +298,15 @@ REPRESENTATIONS: dict[str, Representation] = {
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
         batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
     ),
+    "lla": Representation("lat lon alt", (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
+                          names="lat lon alt"),
+    "ecef": Representation("ecef_x ecef_y ecef_z", (), "the Earth's frame: x to lat 0 lon 0, z to the north pole"),
+    "utm": Representation("utm_zone easting northing alt", (), "UTM, a zone as 32N or 32S and metres",
+                          names="zone easting northing alt"),
+    "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up"),
+    "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down"),
 }  # fmt: skip
+ROTATIONS = {_name: _row for _name, _row in REPRESENTATIONS.items() if not _row.is_place}
 for _name, _row in REPRESENTATIONS.items():
     _row.name = _name
 
@@ -397,7 +412,20 @@ def _upper_rows() -> Notation:
     return Notation("matrix", row, None, degrees=None)
 
 
+def _heading_row() -> Representation:
+    """Make the rotation that a heading says: level, x so far clockwise from north; as a turn about down."""
+
+    def forward(components: Components, xp: Namespace, degrees: bool, _axes: str) -> Quaternion:  # noqa: FBT001 - all do
+        zero = components[0] - components[0]
+        return (zero, zero, *(floats.half_sincos_deg if degrees else floats.half_sincos)(components[0], xp))
+
+    row = Representation("heading", (0,), "clockwise from north", names="heading", forward=forward)
+    row.name = "heading"
+    return row
+
+
 UPPER_ROWS = _upper_rows()  # no name spells it: twelve numbers of a file say it
+HEADING = _heading_row()  # nor this: it is read beside a place on the Earth, whose axes say which way is up
 
 
 def notation(spec: str) -> Notation:

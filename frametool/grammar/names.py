@@ -24,7 +24,13 @@ _STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _SECONDS = ("s", "sec", "seconds", "")
-_EARTH = r"(?i)[#% ]*(?:.*[._])?(?:(lat(?:itude)?)|lon(?:gitude)?|lng)[_ ]?(?:deg|rad|e7)?\s*(?:[\[(].*)?"
+_EARTH = r"(?i)(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|ecef|utm|easting|north|at$)"
+PLACE_KEYS = frozenset((
+    "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
+    "north", "up", "down",
+))  # fmt: skip
+# a place says its frame, by either name
+EARTH_FRAMES = ("ecef", "earth")
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -71,13 +77,9 @@ def _is_known(name: str) -> bool:
     return True
 
 
-def on_earth(names: Iterable[str]) -> str:
-    """Return what to say of names that are a latitude and a longitude, which are no position here; "" without both."""
-    found = {match[1] is None: name for name in names if (match := re.fullmatch(_EARTH, name))}
-    if len(found) < 2:
-        return ""
-    named = f"{shown(found[False])} and {shown(found[True])}"
-    return f"{named} are coordinates on the Earth, which are not read; give x, y, z in metres"
+def may_be_on_earth(name: str) -> bool:
+    """Tell whether a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
+    return re.search(_EARTH, name) is not None
 
 
 def may_be_uncertain(name: str) -> bool:

@@ -12,7 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import ROTATIONS
+from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
 from frametool.grammar.rotation_spelling import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
 from frametool.text.numbers import parse_number
@@ -97,6 +98,11 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     Raises Misfit with the path of what is wrong below this mapping.
     """
     if not POSE_KEYS.issuperset(mapping):
+        if any(map(may_be_on_earth, mapping)):
+            from frametool.grammar.place import EARTH_KEYS, read_placed
+
+            if not EARTH_KEYS.isdisjoint(mapping):
+                return read_placed(mapping, reading, also)
         _refuse_unknown_keys(mapping, also)
     position: Vector | None = None
     rotation: Quaternion | None = None
@@ -237,5 +243,5 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     unknown = [key for key in mapping if key not in known]
     if unknown:
         named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[:MOST_NAMED]], len(unknown))
-        choices = ", ".join(REPRESENTATIONS)
+        choices = ", ".join(ROTATIONS)
         raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.errors import FormatError
+    from frametool.geometry.place import Earth
     from frametool.grammar.edges import Remark
 
     Path = tuple[str | int, ...]
@@ -59,17 +60,21 @@ class Note(NamedTuple):
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
-    __slots__ = ("bare_numbers", "degrees", "faults", "here", "normalize", "notes", "raw", "source")
+    __slots__ = ("bare_numbers", "degrees", "earth", "faults", "here", "normalize", "notes", "raw", "source")
 
-    def __init__(self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False) -> None:
+    def __init__(
+        self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False,
+        earth: Earth | None = None,
+    ) -> None:  # fmt: skip
         """Begin at the top of a document of `source`; `notes` collects what is odd.
 
         raw: take messages as they are; whoever gets them judges.  `bare_numbers` is set for the forms of other tools,
-        which read neither `90deg` nor `pi/2`.
+        which read neither `90deg` nor `pi/2`.  earth: what is said of all places on the Earth
         """
         self.source = source
         self.degrees = degrees
         self.normalize = normalize
+        self.earth = earth
         self.raw = raw
         self.bare_numbers = False
         self.here: Path = ()

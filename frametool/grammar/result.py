@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
+    from frametool.geometry.place import Place
     from frametool.geometry.representations import Notation
     from frametool.geometry.transform import Transform
 
@@ -31,9 +32,10 @@ class Style:
     full: that text for people too, who are else shown some decimals of an overview
     axes: those of the camera that the poses are of, `optical` or `opengl`; "" where that is not known
     in_camera: whether they are seen from the same camera at another time
+    place: how positions on the Earth are written, None where x, y, z are
     """
 
-    __slots__ = ("axes", "degrees", "form", "full", "in_camera", "keep_sign", "notations", "precision")
+    __slots__ = ("axes", "degrees", "form", "full", "in_camera", "keep_sign", "notations", "place", "precision")
 
     def __init__(
         self,
@@ -49,6 +51,7 @@ class Style:
         self.form = form
         self.axes = ""
         self.in_camera = False
+        self.place: Place | None = None
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
@@ -62,7 +65,12 @@ class Style:
             keep_sign=self.keep_sign,
         )  # fmt: skip
         style.axes, style.in_camera = self.axes, self.in_camera
+        style.put_at(self.place)
         return style
+
+    def put_at(self, place: Place | None) -> None:
+        """Write positions as places on the Earth; in tables convergence and scale of UTM have no column."""
+        self.place = place and place.with_grid(gridded=self.form in ("text", "yaml", "json"))
 
     def in_notations(self, notations: tuple[Notation, ...]) -> Style:
         """Return the same style with other notations."""
@@ -96,11 +104,16 @@ class Result:
         pose = self.pose
         entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
         extras = self.said(style)
-        if pose.rotation is None:
+        if style.place is not None:
+            from frametool.grammar.place import placed_entry
+
+            written, pose = placed_entry(pose, style.place)
+            entry |= written
+        elif pose.rotation is None:
             return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | extras
-        if pose.position is not None and not any(carries_position(each) for each in style.notations):
+        elif pose.position is not None and not any(carries_position(each) for each in style.notations):
             entry["xyz"] = list(pose.position)
-        for each in style.notations:
+        for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
             _add(entry, key, value)
         if any(is_locked(pose, each) for each in style.notations):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, bare, overheard, shown
 from frametool.geometry import floats, quaternion
-from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, REPRESENTATIONS, ROWS, Notation, axes_name
+from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, ROTATIONS, ROWS, Notation, axes_name
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_texts, within
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
@@ -28,7 +28,7 @@ AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie 
 def _rotation_keys() -> dict[str, Notation]:
     """List every key that holds a rotation, with and without a unit."""
     keys = {}
-    for name, row in REPRESENTATIONS.items():
+    for name, row in ROTATIONS.items():
         for spelled in (name, f"{name}_deg", f"{name}_rad") if row.angles else (name,):
             keys[spelled] = parse_notation(spelled)
     return keys | {alias: keys[name] for alias, name in ALIASES.items()}
@@ -210,7 +210,7 @@ def _take_named(notation: Notation, value: Any) -> Spelled:
     if type(value) is list:
         numbers = bare(", ".join(map(str, value)))
         others = [
-            f"{name}: [..]" for name, row in REPRESENTATIONS.items()
+            f"{name}: [..]" for name, row in ROTATIONS.items()
             if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
         ]  # fmt: skip
         named = ", ".join(f"{name}:" for name in names)

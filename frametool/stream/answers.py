@@ -64,7 +64,7 @@ def read_entries(
 
     Raises FormatError with the place of a record that cannot be read.
     """
-    reading = Reading(source, degrees=request.degrees, normalize=request.normalize)
+    reading = Reading(source, degrees=request.degrees, normalize=request.normalize, earth=request.earth)
     try:
         records = list(find_records(document.value, request, reading, (document.index,)))
         note([_at_its_number(each, records) for each in reading.notes])

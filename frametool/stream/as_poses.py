@@ -67,7 +67,7 @@ class FormatConverter:
         self.is_table = FORMATS[form].is_table
         self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
         self.style = style.in_form(style.form)
-        self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
+        self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.form].writes)), "points" in writes
         if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.form in LEARNED)):
@@ -116,7 +116,7 @@ class FormatConverter:
         self.placed = plan.targets[0].unit is not None
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
         has_none = is_bare and not plan.targets[0].notations
-        if (is_bare and self.request.operation.keeps_position and not has_none) or (has_none and not self.has_points):
+        if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
             message = f"no rotation among the columns {columns}: {self.style.form} is written of poses"
             raise FormatError(message, source=self.source, line=line)
         self.shape = shape._replace(kind=POINT) if has_none else shape

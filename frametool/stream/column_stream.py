@@ -29,7 +29,7 @@ from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused, RowNote
 from frametool.stream.header import XYZ
-from frametool.stream.layout import NAME, PARENT, Kept, New, quoted
+from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
 from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
@@ -117,7 +117,8 @@ class ColumnRows:
             elif isinstance(column, New):
                 found.append(OutColumn(column.name if self.table.names else "", self._kind_of(column)))
             else:
-                found.append(OutColumn(self._name(column.place), None))
+                name = self._name(column.place) if isinstance(column, Named) else column.name
+                found.append(OutColumn(name, None))
         return found
 
     def named_columns(self) -> list[OutColumn]:
@@ -125,11 +126,15 @@ class ColumnRows:
         if self.table.names:
             return self.columns()
         targets = self.plan.targets
-        names = [name for each in targets for name in (*XYZ[: 3 * (each.unit is not None)], *each.names)]
+        names = [name for each in targets for name in (*each.position_columns, *each.names)]
         kept = dict(zip(self.layout.places, names, strict=False))
         found = []
         for at, (column, given) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1):
-            ours = dict(enumerate(names)).get(given.number) if isinstance(given, New) else kept.get(given.place)
+            ours = dict(enumerate(names)).get(given.number) if isinstance(given, New) else None
+            if isinstance(given, (Kept, Named)):
+                ours = kept.get(given.place)
+            elif isinstance(given, (Worded, Fixed)):
+                ours = given.name
             found.append(column._replace(name=ours or f"column_{at}"))
         return found
 
@@ -463,8 +468,12 @@ def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults)
             with np.errstate(invalid="ignore"):
                 values = results.numbers[:, given.number].astype(column.kind or DOUBLE)
             made.append(Made(values, rows.absent_in(given.number, results)))
-        elif not isinstance(given, Kept):
+        elif isinstance(given, Named):
             made.append(Made(results.names.get(given.role, ())))
+        elif isinstance(given, Worded):
+            made.append(Made([given.words[int(number)] for number in results.numbers[:, given.number].tolist()]))
+        elif isinstance(given, Fixed):
+            made.append(Made([given.word] * len(results.numbers)))
     return made
 
 

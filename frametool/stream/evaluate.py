@@ -33,7 +33,7 @@ from frametool.stream.stamp_columns import (
     stamps_of,
     weights_of,
 )
-from frametool.stream.text_parts import Const, In, Instead, Out
+from frametool.stream.text_parts import Const, In, Instead, Out, Word
 from frametool.text.numbers import read_number_or_angle
 from frametool.text.parse import parse_floats
 
@@ -114,6 +114,7 @@ class Run:
         self.plan = plan
         self.block = block
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
+        self.words: dict[str, float] = {}
         self.mended: list[int] = []
         self.rounded: list[RowNote] = []
         self.doubted: list[tuple[int, int, str]] = []
@@ -152,10 +153,19 @@ class Run:
             row, column = divmod(place, numbers.shape[1])
             text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
-                numbers[row, column] = read_number_or_angle(text, self._unit_of(column))
+                numbers[row, column] = self._read_odd(text, column)
             except ValueInvalid as error:
                 self._blame(row, self.plan.names[column], str(error))
         return numbers
+
+    def _read_odd(self, text: str, column: int) -> float:
+        """Read what is no plain number: an angle with its unit, or a word that stands for a number."""
+        first = 0
+        for shape in self.plan.shapes if text not in self.words else ():
+            if shape.place is not None and (read := shape.place.readers.get(column - first)):
+                self.words[text] = read(text)
+            first += shape.size
+        return self.words[text] if text in self.words else read_number_or_angle(text, self._unit_of(column))
 
     def _check_covariances(self, numbers: Floats) -> None:
         """Refuse rows whose covariance is none; sigmas cannot be negative."""
@@ -362,9 +372,28 @@ class Run:
         if not np.isfinite(results.sum()):
             for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
                 if row not in self.reasons:
-                    too_large = "the result is not finite: the numbers are too large"
-                    self._blame(row, "", self._why_no_value(row) if self.plan.operation.formula else too_large)
+                    self._blame(row, *self._why_not_finite(row, moved))
         return results, locked
+
+    def _why_not_finite(self, row: int, moved: Sequence[Components]) -> tuple[str, str | FrametoolError]:
+        """Return the column and the reason why a row has no finite result."""
+        if self.plan.operation.formula:
+            return "", self._why_no_value(row)
+        first = 0
+        for shape, columns, _ in self._things(self.columns):
+            try:
+                if shape.place is not None:
+                    shape.place.check([float(column[row]) for column in columns[: shape.place.size]])
+            except ValueInvalid as error:
+                return self.plan.names[first], error
+            first += shape.size
+        for target, parts in zip(self.plan.targets, moved, strict=True):
+            try:
+                if target.place is not None:
+                    target.place.check_result(*(float(np.broadcast_to(part, self.count)[row]) for part in parts[:3]))
+            except ValueInvalid as error:
+                return "", error
+        return "", "the result is not finite: the numbers are too large"
 
     def _keep(self, kept: Flags) -> None:
         self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
@@ -403,7 +432,7 @@ class Run:
                 self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml
             )
         parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked))]
+        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked, self.results))]
 
     def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
         plan = self.plan
@@ -429,6 +458,8 @@ def _without_result(piece: Piece, null: bytes) -> Piece:
     """Return what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
     if isinstance(piece, Out):
         return Const(piece.between.join([null] * (piece.last - piece.first)))
+    if isinstance(piece, Word):
+        return Const(null)
     return In(piece.part) if isinstance(piece, Instead) else piece
 
 

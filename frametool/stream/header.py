@@ -11,9 +11,8 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
-from frametool.geometry.representations import NAMED, REPRESENTATIONS, UPPER_ROWS
+from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.names import on_earth
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
@@ -170,8 +169,8 @@ class Header:
         return Columns(match.places, names, match.prefix, match.suffix, wrong=wrong)
 
 
-WORDS = {word for row in REPRESENTATIONS.values() for word in (*row.columns, *row.names, *row.alone) if word}.union(
-    *POSITIONS, *(row.whole.columns for row in REPRESENTATIONS.values() if row.whole)
+WORDS = {word for row in ROTATIONS.values() for word in (*row.columns, *row.names, *row.alone) if word}.union(
+    *POSITIONS, *(row.whole.columns for row in ROTATIONS.values() if row.whole)
 )
 BY_TOKEN: dict[str, list[str]] = {}
 for _word in sorted(WORDS):
@@ -187,7 +186,7 @@ def find_positions(header: Header) -> list[Columns]:
     """Return every three columns that can be a position."""
     named = {(match.prefix, match.suffix) for match in _named_maps(header)}
     turns: dict[int, set[int]] = {}
-    for at, match in enumerate(match for row in REPRESENTATIONS.values() for match in header.match(row.columns)):
+    for at, match in enumerate(match for row in ROTATIONS.values() for match in header.match(row.columns)):
         for place in match.places:
             turns.setdefault(place, set()).add(at)
     found = []
@@ -229,7 +228,7 @@ def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> lis
 
 def _searched(given: Notation | None) -> list[Representation]:
     """Return the representations whose columns are looked for; of those that share their columns the first."""
-    rows = [row for row in REPRESENTATIONS.values() if row.searched]
+    rows = [row for row in ROTATIONS.values() if row.searched]
     if given is not None:
         same = [row for row in rows if set(row.columns) == set(given.representation.columns)]
         return same[:1] or [given.representation]
@@ -238,7 +237,7 @@ def _searched(given: Notation | None) -> list[Representation]:
 
 def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Match]:
     """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
-    for row in REPRESENTATIONS.values():
+    for row in ROTATIONS.values():
         for match in header.match(row.names) if row.shape == NAMED else ():
             if bare or match.prefix or match.suffix or len(header.names) == len(row.names):
                 yield match
@@ -300,8 +299,6 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
     header = Header(names)
     positions, rotations = find_positions(header), find_rotations(header, given)
-    if not positions and (problem := on_earth(names)):
-        raise _refusal(problem, source)
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
         return [_only_pose(header, positions, rotations, given, source)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
@@ -366,7 +363,7 @@ def _only_pose(
 
 def _half_rotation(header: Header, given: Notation | None) -> str:
     """Say what is missing of a rotation that is there by half, or goes by other names; "" where there is none."""
-    for row in REPRESENTATIONS.values() if given is None else ():
+    for row in ROTATIONS.values() if given is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
             return f"columns {header.columns(match).shown} may be {row.name}; then add --from {row.spelling}"
     if given is None and (match := next(_named_maps(header, bare=True), None)):
@@ -500,7 +497,7 @@ def named_pose(
     numbers: dict[str, int] = {}
     for place, name in enumerate(names or ()):
         numbers.setdefault(name, place)
-    places = [place for word in spec.split(",") for place in _places(word.strip(), numbers, width)]
+    places = [place for word in spec.split(",") for place in places_named(word.strip(), numbers, width)]
     header = Header(names or [f"column {place + 1}" for place in range(width)])
     if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
         raise Misused(f"--columns: {', '.join(twice)} stands twice")
@@ -510,8 +507,6 @@ def named_pose(
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])
-    if problem := on_earth(header.names[place] for place, _ in filter(None, match.spots)):
-        raise Misused(f"--columns: {problem}")
     if len(match.spots) == len(XYZ):
         return PoseColumns(_position(header, match), rotation)
     return PoseColumns(_position(header, match._replace(spots=(*match.spots, None)))._replace(absent=(2,)), rotation)
@@ -521,7 +516,7 @@ def wholes_of(given: Notation | None) -> list[Notation]:
     """Return the notations whose numbers may be those of a whole pose: without names twelve need a word for it."""
     if given is not None:
         return [given, *([UPPER_ROWS] if given.representation.whole else [])]
-    return [parse_notation(row.name) for row in REPRESENTATIONS.values() if row.whole]
+    return [parse_notation(row.name) for row in ROTATIONS.values() if row.whole]
 
 
 def _chosen(header: Header, places: Sequence[int]) -> Match:
@@ -559,7 +554,7 @@ def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | No
 def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> Columns | None:
     """Return the rotation whose columns these are, in their order."""
     chosen = Header([header.names[place] for place in places])
-    for row in REPRESENTATIONS.values():
+    for row in ROTATIONS.values():
         told = given if given is not None and given.representation is row else None
         if not (row.searched or told):
             continue
@@ -569,7 +564,7 @@ def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> 
     return None
 
 
-def _places(word: str, numbers: dict[str, int], width: int) -> list[int]:
+def places_named(word: str, numbers: dict[str, int], width: int) -> list[int]:
     """Return the places of a column's name, or of a number or range from 1."""
     if word in numbers:
         return [numbers[word]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.stream.faults import Misused
-from frametool.stream.text_parts import Const, In, Instead, Out
+from frametool.stream.text_parts import Const, In, Instead, Out, Word
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +28,21 @@ class New(NamedTuple):
     name: str
 
 
+class Worded(NamedTuple):
+    """A number of the result, under its name, as the word that it stands for."""
+
+    number: int
+    name: str
+    words: tuple[str, ...]
+
+
+class Fixed(NamedTuple):
+    """The same word in every row of the result, under a name."""
+
+    word: str
+    name: str
+
+
 class Named(NamedTuple):
     """A frame's name in place of a column: the result's parent or what it is the pose of."""
 
@@ -39,7 +54,8 @@ PARENT, NAME = 0, 1  # roles of names
 NAMED = "named"  # a stretch that is no text of the input but the name of a role
 
 
-Column: TypeAlias = Kept | New | Named
+Column: TypeAlias = Kept | New | Worded | Fixed | Named
+ADDED = (New, Worded, Fixed)  # no columns of the input
 
 
 class Layout(NamedTuple):
@@ -66,15 +82,15 @@ class Layout(NamedTuple):
     def header(self, raw: Sequence[bytes]) -> list[bytes]:
         """Return the cells of the output's header, the kept names as they were written."""
         return [
-            quoted(column.name, self.delimiter) if isinstance(column, New) else raw[column.place]
+            quoted(column.name, self.delimiter) if isinstance(column, ADDED) else raw[column.place]
             for column in self.columns
         ]
 
     def null_row(self, cells: Sequence[bytes]) -> bytes:
         """Return a row without a result, as far as its cells go."""
-        most = max((column.place for column in self.columns if not isinstance(column, New)), default=-1)
+        most = max((column.place for column in self.columns if not isinstance(column, ADDED)), default=-1)
         padded = [*cells, *[self.null] * (most + 1)]
-        given = [self.null if isinstance(column, New) else padded[column.place] for column in self.columns]
+        given = [self.null if isinstance(column, ADDED) else padded[column.place] for column in self.columns]
         return (self.delimiter or b" ").join([*given, *cells[max(most + 1, max(self.places, default=-1) + 1) :]])
 
 
@@ -129,6 +145,9 @@ def _written(group: Sequence[Column], between: bytes, stretches: list[Stretch]) 
         place, role = group[0]
         stretches += [(place, place, "cell", "cell"), (role, role, NAMED, NAMED)]
         return [Instead(len(stretches) - 2, len(stretches) - 1)]
+    if isinstance(group[0], (Worded, Fixed)):
+        column = group[0]
+        return [Const(column.word.encode()) if isinstance(column, Fixed) else Word(column.number, column.words)]
     first, last = group[0].number, group[-1].number  # type: ignore[union-attr]
     return [Out(first, last + 1, between)]
 
@@ -149,8 +168,8 @@ def _grouped(columns: Sequence[Column]) -> list[list[Column]]:
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     """Raise Misused if a new column would be called as one that stays, or as another new one."""
-    kept = [names[column.place] for column in columns if not isinstance(column, New)]
-    new = [column.name for column in columns if isinstance(column, New)]
+    kept = [names[column.place] for column in columns if not isinstance(column, ADDED)]
+    new = [column.name for column in columns if isinstance(column, ADDED)]
     if twice := sorted({name for name in new if new.count(name) > 1}):
         if {"x", "y", "z"} <= {*twice}:
             hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"

@@ -13,8 +13,8 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
-from frametool.geometry.representations import REPRESENTATIONS, notation
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain, on_earth
+from frametool.geometry.representations import ROTATIONS, notation
+from frametool.grammar.names import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, may_be_on_earth, may_be_uncertain
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
     POSE_KEYS,
@@ -51,6 +51,7 @@ QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
 KEYS_REMEDY = "name the keys _deg"
+EARTH_PARENTS, EARTH_NAMES = ("parent", "frame"), ("child_frame_id", "name", "frame_id")
 STALE = ("gimbal_lock", "distance", "angle", "angle_deg")  # they describe the pose that was
 
 
@@ -74,6 +75,7 @@ class Record(NamedTuple):
     known: where each of them begins, which -1 would make one of those
     unknown: where a covariance begins that is none, and decides that
     stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
+    placed: the keys that say a position on the Earth and the rotation there, where its numbers are not theirs
     """
 
     path: Path
@@ -92,6 +94,7 @@ class Record(NamedTuple):
     unknown: tuple[Path, ...] = ()
     stamps: tuple[Path, ...] = ()
     stamp_ns: int | None = None
+    placed: tuple[str, ...] = ()
 
 
 class RecordPlace(NamedTuple):
@@ -156,7 +159,7 @@ def _nothing_in(document: Any) -> Misfit:
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
     """Build the error for keys that are nearly known."""
     named = unknown_keys(near, len(near))
-    choices = ", ".join(REPRESENTATIONS)
+    choices = ", ".join(ROTATIONS)
     return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
 
 
@@ -208,9 +211,8 @@ def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
     if is_message and not found:
-        what = "a position on the Earth" if "latitude" in value else "a message"
         fields = _named_keys([key for key in value if key != "header"])
-        raise Misfit(f"{what} that cannot be moved whole: its fields are {fields}; see help records", path)
+        raise Misfit(f"a message that cannot be moved whole: its fields are {fields}; see help records", path)
     used = {"header", *stays}.union(*((*each.path[len(path) :][:1], each.field, *each.covariances) for each in found))
     if any(each.path == path and not each.field for each in found):
         used |= USED
@@ -261,6 +263,11 @@ def _holds_numbers(value: dict[str, Any]) -> bool:
         return True
     if any(type(value.get(key)) in (dict, list) for key in INNER):
         return False
+    if any(map(may_be_on_earth, value)):
+        from frametool.stream.earth_records import is_on_earth
+
+        if is_on_earth(value):
+            return True
     try:
         return _flat_pose(value, []) is not None
     except Misfit:
@@ -310,7 +317,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
     except Misfit as misfit:
         raise misfit.below(*here) from None
     try:
-        if around := holders(document, place, record.shape):
+        if not record.placed and (around := holders(document, place, record.shape)):
             from frametool.stream.beside import with_covariances
 
             record = with_covariances(record, value_at(document, around[0]), around[0], place, above, request, reading)
@@ -415,15 +422,17 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if (parts := _parts_of(value)) is not None and not _is_holder(value):
         return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else parts, path, request)
     positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
+    if any(map(may_be_on_earth, value)):
+        from frametool.stream.earth_records import record_on_earth
+
+        if (record := record_on_earth(value, path, positions, reading, request)) is not None:
+            return record
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
     flat = _flat_pose(value, rotations)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
     # the grammar of poses allows that several say the same thing twice
     if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
-    formula = request.operation.formula
-    if not there and "header" not in value and (formula is None or formula.reads_row) and (problem := on_earth(value)):
-        raise Misfit(problem)
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
     record = Record(path, Shape(_kind(key, turned, request), None), key=key)
@@ -638,6 +647,7 @@ def _with_names(
 ) -> Record:
     """Add the frames that the record and the message around it name, and the stamp of its header."""
     parent, name = Name(), Name()
+    on_earth = record.parent.text in EARTH_FRAMES
     for around in (path, *reversed(outer)):
         value = value_at(document, around)
         if type(value) is not dict:
@@ -646,15 +656,21 @@ def _with_names(
             from frametool.stream.beside import with_scale
 
             record = with_scale(record, value[SCALE], around, above, request)  # around it, of a Marker: its shape's
-        parent = _named(value, PARENT_KEYS, (*above, *around), parent, request)
+        parent_keys, name_keys = (EARTH_PARENTS, EARTH_NAMES) if on_earth else (PARENT_KEYS, NAME_KEYS)
+        parent = _named(value, parent_keys, (*above, *around), parent, request)
         if record.shape.kind == POSE or around == path:
-            name = _named(value, NAME_KEYS, (*above, *around), name, request)
+            name = _named(value, name_keys, (*above, *around), name, request)
         header = value.get("header")
         if type(header) is dict:
             inside = (*around, "header")
-            parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
+            if on_earth:  # the frame of a fix is that of its antenna
+                name = name if name.text else Name(header.get("frame_id") or None)
+            else:
+                parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
             record = _with_stamp(record, header, (*inside, "stamp"), above)
-    return record._replace(parent=parent, name=name) if parent.paths or name.paths else record
+    if on_earth:
+        parent = parent._replace(text=parent.text or record.parent.text)
+    return record._replace(parent=parent, name=name) if parent.paths or name.paths or on_earth else record
 
 
 def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, request: Request) -> Name:

@@ -28,6 +28,7 @@ from frametool.stream.row_layout import PARTS, POSE, ROTATION, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled
+from frametool.stream.text_parts import Const, Word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -102,8 +103,10 @@ def pose_of(record: Record, request: Request) -> Pose:
         return pose if shape.whole or shape.unit is not None else pose._replace(position=None)
     if shape.notation is not None:
         rotation, _ = checked_rotation(shape, record.values, normalize=request.normalize)
-    placed_at = shape.whole or shape.unit is not None
-    pose = Pose(shape.position(record.values) if placed_at else None, rotation, record.name.text, record.parent.text)
+        x, y, z, w = shape.turned(record.values, rotation)
+        rotation = x, y, z, w
+    position = shape.position(record.values) if shape.whole or shape.unit is not None else None
+    pose = Pose(position, rotation, record.name.text, record.parent.text)
     beside = record.values[shape.own_size :]
     if 36 in shape.covariance:
         pose = pose._replace(covariance=beside[:36])
@@ -245,6 +248,9 @@ class _Spliced:
         root = Node(0, len(text), parse_nodes(text))
         edits = edits_of(text, entries, root, self.request, json=_is_json(self.source))
         stretches, pieces = cut(len(text), (), edits)
+        pieces = [
+            Const(each.text(self.numbers[each.number])) if isinstance(each, Word) else each for each in pieces
+        ]
         marked = [f"{at}{self.mark}" for at in range(len(self.numbers))]
         return parse_nodes(filled(pieces, [text[slice(*each)] for each in stretches], marked))
 
@@ -369,7 +375,8 @@ def _read_stamp(key: str, value: Any) -> int:
 def _used_keys(record: Record) -> set[str]:
     """Return the keys of a record that say its pose, or what is no longer true of the result."""
     halves = PARTS.get(record.shape.kind, ())
-    return {record.key, record.rotation, *record.others, *record.flat, *record.members, *halves, *NOT_PLAIN}
+    own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
+    return {*own, *halves, *NOT_PLAIN}
 
 
 def _says_no_more(record: Record, document: Document, unit: Path) -> bool:
@@ -403,14 +410,19 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> 
     entry = made.entry
     kind = entry.record.shape.kind
     named: dict[str, Any] = {"frame": entry.parent} if entry.parent is not None else {}
+    antenna = {"name": entry.name} if entry.record.placed and entry.name else {}
     numbers = written(made)[: entry.target.size]
     beside = _extras(made, request, len(numbers))
     if kind in PARTS:
         named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
+    elif entry.target.place is not None:
+        from frametool.grammar.place import point_entry
+
+        named = point_entry(entry.parent, made.parts[:3], entry.target.place)
     else:
         named[kind] = numbers
     rest = _with_stamp_ns(_rest(node, unit, entry.record), form)
-    return named | _header_stamp(entry.record) | beside | rest
+    return antenna | named | _header_stamp(entry.record) | beside | rest
 
 
 def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Spliced) -> dict[str, Any]:

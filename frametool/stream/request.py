@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from frametool.errors import ValueInvalid
 from frametool.geometry import rigid, vectors
 from frametool.geometry.floats import RADIAN
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import HEADING, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
@@ -19,9 +19,11 @@ from frametool.stream.row_layout import MOVERS, POINT, POSE, SIX, TURNED, VECTOR
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.geometry.place import Earth, Place
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
+    from frametool.stream.row_layout import Unit
     from frametool.stream.stamp_source import Timed
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
@@ -275,7 +277,7 @@ def _placed() -> Any:
 
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
     """Return the pose that numbers say, which may be the inverse of what is written."""
-    pose = pose_of(shape.position(own), rotation(own))
+    pose = pose_of(shape.position(own), shape.turned(own, rotation(own)))
     return rigid.inverse(*pose) if shape.inverse else pose
 
 
@@ -302,6 +304,8 @@ class Request(NamedTuple):
     gathered: takes the poses, nothing is written then
     all_numbers: all numbers of a result are wanted, also those that do not change
     canonical: results are written anew rather than in the text of their records
+    place: how positions on the Earth are written; given_place: what unnamed numbers are of one
+    earth: what is said of all places: the origin, the axes of rotations, the zone
     """
 
     operation: Operation = Operation()
@@ -331,11 +335,20 @@ class Request(NamedTuple):
     on_error: str = STOP
     all_numbers: bool = False
     canonical: bool = False
+    place: Place | None = None
+    given_place: str = ""
+    earth: Earth | None = None
 
     @property
     def in_order(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
-        return self.unwrap or self.operation.looks_back or self.gathered is not None
+        takes_first = self.earth is not None and self.earth.origin is not None and self.earth.origin.place is None
+        return self.unwrap or self.operation.looks_back or self.gathered is not None or takes_first
+
+    @property
+    def keeps_position(self) -> bool:
+        """Tell whether positions stay as they are written."""
+        return self.operation.keeps_position and self.place is None
 
     def target(self, shape: Shape) -> Target:
         """Choose how results of things of a shape are written: as they were read unless told."""
@@ -347,11 +360,13 @@ class Request(NamedTuple):
         if kind in SIX:
             return Target(None, (), plain=True)
         if kind not in TURNED:
-            return Target(1.0 if self.all_numbers and shape.unit else shape.unit, (), three=True)
+            if self.place is not None and kind != POINT:
+                raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {self.place.name} out")
+            return Target(self._unit(shape), (), three=True)
         there = shape.whole or shape.unit is not None
         placed = there or (self.shifts and kind == POSE)
-        unit = 1.0 if self.all_numbers and (self.notations or shape.notation is None) else shape.unit or 1.0
-        if self.notations or shape.notation is None:
+        unit = self._unit(shape) or 1.0
+        if self.notations or shape.notation is None or shape.notation.representation is HEADING:
             stays = shape.notation is None and self._only_turns_around and (self.by_default or not self.notations)
             notations = () if stays else self.notations or (notation("quaternion"),)
             scaled = self._is_scaled(shape, notations)
@@ -368,6 +383,13 @@ class Request(NamedTuple):
             absent=tuple(at + first * (not shape.whole) for at in shape.absent),
             scaled=self._is_scaled(shape, (shape.notation,)),
         )
+
+    def _unit(self, shape: Shape) -> Unit | None:
+        """Return how positions are written: as asked for, as they were read, or in metres, as those of places are."""
+        if self.place is not None and shape.unit is not None:
+            return self.place
+        own = shape.unit if shape.place is None else 1.0
+        return 1.0 if own is not None and self.all_numbers and (self.notations or shape.notation is None) else own
 
     def _is_scaled(self, shape: Shape, notations: Sequence[Notation]) -> bool:
         """Tell whether the scale of results is in the one matrix that is written of each."""

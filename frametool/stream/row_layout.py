@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
+    from frametool.geometry.place import Place
     from frametool.geometry.representations import Notation, Whole
     from frametool.geometry.types import Components, Namespace, Quaternion, Rigid
 
@@ -38,7 +39,8 @@ TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
 FLAT = 1e-9  # radians, metres: what a number without a column may be
 LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
-Unit: TypeAlias = float | tuple[float, float, float]  # how many make a metre, where they differ of x, y, z each
+# how many make a metre, where they differ of x, y, z each; or how positions on the Earth are written
+Unit: TypeAlias = "float | tuple[float, float, float] | Place"
 
 
 def six_names(kind: str) -> list[str]:
@@ -97,12 +99,18 @@ class Shape(NamedTuple):
         if self.joined or self.kind in SIX:
             return len(self.joined.columns) if self.joined else 6
         rotation = len(self.notation.representation.columns) if self.notation else 0
-        return rotation + (self.unit is not None) * 3
+        return rotation + count_of(self.unit)
+
+    @property
+    def place(self) -> Place | None:
+        """Return how its position on the Earth is written, None of any other."""
+        return place_of(self.unit)
 
     @property
     def position_size(self) -> int:
         """Count the numbers of the position in a row."""
-        return 0 if self.whole or self.unit is None else 3 - sum(place < 3 for place in self.absent)
+        count = count_of(self.unit)
+        return 0 if self.whole else count - sum(place < count for place in self.absent)
 
     @property
     def rotation_at(self) -> tuple[int, ...]:
@@ -115,7 +123,7 @@ class Shape(NamedTuple):
         """Return where in a row a number of the rotation stands that has a column."""
         if self.joined:
             return self.rotation_at[index]
-        full = index + 3 * (self.unit is not None)
+        full = index + count_of(self.unit)
         return full - sum(each < full for each in self.absent)
 
     def in_degrees(self, place: int) -> bool | None:
@@ -123,7 +131,7 @@ class Shape(NamedTuple):
         if place >= self.own_size:
             return None
         there = [each for each in range(self._full) if each not in self.absent]
-        index = there[place] - (self.unit is not None) * 3
+        index = there[place] - count_of(self.unit)
         if self.whole or self.notation is None or index not in self.notation.representation.angles:
             return None
         return self.degrees and index not in self.radians_at
@@ -135,18 +143,25 @@ class Shape(NamedTuple):
             return position
         if self.unit is None:
             return (0.0, 0.0, 0.0)
+        if (place := self.place) is not None:
+            return place.ecef(numbers[: place.size])
         x, y, z = self._with_absent(numbers)[:3]
         if self.unit == 1.0:
             return x, y, z
         a, b, c = _each(self.unit)
         return x / a, y / b, z / c
 
+    def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
+        """Return the checked rotation of a row, as x y z w, in the frame that its position is in."""
+        place = self.place
+        return rotation if place is None or self.notation is None else place.turned(numbers[: place.size], rotation)
+
     def rotation(self, numbers: Sequence[Any]) -> Components:
         """Return the rotation's numbers in the order of its columns, angles in one unit."""
         if self.joined:
             rotation: Components = self.joined.split(numbers)[1]
             return rotation
-        given = list(self._with_absent(numbers)[(self.unit is not None) * 3 : self._full])
+        given = list(self._with_absent(numbers)[count_of(self.unit) : self._full])
         for index in self.radians_at:
             given[index] = given[index] * TO_DEGREES
         return tuple(given)
@@ -188,6 +203,16 @@ class Target(NamedTuple):
     absent: tuple[int, ...] = ()
     scaled: bool = False
 
+    @property
+    def place(self) -> Place | None:
+        """Return how positions on the Earth are written, None where there are none."""
+        return place_of(self.unit)
+
+    @property
+    def position_columns(self) -> list[str]:
+        """Name the numbers of the position."""
+        return list("xyz" if self.place is None else self.place.columns) if self.unit is not None else []
+
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
         own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
@@ -204,7 +229,7 @@ class Target(NamedTuple):
         """Return the numbers of a result without a column, by name; a row where one is above FLAT is bad."""
         if not self.absent:
             return []
-        full, names = self._full(parts, xp), [*"xyz"[: 3 * (self.unit is not None)], *self.names]
+        full, names = self._full(parts, xp), [*self.position_columns, *self.names]
         return [(names[place], full[place]) for place in self.absent]
 
     def _full(self, parts: Components, xp: Namespace, scale: Any = None) -> list[Any]:
@@ -213,11 +238,13 @@ class Target(NamedTuple):
         position: list[Any] = []
         if self.unit == 1.0:
             position = list(parts[:3])
+        elif (place := self.place) is not None:
+            position = place.numbers(*parts[:3])
         elif self.unit is not None:
             position = [part * unit for part, unit in zip(parts[:3], _each(self.unit), strict=True)]
         if len(parts) == 3 or not self.notations:
             return position
-        x, y, z, w = parts[3:7]
+        x, y, z, w = parts[3:7] if self.place is None else self.place.local(parts[0], parts[1], parts[2], parts[3:7])
         unit = quaternion.unit(x, y, z, w, xp)
         written = [
             notation.from_quaternion(*unit, xp, degrees=degrees, keep_sign=self.keep_sign)
@@ -242,15 +269,15 @@ class Target(NamedTuple):
     @property
     def size(self) -> int:
         """Count the numbers of a result."""
-        return 6 if self.plain else (self.unit is not None) * 3 + len(self.names) - len(self.absent)
+        return 6 if self.plain else count_of(self.unit) + len(self.names) - len(self.absent)
 
     def angle_columns(self) -> list[tuple[int, float]]:
         """Return which of the numbers are angles, each with the size of a full turn."""
-        found, first = [], 0 if self.unit is None else 3
+        found, first = [], count_of(self.unit)
         for notation, degrees in self.notations:
             found += [(first + index, 360.0 if degrees else TURN) for index in notation.representation.angles]
             first += len(notation.representation.columns)
-        start = 0 if self.unit is None else 3
+        start = count_of(self.unit)
         return [
             (place - sum(each < place for each in self.absent), TURN if place - start in self.radians_at else period)
             for place, period in found
@@ -266,9 +293,20 @@ class Target(NamedTuple):
         return euler.locked(x, y, z, w, axes)
 
 
-def _each(unit: Unit) -> tuple[float, float, float]:
+def place_of(unit: Unit | None) -> Place | None:
+    """Return a unit that is a way to write positions on the Earth, None for any other."""
+    return None if unit is None or type(unit) is float or type(unit) is tuple else unit  # type: ignore[return-value]
+
+
+def count_of(unit: Unit | None) -> int:
+    """Count the numbers of a position: three, or those of a place; none without one."""
+    place = place_of(unit)
+    return place.size if place is not None else 3 * (unit is not None)
+
+
+def _each(unit: Any) -> tuple[float, float, float]:
     """Return the unit of x, y and z each."""
-    return unit if isinstance(unit, tuple) else (unit, unit, unit)
+    return unit if type(unit) is tuple else (unit, unit, unit)
 
 
 def pose_of(position: Components, rotation: Components) -> Rigid:

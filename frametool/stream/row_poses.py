@@ -14,7 +14,7 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import in_nanoseconds, stamp_places
+from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_places
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.evaluate import Run, State
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from frametool.geometry.place import Place
     from frametool.stream.faults import RowNote
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
@@ -86,7 +87,8 @@ class TablePoses:
         named = request.for_kind(self.shape.kind)
         self.naming = Naming(self.table, layout, named)
         rename = rename_of(named)
-        self.unnamed = (None, None) if rename is None else rename(None, None)
+        own = EARTH_FRAMES[0] if self.shape.place is not None else None
+        self.unnamed = (own, None) if rename is None else rename(own, None)
         self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
         if layout.time is None:
             time, below = stamp_places(self.table.names)
@@ -306,8 +308,10 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
     return made
 
 
-def points_of(block: RowPoses, kind: str, extras: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Return a block of points or vectors as mappings, one each."""
+def points_of(
+    block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None
+) -> list[dict[str, Any]]:
+    """Return a block of points or vectors as mappings, one each, or of points on the Earth at a place."""
     size = len(block.numbers)
     frames = block.parents if len(block.parents) == size else list(block.parents) * size
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
@@ -317,7 +321,12 @@ def points_of(block: RowPoses, kind: str, extras: Sequence[str] = ()) -> list[di
         named: dict[str, Any] = {"frame": frames[at]} if frames[at] else {}
         stamp = {} if stamps is None else {"stamp_ns": None if stamps[at] == NO_STAMP else stamps[at]}
         is_null, size = isnan(numbers[0]), len(numbers) - len(extras)
-        own = spelled(kind, None if is_null else numbers[:size])
+        if place is not None and not is_null:
+            from frametool.grammar.place import point_entry
+
+            own, named = point_entry(frames[at], numbers[:size], place), {}
+        else:
+            own = spelled(kind, None if is_null else numbers[:size])
         own |= with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[size:], strict=True)))
         made.append(named | own | stamp | {name: texts[at] for name, texts in others.items()})
     return made

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.text_parts import Const, IfLocked, In, Instead, Out
+from frametool.stream.text_parts import Const, IfLocked, In, Instead, Out, Word
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, shortest_spans
 
@@ -101,9 +101,27 @@ def separators(pieces: Iterable[Piece], count: int) -> bytes:
     return bytes(after)
 
 
-def assemble(pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints) -> list[Spans]:
-    """Return the spans, in order, that make up the rows; locked: (n,) 1 where angles are not unique."""
-    return [_spans(piece, parts, values, locked) for piece in pieces]
+def assemble(
+    pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints, results: Floats | None = None
+) -> list[Spans]:
+    """Return the spans, in order, that make up the rows.
+
+    values: the texts of the results; locked: (n,) 1 where angles are not unique
+    """
+    return [
+        worded(results[:, piece.number], piece) if isinstance(piece, Word) and results is not None
+        else _spans(piece, parts, values, locked)
+        for piece in pieces
+    ]  # fmt: skip
+
+
+def worded(numbers: Floats, piece: Word) -> Spans:
+    """Return the words that numbers (n,) stand for."""
+    found, of_row = np.unique(numbers, return_inverse=True)
+    texts = [piece.text(number) for number in found.tolist()]
+    ends = np.cumsum([len(text) for text in texts]) + MARGIN
+    starts = ends - [len(text) for text in texts]
+    return Spans(framed(b"".join(texts)), starts[of_row], ends[of_row])
 
 
 def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:

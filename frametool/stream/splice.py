@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import quoted
-from frametool.geometry.representations import REPRESENTATIONS
-from frametool.grammar.names import PARENT_KEYS
+from frametool.geometry.representations import ROTATIONS
+from frametool.grammar.names import EARTH_FRAMES, PARENT_KEYS, PLACE_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
-from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR
-from frametool.stream.text_parts import Const, IfLocked, Out
+from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
+from frametool.stream.text_parts import Const, IfLocked, Out, Word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.document import Node
+    from frametool.geometry.place import Place
     from frametool.stream.answers import Entry
     from frametool.stream.record import Name, Record
     from frametool.stream.request import Request
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
 MARK = "\0"
 SAMPLE = (0.5, 0.5, 0.5, 0.5)
 OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angular", "force", "torque")).union(
-    *({column, f"{column}_deg", f"{column}_rad"} for row in REPRESENTATIONS.values() for column in row.columns)
+    *({column, f"{column}_deg", f"{column}_rad"} for row in ROTATIONS.values() for column in row.columns)
 )
 
 
@@ -58,7 +60,7 @@ def null_edits(node: Node) -> list[Edit]:
         return []
     found = []
     for key, (_, value) in node.value.items():
-        if key in OURS:
+        if key in OURS or key in PLACE_KEYS:
             found.append(Edit(value.start, value.end, (Const(b"null"),)))
         else:
             found += null_edits(value)
@@ -149,7 +151,7 @@ class Splicer:
         if self.record.shape.unit is None:
             if target.unit is not None:
                 anchor = self.node.value[self.record.rotation][0] if self.record.rotation else self._first_key()
-                self._insert_before(anchor, self._member({"xyz": list(SAMPLE[:3])}, 0))
+                self._insert_before(anchor, self._place("xyz"))
             return
         kind = "xyz" if self.record.shape.kind == POSE else self.record.shape.kind
         if key in (POINT, VECTOR) and key != kind:
@@ -159,21 +161,34 @@ class Splicer:
         there = self.record.shape.position_size
         if target.unit is None:
             self.dropped.update(members)
-        elif None in self.slots[:there] or (there < 3 and not target.absent):
-            self._replace(self.node.value[members[0]], self._member({key or "xyz": list(SAMPLE[:3])}, 0))
+        elif None in self.slots[:there] or (there < 3 and not target.absent) or target.place != self.record.shape.place:
+            self._replace(self.node.value[members[0]], self._place(key or kind))
             self.dropped.update(members[1:])
         elif not self._position_stays():
             self._numbers(range(there), 0)
 
+    def _place(self, key: str) -> tuple[Piece, ...]:
+        """Write the position as a member, or as those of a place, with the axes of its rotation."""
+        place = self.target.place
+        if place is None:
+            return self._member({key: list(SAMPLE[:3])}, 0)
+        entry = place.entry(place.sample)
+        if place.name in EARTH_FRAMES:
+            entry = {key: entry.pop(place.name)} | entry
+        elif self.target.notations:
+            entry |= {AXES_KEY: place.axes}
+        return tuple(_with_words(self._member(entry, 0), place, self.first, quote=self.json))
+
     def _position_stays(self) -> bool:
         """Tell whether only the notation of the rotation changes: then the position keeps its text."""
         request = self.request
-        return request.operation.keeps_position and not self.record.shape.inverse
+        return request.keeps_position and not self.record.shape.inverse
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
         shape, target = self.record.shape, self.target
         first = 0 if target.unit is None else 3 - sum(place < 3 for place in target.absent)
+        first = first if target.place is None else target.place.size
         slots = range(shape.position_size, shape.own_size)
         rotation = self.record.rotation
         members = self._members(first)
@@ -234,17 +249,33 @@ class Splicer:
 
     def _names(self) -> None:
         """Rename the frames as the operation does."""
+        record = self.record
+        if record.parent.text and not record.parent.paths and not self._is_local():  # a place, which says its frame
+            self._insert_before(self._first_key(), self._member({self._parent_key(): self.entry.parent}, 0))
+        if record.placed and record.name.text and not record.name.paths:
+            self._insert_before(self._first_key(), self._member({"name": self.entry.name}, 0))
+        if "header" in record.placed and record.stamp_ns is not None:
+            self._insert_before(self._first_key(), self._member({"stamp_ns": Verbatim(str(record.stamp_ns))}, 0))
         if self.request.rename is None:
             return
-        record = self.record
         if not self.request.poses and {"name", "parent"} & self.node.value.keys() - {*record.members}:
             return  # in a row that was no pose they say something else
         parent, name = self.entry.parent, self.entry.name
         if self._has_swapped(name, parent):
             return
         self._name(record.name, name, "name")
-        becomes_pose = self.request.operation.result_kind(record.shape.kind) == POSE
-        self._name(record.parent, parent, "parent" if becomes_pose else "frame")
+        if record.parent.paths or not record.parent.text:
+            self._name(record.parent, parent, self._parent_key())
+
+    def _parent_key(self) -> str:
+        """Return the key that names the frame in which a result is given."""
+        return "parent" if self.request.operation.result_kind(self.record.shape.kind) == POSE else "frame"
+
+    def _is_local(self) -> bool:
+        """Tell whether a result on the Earth says no frame: a point that says its place, or axes of an origin."""
+        place = self.target.place
+        says = place is not None and place.name not in EARTH_FRAMES and self._parent_key() == "frame"
+        return says or (place is not None and place.origin is not None)
 
     def _name(self, old: Name, new: str | None, key: str) -> None:
         """Write a frame's name where the record says it, or as a member of its own."""
@@ -346,10 +377,9 @@ class Splicer:
 
     def _all_members(self) -> list[tuple[Piece, ...]]:
         """Return the members of a result: position, rotation, what comes beside."""
-        placed = self.target.unit is not None
         kind = self.request.operation.result_kind(self.record.shape.kind)
-        position = [self._member({"xyz" if kind == POSE else kind: list(SAMPLE[:3])}, 0)] if placed else []
-        return [*position, *self._members(3 * placed), *self._extras(self.target.size)]
+        position = [self._place("xyz" if kind == POSE else kind)] if self.target.unit is not None else []
+        return [*position, *self._members(count_of(self.target.unit)), *self._extras(self.target.size)]
 
     def _leave_out(self) -> None:
         """Leave members out, with what parts them from their neighbours."""
@@ -378,6 +408,13 @@ def _flow(value: Any, text: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_flow(each, text) for each in value) + "]"
     return str(text(value))
+
+
+def _with_words(pieces: Sequence[Piece], place: Place, first: int, *, quote: bool) -> Iterator[Piece]:
+    """Put words in the place of the numbers that stand for them."""
+    for piece in pieces:
+        words = place.words.get(piece.first - first) if isinstance(piece, Out) else None
+        yield piece if words is None else Word(piece.first, words, b'"' * quote)  # type: ignore[union-attr]
 
 
 def _with_numbers(text: str, first: int) -> Iterator[Piece]:

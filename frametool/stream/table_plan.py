@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.grammar.names import (
+    EARTH_FRAMES,
     NAME_KEYS,
     PARENT_COLUMNS,
     in_nanoseconds,
+    may_be_on_earth,
     may_be_uncertain,
     nanoseconds_beside,
     without_mark,
 )
+from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import Misused
 from frametool.stream.header import (
@@ -26,8 +29,8 @@ from frametool.stream.header import (
     row_shape,
     wholes_of,
 )
-from frametool.stream.layout import NAME, PARENT, Kept, Named, New, lay_out, refuse_repeated
-from frametool.stream.row_layout import POSE, SIX, Shape, six_names
+from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, lay_out, refuse_repeated
+from frametool.stream.row_layout import POSE, SIX, Shape, place_of, six_names
 from frametool.stream.table import rename_of
 
 if TYPE_CHECKING:
@@ -44,14 +47,23 @@ if TYPE_CHECKING:
 def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layout]:
     """Choose the columns that are read and written; raises FormatError that names the columns there are."""
     poses = _find_if_read(table, request, source)
-    only_turned = not request.operation.moves and request.operation.keeps_position and request.gathered is None
+    only_turned = not request.operation.moves and request.keeps_position and request.gathered is None
     only_turned = only_turned and not (request.operation.turns and poses and poses[0].rotation is None)  # a point
-    if request.poses == 1 and only_turned and not request.all_numbers:
+    on_earth = bool(poses) and poses[0].position is not None and place_of(poses[0].position.unit) is not None
+    if request.poses == 1 and only_turned and not (request.all_numbers or on_earth):
         poses = [_without_position(poses[0], request, table, source)]
     for wrong in [columns.wrong for pose in poses for columns in pose if columns and columns.wrong]:
         raise FormatError(wrong, source=source, line=1)
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
+    if on_earth:
+        from frametool.stream.earth_columns import check_rows
+
+        request, shapes = check_rows(request, shapes, source)
+    if request.place is not None and (request.operation.moves or not on_earth):
+        from frametool.stream.earth_columns import refuse_elsewhere
+
+        refuse_elsewhere(table, request, source)
     beside: tuple[int, ...] = ()
     if any(may_be_uncertain(name) for name in table.names or ()):
         from frametool.stream.beside import covariance_columns
@@ -61,12 +73,13 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
-    frames = _frame_columns(table, request, source)
+    frames = () if on_earth else _frame_columns(table, request, source)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
-    edge_of = request.pose_of_row_frame
+    edge_of = None if on_earth else request.pose_of_row_frame
     if frames and edge_of is None and request.operation.moves:
         edge_of = request.pose_from_frame
+    edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
@@ -84,6 +97,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
         timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
+        edges=edges, sources=EARTH_FRAMES[:1] if on_earth else (),
         frame_column=table.name(frames[0]) if len(frames) == 1 else "",
     ), layout  # fmt: skip
 
@@ -95,6 +109,10 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
     if request.columns:
         if len(request.columns) != request.poses:
             raise Misused(f"--columns is given {len(request.columns)} times, for {request.poses} poses in a row")
+        if request.given_place:
+            from frametool.stream.earth_columns import chosen_pose
+
+            return [chosen_pose(request.columns[0], table.names, table.width, request)]
         kinds = request.kinds or (request.kind,) * request.poses
         return [
             named_pose(spec, table.names, table.width, request.given, kind)
@@ -106,6 +124,10 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
         known = request.extra_column
         names = ["" if name == known or may_be_uncertain(name) else name for name in table.names]
         return _find_named(names, request, source)
+    if request.poses == 1 and request.given_place:
+        from frametool.stream.earth_columns import chosen_pose, of_width
+
+        return [chosen_pose(of_width(table.width, request), None, table.width, request)]
     if request.kind in SIX and table.width == len(six_names(request.kind)):
         return [named_pose(f"1-{table.width}", None, table.width, None, request.kind)]
     if request.poses == 1 and (spec := _by_width(table.width, request.given)):
@@ -132,6 +154,11 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
         others = list(names)  # what a pose has beside it would no longer be true
+    if request.poses == 1 and (request.given_place or any(map(may_be_on_earth, names))):
+        from frametool.stream.earth_columns import find_pose
+
+        if (pose := find_pose(others, request, source)) is not None:
+            return [pose]
     return find_poses(others, request.given, request.poses, source)
 
 
@@ -255,7 +282,7 @@ def _columns(
     position, rotation, extras = _new_columns(poses, target, request, shapes[0] if shapes else Shape(POSE))
     ours = [columns for pose in poses for columns in pose if columns is not None]
     columns: list[Column] = [Kept(place) for place in range(table.width)]
-    only_turned = request.operation.changes_nothing and not request.operation.moves
+    only_turned = request.operation.changes_nothing and not request.operation.moves and request.place is None
     if only_turned and request.by_default and not (request.all_numbers or target.notations or request.keep):
         return columns
     if request.keep or request.operation.only_adds or not ours:
@@ -316,6 +343,7 @@ def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request)
         return False
     same = not target.notations or shape.notation is None or _same(pose, target)
     placed = (shape.unit is None) == (target.unit is None) and len(shape.absent) == len(target.absent)
+    placed = placed and shape.place is target.place is None
     return same and placed and shape.whole == target.whole and (pose.position is not None or pose.rotation is not None)
 
 
@@ -324,7 +352,9 @@ def _same(pose: PoseColumns, target: Target) -> bool:
     return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
 
 
-def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request, shape: Shape) -> list[list[New]]:
+def _new_columns(
+    poses: Sequence[PoseColumns], target: Target, request: Request, shape: Shape
+) -> list[list[Column]]:
     """Name the numbers of the result of rows of a shape: position, rotation, what else there is."""
     pose = poses[0] if poses else PoseColumns(None, None)
     rotation, alone = pose.rotation, not request.prefix and len(poses) == 1
@@ -332,16 +362,23 @@ def _new_columns(poses: Sequence[PoseColumns], target: Target, request: Request,
         turned = list(rotation.names)
     else:
         turned = _affixed(target.names, rotation, request, len(poses))
-    moved = [] if target.unit is None else [request.prefix + name for name in XYZ]
+    moved = [request.prefix + name for name in target.position_columns]
     if target.plain and pose.position:
         moved = [request.prefix + name for name in pose.position.names]
-    if moved and pose.position and alone:
+    if moved and pose.position and alone and target.place == shape.place:
         moved = list(pose.position.names)
-        moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
+        if target.place is None:
+            moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
     extras = [request.prefix + name for name in request.extras(shape)]
-    new = [New(at, name) for at, name in enumerate((*moved, *turned, *extras))]
+    words = {} if target.place is None else target.place.words
+    named = [*enumerate((*moved, *turned, *extras))]
+    new: list[Column] = [Worded(at, name, words[at]) if at in words else New(at, name) for at, name in named]
     first, last = len(moved), len(moved) + len(turned)
-    return [new[:first], new[first:last], [each for each in new[last:] if each.name not in turned]]
+    axes: list[Column] = []
+    if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
+        axes = [Fixed(target.place.axes, request.prefix + AXES_KEY)]
+    beside = [column for column, (_, name) in zip(new[last:], named[last:], strict=True) if name not in turned]
+    return [[*new[:first], *axes], new[first:last], beside]
 
 
 def _affixed(names: Sequence[str], columns: Columns | None, request: Request, poses: int) -> list[str]:

@@ -23,7 +23,7 @@ from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS
 from frametool.stream.row_layout import POSE
 from frametool.stream.splice import OURS, Splicer
-from frametool.stream.text_parts import Const, IfLocked, In, Out
+from frametool.stream.text_parts import Const, IfLocked, In, Out, Word
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -201,6 +201,7 @@ class Template:
         around |= {(*path, "scale") for path in poses}
         words = _WORDS if poses else _WORDS - {"scale"}  # of points that is data
         fixed = {path for entry in self.entries for path in (*entry.record.numbers, *entry.record.unknown)}
+        placed = {(*entry.record.path, key) for entry in self.entries for key in entry.record.placed}
         stamps = {path: STAMP[at % 2] for entry in self.entries for at, path in enumerate(entry.record.stamps)}
         for path, leaf in _leaves(self._root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
@@ -209,8 +210,8 @@ class Template:
                 yield leaf, f"{leaf.quote}[0-9]++{leaf.quote}"
             elif path in stamps:
                 yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
-            elif "sigma" in path or may_be_uncertain(key):
-                continue  # they say a covariance, and are no numbers of ours
+            elif "sigma" in path or may_be_uncertain(key) or any(path[: len(each)] == each for each in placed):
+                continue  # they say a covariance or a place, and are no numbers of ours
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue
             else:
@@ -288,6 +289,8 @@ def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str]
             shown.append(texts[piece.part])
         elif isinstance(piece, Out):
             shown.append(numbers[piece.first])
+        elif isinstance(piece, Word):
+            shown.append(piece.text(float(numbers[piece.number])).decode())
         elif isinstance(piece, Const) or (locked and isinstance(piece, IfLocked)):
             shown.append(piece.text.decode())
     return "".join(shown)

@@ -19,6 +19,18 @@ class Out(NamedTuple):
     between: bytes = b","
 
 
+class Word(NamedTuple):
+    """A number of the result as the word that it stands for, between quotes or not: the zone of UTM."""
+
+    number: int
+    words: tuple[str, ...]
+    quote: bytes = b""
+
+    def text(self, number: float) -> bytes:
+        """Return the word of a number."""
+        return self.quote + self.words[int(number)].encode() + self.quote
+
+
 class Instead(NamedTuple):
     """A name of the result in place of a stretch of the input, which stays where there is no result."""
 
@@ -38,4 +50,4 @@ class IfLocked(NamedTuple):
     text: bytes
 
 
-Piece: TypeAlias = In | Out | Const | IfLocked | Instead
+Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word

@@ -32,6 +32,7 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.geometry.representations import notation
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.header import XYZ
@@ -55,6 +56,7 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from frametool.geometry.place import Place
     from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.stream.row_poses import RowPoses
@@ -69,11 +71,12 @@ MARK = "@@{}@@"
 
 def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     """Say which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
+    place: Any = style.place
     if kind != POSE:
-        return Target(None, (), plain=True) if kind in SIX else Target(1.0, (), three=True)
+        return Target(None, (), plain=True) if kind in SIX else Target(place or 1.0, (), three=True)
     forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
     whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
-    return Target(None if whole or not placed else 1.0, forms, style.keep_sign, whole)
+    return Target(None if whole or not placed else place or 1.0, forms, style.keep_sign, whole)
 
 
 class TextWriter:
@@ -99,6 +102,8 @@ class TextWriter:
         self.extras = tuple(extras)
         self.placed = placed
         self.target = target_in(style, kind, placed=placed)
+        far = 1.0 if self.target.place is None else 1e6  # nothing near the Earth's centre has a latitude
+        self.probe = (*(far * part for part in PROBE[:3]), *PROBE[3:])
         self.count = 0
         self.dropped: dict[str, None] = {}
         self.rows: RowForm | None = None
@@ -112,6 +117,8 @@ class TextWriter:
         if not len(block.numbers):
             self.empty = block
             return b""
+        if self.style.place is not None:
+            self._settle(self.style.place, block)
         if self.style.form not in LEARNED:
             self.dropped |= dict.fromkeys((*self.extras, *block.extras))
             refuse_scale_in(self.style.form, self.dropped)
@@ -123,6 +130,17 @@ class TextWriter:
             text += self._fixed(self.fixed, run) if self.fixed else self._free(run, is_null=bool(absent[start]))
             self.count += end - start
         return text
+
+    def _settle(self, place: Place, block: RowPoses) -> None:
+        """Refuse positions of another frame than the Earth's; the first of all may be the origin."""
+        from frametool.grammar.place import check_in_ecef
+
+        for parent in dict.fromkeys(block.parents):
+            check_in_ecef(parent, place)
+        if self.fixed is not None:
+            names = ", ".join(each.name for each in (place, *place.more))
+            raise ValueInvalid(f"{self.style.form} holds x, y, z; leave --to {names} out, or write csv or json")
+        place.settle(*self._own(tuple(block.numbers.T))[:3])
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and tell what was left out."""
@@ -256,14 +274,15 @@ class TextWriter:
         style = self.style.in_form(self.style.form)
         style.precision = None
         varies = block.extras or {len(block.names), len(block.parents)} != {1}
-        if style.form not in LEARNED or (style.form == "yaml" and varies):
+        is_worded = self.target.place is not None and bool(self.target.place.words)
+        if style.form not in LEARNED or (style.form == "yaml" and varies) or is_worded:
             return
         probe = self._probe(block)
         alone, twice = (self.write([probe] * count, style) for count in (1, 2))
         row = twice[len(alone) :]
         head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
         row = row[len(between) :]
-        own = PROBE[: self._size] if self.placed or self.kind != POSE else PROBE
+        own = self.probe[: self._size] if self.placed or self.kind != POSE else self.probe
         beside = (0.7310585786300049 + at for at in range(len(self.extras)))
         written = [*self.target.written(own, floats), *beside]
         marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
@@ -292,8 +311,13 @@ class TextWriter:
         )
         if self.kind != POSE:
             named = {} if parent is None else {"frame": parent}
+            if self.target.place is not None:
+                from frametool.grammar.place import point_entry
+
+                named = point_entry(EARTH_FRAMES[0], self.probe[:3], self.target.place)
+                return named | self._probe_extras(block)
             return named | spelled(self.kind, PROBE[: self._size]) | self._probe_extras(block)
-        pose = Pose.of(PROBE, name, parent)
+        pose = Pose.of(self.probe, name, parent)
         return Result(pose if self.placed else pose._replace(position=None), self._probe_extras(block))
 
     def _probe_extras(self, block: RowPoses) -> dict[str, Any]:
@@ -310,7 +334,7 @@ class TextWriter:
         if self.kind == POSE:
             results = list(results_of(block, self.extras, placed=self.placed))
         else:
-            results = points_of(block, self.kind, self.extras)
+            results = points_of(block, self.kind, self.extras, self.target.place)
         first = self.first = self.first or results[0]
         known = "" if not self.count else self.write([first], self.style)
         text = self.write(results if not self.count else [first, *results], self.style)

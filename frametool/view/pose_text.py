@@ -11,7 +11,7 @@ from frametool.documents.json import dump
 from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
-from frametool.geometry.representations import REPRESENTATIONS, ROWS, notation
+from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.grammar.pose import TIMES
 from frametool.grammar.result import is_locked, rotation_entry, rotation_numbers
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, Style
 
-OVERVIEW = [name + unit for name, row in REPRESENTATIONS.items() for unit in row.overview]
+OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
 
 
 WIDTH = 80
@@ -228,7 +228,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
 
 
 ECHO_DECIMALS = 3
-ROTATIONS = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg", "RPY (degree)"))
+ECHOED = (("quaternion", "Quaternion"), ("rpy_rad", "RPY (radian)"), ("rpy_deg", "RPY (degree)"))
 
 
 def write_blocks(results: Iterable[Result], target: str, source: str, style: Style) -> Iterator[str]:
@@ -249,7 +249,7 @@ def _block(result: Result, style: Style) -> str:
 
     lines = ["At any time: the frames stand still" if stamp_ns is None else f"At time {format_stamp(stamp_ns)}"]
     lines.append(f"- Translation: [{', '.join(fixed(components[:3]))}]")
-    for spec, name in ROTATIONS:
+    for spec, name in ECHOED:
         numbers = fixed(rotation_numbers(result.pose, notation(spec), style))
         lines.append(f"- Rotation: in {name} [{', '.join(numbers)}]")
     lines.append("- Matrix:")

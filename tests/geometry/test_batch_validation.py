@@ -13,12 +13,12 @@ import samples
 from frametool.errors import FrametoolWarning, ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.batch_validation import IDENTITY, read_rotations, require_rotations
-from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
+from frametool.geometry.representations import ROTATIONS, Notation, notation
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Array, Quaternion
 
-SPECS = [*(name for name in REPRESENTATIONS if name != "euler"), "euler:rzyx"]
+SPECS = [*(name for name in ROTATIONS if name != "euler"), "euler:rzyx"]
 SIZES = (
     1.0, 1.0 + 1e-15, 1.0 + 5e-7, 1.0 + 2e-6, 1.0005, 0.9995, 1.002, 2.0, 1e-3, 1e-160, 1e-310, 1e160, 1e300, 0.0, -1.0,
     math.inf, math.nan,

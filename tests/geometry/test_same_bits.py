@@ -12,7 +12,7 @@ import samples
 
 from frametool.geometry import arrays, earth, euler, floats, matrix, quaternion, rigid
 from frametool.geometry import transverse_mercator as mercator
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import ROTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -104,10 +104,10 @@ def test_all_24_conventions(axes: str, unit: str) -> None:
     assert_same(form.from_quaternion, [*QUATERNIONS, *rotations])
 
 
-@pytest.mark.parametrize("name", [name for name in REPRESENTATIONS if name != "euler"])
+@pytest.mark.parametrize("name", [name for name in ROTATIONS if name != "euler"])
 @pytest.mark.parametrize("unit", ["_deg", "_rad"])
 def test_all_representations(name: str, unit: str) -> None:
-    form = notation(name + unit * bool(REPRESENTATIONS[name].angles))
+    form = notation(name + unit * bool(ROTATIONS[name].angles))
     assert_same(form.from_quaternion, QUATERNIONS)
     rows: list[Row] = [form.from_quaternion(*row, floats) for row in QUATERNIONS]
     if name in ("rotvec", "rpy", "mrp"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from flow import INVERT, MOVE, convert, flow
 
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import ROTATIONS
 from frametool.stream.header import Header, find_rotations
 from frametool.stream.request import Operation, Request
 
@@ -194,9 +194,9 @@ def test_an_angle_that_stands_twice_is_the_one_beside_its_axis() -> None:
     assert flow(result.text, INVERT).status == 0
 
 
-@pytest.mark.parametrize("name", [name for name, row in REPRESENTATIONS.items() if row.searched])
+@pytest.mark.parametrize("name", [name for name, row in ROTATIONS.items() if row.searched])
 def test_the_work_on_a_header_grows_with_its_width(name: str) -> None:
-    columns = [f"a{at}.{column}" for at in range(200) for column in REPRESENTATIONS[name].columns]
+    columns = [f"a{at}.{column}" for at in range(200) for column in ROTATIONS[name].columns]
     counts = []
     for names in (columns, columns * 2):
         header = Header([f"{at}.{each}" for at, each in enumerate(names)])

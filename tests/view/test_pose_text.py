@@ -13,7 +13,7 @@ import pytest
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats
 from frametool.geometry.conventions import find_euler
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import ROTATIONS
 from frametool.geometry.rotation import Rotation
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         def __call__(self, *arguments: str, stdin: str = ..., files: dict[str, str] | None = None) -> Outcome: ...
 
 
-SPECS = ["", *(row.spelling.replace("AXES", "rzyx") for row in REPRESENTATIONS.values()), "euler:all", "rpy_deg,matrix"]
+SPECS = ["", *(row.spelling.replace("AXES", "rzyx") for row in ROTATIONS.values()), "euler:all", "rpy_deg,matrix"]
 
 
 def hostile(seed: int) -> str:

@@ -31,6 +31,7 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose_algebra import looked_up
 from frametool.text.numbers import NotFinite, parse_number
 
@@ -103,7 +104,8 @@ def command(
         chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
         if scale:
             raise click.UsageError("--scale is about the matrix of --transform; frames of a tree have none")
-        way, rest = _way_by_tree(arguments, more, chosen, at, uncertain=covariance)
+        numbers = bool(stream.given_place)
+        way, rest = _way_by_tree(arguments, more, chosen, at, uncertain=covariance, numbers=numbers)
     elif time_column is not None or at is not None:
         raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
     else:
@@ -136,6 +138,7 @@ def command(
         return task.write(made)
     request = way.request(frame_column, time_column)
     request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
+    request = task.at_places(request)
     if (count := len(stream.options["columns"])) > 1:
         request = request._replace(poses=count, kinds=(kinds if len(kinds) == count else (kind or "",) * count))
     status = 0
@@ -143,7 +146,7 @@ def command(
         status = stream.run(request, output)
     else:
         task.only_arguments(rest, "frame_column", "time_column")
-        output.values(values_of(list(_sources(rest, kind)), request, output))
+        output.values(values_of(list(_sources(rest, kind, stream.given_place)), request, output))
     way.tell()
     return status
 
@@ -217,15 +220,17 @@ class Way(NamedTuple):
 
 
 def _way_by_tree(
-    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None, *, uncertain: bool
+    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None, *, uncertain: bool,
+    numbers: bool = False,
 ) -> tuple[Way, tuple[str, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records.
 
-    chosen: the time of all lookups, where one was chosen.
+    chosen: the time of all lookups, where one was chosen; numbers: what looks like one is no frame's name
     """
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
-    named = arguments[2:3] if len(arguments) > 2 and not _is_record(arguments[2]) else ()
+    is_named = len(arguments) > 2 and not _is_record(arguments[2]) and not (numbers and _begins_number(arguments[2]))
+    named = arguments[2:3] if is_named else ()
     rest = arguments[2 + len(named) :]
     tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
     sigmas = CarriedSigmas(tree) if uncertain else None
@@ -300,12 +305,12 @@ def _way_by_pose(argument: str, task: PoseTask, *, uncertain: bool, multiples: b
 
 def _settled(own: str | None, source: str | None) -> str | None:
     """Decide which frame a record is given in: where both it and the command say, they must agree."""
-    if own and source is not None and own != source:
+    if own and source is not None and own != source and not {own, source} <= {*EARTH_FRAMES}:
         raise ValueInvalid(
             f"a record is given in {shown(own)}, not in {shown(source)}; "
             "leave SOURCE out to use each record's own frame"
         )
-    return own or source
+    return source or own
 
 
 def _is_record(argument: str) -> bool:
@@ -323,8 +328,13 @@ def _is_apart(argument: str) -> bool:
     return not argument or _is_record(argument) or (not _begins_number(argument) and is_pasted(argument))
 
 
-def _sources(arguments: Sequence[str], kind: str | None) -> Iterator[str | Source]:
+def _sources(arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
+    if place and not any(map(_is_record, arguments)):
+        from frametool.cli.earth import mapping_of
+
+        yield mapping_of(arguments, place)
+        return
     for are_apart, group in groupby(arguments, _is_apart):
         texts = list(group)
         yield from filter(None, texts) if are_apart else _points(texts, kind)

@@ -99,7 +99,11 @@ def command(
     request = task.request(operation=operation, notations=forms, unwrap=unwrap)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
-    is_numbers = _are_numbers(values, has_from=request.given is not None)
+    is_numbers = _are_numbers(values, has_from=request.given is not None or bool(request.given_place))
+    if is_numbers and request.given_place:
+        from frametool.cli.earth import mapping_of
+
+        values, is_numbers = (mapping_of(values, request.given_place),), False
     if len(values) == 1 and not (is_numbers or stream.path) and task.has_table(values[0]):
         if task.derives:
             raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")

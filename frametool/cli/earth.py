@@ -1,0 +1,95 @@
+"""What the command line says of places on the Earth: the origin, the axes of rotations, the zone; loaded where it does.
+
+Also takes the places out of what --to and --from name.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.group import refuse_unused, settings
+from frametool.cli.stderr import say
+from frametool.documents.source import Source
+from frametool.errors import FormatError, ValueInvalid
+from frametool.geometry.place import Earth, Origin, Place
+from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.transverse_mercator import zone_number
+from frametool.grammar.place import read_at
+from frametool.grammar.readers import Misfit, Reading, tell
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.geometry.representations import Notation
+    from frametool.geometry.types import Vector
+
+FIRST = "first"
+INLINE = "argument"
+
+
+def earth() -> Earth:
+    """Return what the options say; raises click.UsageError for what is no place and no zone."""
+    said = settings()
+    if said.earth is None:
+        try:
+            zone = None if said.zone is None else zone_number(said.zone)
+        except ValueInvalid as error:
+            raise click.UsageError(f"--zone: {error}") from None
+        said.earth = Earth(None if said.origin is None else _origin(said.origin), said.local_axes or "", zone)
+    return said.earth
+
+
+def _origin(text: str) -> Origin:
+    """Read --origin: a place, or the first position."""
+    if text == FIRST:
+        return Origin(tell=_tell)
+    from frametool.documents.document import parse_documents
+
+    source = Source("--origin", text)
+    reading = Reading(source)
+    try:
+        documents = parse_documents(text, source.name) if text.startswith("{") else []
+        if len(documents) != 1:
+            raise click.UsageError(f"--origin takes a place like '{{lat: 48.1, lon: 11.5, alt: 520}}', or {FIRST}")
+        spot = read_at(documents[0].value, reading)
+    except Misfit as misfit:
+        raise click.UsageError(f"--origin: {misfit}") from None
+    except FormatError as error:
+        raise click.UsageError(str(error)) from None
+    tell(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
+    lat, lon, alt = spot.place.lla(spot.numbers)
+    return Origin((lat, lon, alt))
+
+
+def _tell(place: Vector) -> None:
+    lat, lon, alt = place
+    if not settings().quiet:
+        say(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
+
+
+def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Place | None]:
+    """Part what --to names into rotations, and how positions are written; raises ValueInvalid for --to enu alone."""
+    names = [each.representation.name for each in notations if each.representation.is_place]
+    rest = tuple(each for each in notations if not each.representation.is_place)
+    return rest, Place.written(names, earth()) if names else None
+
+
+def mapping_of(texts: Sequence[str], name: str) -> str:
+    """Write bare numbers of a place as the mapping that says the same; raises click.UsageError for another count."""
+    from frametool.documents.json import dump
+
+    row = REPRESENTATIONS[name]
+    zoned = name == "utm" and len(texts) == 3 and earth().zone is not None
+    fields = row.names[zoned:]
+    least = {"lla": 2, "utm": 3}.get(name, 3) - zoned
+    if not least <= len(texts) <= len(fields):
+        raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")
+    members: Any = dict(zip(fields, texts, strict=False))
+    return dump({"ecef": members} if name == "ecef" else {"utm": members} if name == "utm" else members)
+
+
+def refuse_earth(why: str) -> None:
+    """Stop where an option about places would not be used."""
+    refuse_unused(why, "origin", "local_axes", "zone")

@@ -1,0 +1,329 @@
+"""How positions on the Earth are written: latitude and longitude, ECEF, UTM, local axes; each way to ECEF and back.
+
+A `Place` says what numbers mean as a unit says it of lengths, and what rotations beside them are given in.  Knows
+numbers only, floats or arrays of one shape; a zone of UTM is a number, as `transverse_mercator` has it.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import ValueInvalid, shown
+from frametool.geometry import earth, floats, quaternion, rigid
+from frametool.geometry import transverse_mercator as mercator
+from frametool.geometry.floats import RADIAN, SQRT_HALF
+from frametool.geometry.representations import REPRESENTATIONS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from frametool.geometry.types import Components, Namespace, Rigid, Vector
+
+ECEF, ENU, NED, GRID = "ecef", "enu", "ned", "grid"  # axes; two of them are places too, beside an origin
+LLA, UTM = "lla", "utm"
+LOCAL = (ENU, NED)
+ZONE, AXES = "zone", "axes"  # what is written as a word
+SAMPLE = 0.5  # a number that is no zone
+GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
+UNSAID = (
+    "a pose at lat, lon does not say what its rotation is given in; "
+    "axes: enu, ned, grid or ecef; for rows --local-axes"
+)
+
+
+class Origin:
+    """Where the axes of enu and ned stand: at a place, or at the first position that is written.
+
+    tell: says where, once it is settled by a position
+    """
+
+    __slots__ = ("place", "tell")
+
+    def __init__(self, place: Vector | None = None, tell: Callable[[Vector], None] | None = None) -> None:
+        """Take lat, lon, alt; None for the first position."""
+        self.place = place
+        self.tell = tell
+
+    def settle(self, x: Any, y: Any, z: Any) -> None:
+        """Take the first finite position of ECEF for the origin, where none was told."""
+        if self.place is not None:
+            return
+        rows = zip(*(part.tolist() if hasattr(part, "tolist") else [part] for part in (x, y, z)), strict=True)
+        for row in rows:
+            found = earth.lla(row[0], row[1], row[2], floats)
+            if all(map(isfinite, found)):
+                lat, lon, alt = found
+                self.place = found = round(lat, 13), round(lon, 13), round(alt, 8)  # as short as it may be: 10 nm
+                if self.tell is not None:
+                    self.tell(found)
+                return
+
+    def pose(self, axes: str) -> Rigid:
+        """Return ecef_from_axes there."""
+        if self.place is None:
+            raise ValueInvalid("there is no position to take for the origin")
+        return earth.pose(*self.place, axes, floats)
+
+
+class Place(NamedTuple):
+    """One way to write positions on the Earth, and what rotations there are given in.
+
+    name: of its row of REPRESENTATIONS
+    fields: what each of its numbers is, in their order
+    axes: of rotations: enu, ned, grid, ecef; "" where nothing is said, or each row has its own among its numbers
+    level: rotations are headings: turns about down, which a frame whose z is up has another way round
+    zone: of UTM the one that all are in; None where each has its own, which is then among its numbers
+    origin: of enu and ned
+    more: further ways that a result is written in beside this one
+    """
+
+    name: str
+    fields: tuple[str, ...]
+    axes: str = ""
+    zone: float | None = None
+    origin: Origin | None = None
+    more: tuple[Place, ...] = ()
+    level: bool = False
+
+    @classmethod
+    def written(cls, names: Sequence[str], earth_: Earth) -> Place:
+        """Return how results are written that are asked for by the names of representations."""
+        made = []
+        for name in names:
+            if name in LOCAL and earth_.origin is None:
+                raise ValueInvalid(f"--to {name} needs --origin: {{lat: .., lon: ..}}, or first for the first position")
+            fields = REPRESENTATIONS[name].names
+            axes = ECEF if name == ECEF else name if name in LOCAL else earth_.axes or (GRID if name == UTM else ENU)
+            origin = earth_.origin if name in LOCAL else None
+            made.append(cls(name, fields, axes, earth_.zone, origin))
+        return made[0]._replace(more=tuple(made[1:]))
+
+    @property
+    def size(self) -> int:
+        """Count its numbers."""
+        return len(self.fields) + sum(each.size for each in self.more)
+
+    @property
+    def sample(self) -> tuple[float, ...]:
+        """Return numbers that stand for others, also for those that are written as words."""
+        return (SAMPLE,) * self.size
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name its numbers as columns of a table."""
+        own = dict(zip(REPRESENTATIONS[self.name].names, REPRESENTATIONS[self.name].columns, strict=True))
+        rest = (name for each in self.more for name in each.columns)
+        return (*(own.get(field, field) for field in self.fields), *rest)
+
+    @property
+    def words(self) -> dict[int, tuple[str, ...]]:
+        """Return the words that numbers stand for, by the number's place: zones."""
+        found = {at: mercator.ZONES for at, field in enumerate(self.fields) if field == ZONE}
+        first = len(self.fields)
+        for each in self.more:
+            found |= {first + at: words for at, words in each.words.items()}
+            first += each.size
+        return found
+
+    @property
+    def readers(self) -> dict[int, Callable[[str], float]]:
+        """Return what reads its numbers that are written as words, by the number's place."""
+        return {at: READERS[field] for at, field in enumerate(self.fields) if field in READERS}
+
+    def with_grid(self, *, gridded: bool) -> Place:
+        """Return the same with convergence and scale beside UTM, where there is room for them, or without."""
+        size = len(self.fields) - len(GRIDDED) * (GRIDDED[0] in self.fields)
+        fields = self.fields[:size] + GRIDDED * (gridded and self.name == UTM)
+        return self._replace(fields=fields, more=tuple(each.with_grid(gridded=gridded) for each in self.more))
+
+    # --- reading ---
+
+    def lla(self, numbers: Sequence[Any]) -> Components:
+        """Return lat, lon in degrees and alt of its numbers, also of ECEF and local axes."""
+        if self.name in (ECEF, *LOCAL):
+            x, y, z = self.ecef(numbers)
+            return earth.lla(x, y, z, namespace(numbers))
+        given = dict(zip(self.fields, numbers, strict=True))
+        zero = numbers[0] - numbers[0]
+        alt = given.get("alt", zero)
+        if "msl" in given:
+            alt = given["msl"] + given["undulation"]
+        if self.name == UTM:
+            zone = given[ZONE] if self.zone is None else self.zone + zero
+            return *mercator.lat_lon(zone, given["easting"], given["northing"], namespace(numbers)), alt
+        lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
+        return lat, lon, alt
+
+    def ecef(self, numbers: Sequence[Any]) -> Components:
+        """Return x, y, z in ECEF of its numbers; NaN for what is no place, and `check` says why."""
+        if self.name == ECEF:
+            return self._three(numbers)
+        if self.name in LOCAL and self.origin is not None:
+            return rigid.apply(*self.origin.pose(self.name), *self._three(numbers))
+        lat, lon, alt = self.lla(numbers)
+        return earth.ecef(lat, lon, alt, namespace(numbers))
+
+    def _three(self, numbers: Sequence[Any]) -> Components:
+        """Return x, y, z, or the numbers of local axes, 0 for one that is not there."""
+        given = dict(zip(self.fields, numbers, strict=True))
+        return tuple(given.get(name, numbers[0] - numbers[0]) for name in REPRESENTATIONS[self.name].names)
+
+    def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
+        """Return a rotation given in the axes there, as x y z w, in ECEF."""
+        if AXES in self.fields:
+            return self._by_row(numbers, rotation)
+        if self.axes == ECEF:
+            return tuple(rotation)
+        return quaternion.compose(*self.base(numbers)[3:], *self.levelled(rotation))
+
+    def levelled(self, rotation: Components) -> Components:
+        """Return a rotation in the axes there: of a heading, a turn about down, yaw = 90 degrees - it where z is up."""
+        if not self.level or self.axes == NED:
+            return tuple(rotation)
+        _, _, s, c = rotation
+        return quaternion.settled(0.0 * s, 0.0 * s, SQRT_HALF * (c - s), SQRT_HALF * (c + s))
+
+    def _by_row(self, numbers: Sequence[Any], rotation: Components) -> Components:
+        """Return rotations that are given in the axes that each row says."""
+        at = self.fields.index(AXES)
+        codes, others = numbers[at], [*numbers[:at], *numbers[at + 1 :]]
+        bare = self._replace(fields=(*self.fields[:at], *self.fields[at + 1 :]))
+        xp = namespace(numbers)
+        found: Components = rotation
+        for code, axes in enumerate(earth.AXES):
+            if xp.some(codes == code):
+                each = bare._replace(axes=axes).turned(others, rotation)
+                found = tuple(xp.where(codes == code, a, b) for a, b in zip(each, found, strict=True))
+        return found
+
+    def base(self, numbers: Sequence[Any]) -> Components:
+        """Return ecef_from_axes at the place that numbers say."""
+        if self.name in LOCAL and self.axes == self.name and self.origin is not None:
+            return (*self.ecef(numbers), *self.origin.pose(self.name)[3:])
+        lat, lon, alt = self.lla(numbers)
+        xp = namespace(numbers)
+        return earth.pose(lat, lon, alt, self.axes, xp, self._convergence(lat, lon, self._zone_of(numbers), xp))
+
+    def _zone_of(self, numbers: Sequence[Any]) -> Any:
+        given = dict(zip(self.fields, numbers, strict=True))
+        return given.get(ZONE, self.zone)
+
+    def _convergence(self, lat: Any, lon: Any, zone: Any, xp: Namespace) -> Any:
+        if self.axes != GRID:
+            return None
+        return mercator.utm(_held(zone, lat, lon, xp), lat, lon, xp)[2]
+
+    def check(self, numbers: Sequence[float]) -> None:
+        """Raise ValueInvalid unless floats are a place."""
+        given = dict(zip(self.fields, numbers, strict=True))
+        if self.name == UTM:
+            zone = given[ZONE] if self.zone is None else self.zone
+            mercator.check_grid(zone, given["easting"], given["northing"])
+        elif self.name == LLA:
+            earth.check_lla(*self.lla(numbers))
+        if self.axes == GRID:
+            lat, lon, _ = self.lla(numbers)
+            mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
+
+    # --- writing ---
+
+    def settle(self, x: Any, y: Any, z: Any) -> None:
+        """Let the first of positions in ECEF be the origin, where that is asked for."""
+        for each in (self, *self.more):
+            if each.origin is not None:
+                each.origin.settle(x, y, z)
+
+    def numbers(self, x: Any, y: Any, z: Any) -> list[Any]:
+        """Return its numbers of a position in ECEF; NaN where there are none, and `check_result` says why."""
+        xp = namespace((x, y, z))
+        found: list[Any] = []
+        place: Components = ()
+        for each in (self, *self.more):
+            if each.name == ECEF:
+                found += [x, y, z]
+            elif each.origin is not None:
+                each.origin.settle(x, y, z)
+                found += earth.seen_from(*each.origin.pose(each.name), x, y, z)
+            else:
+                lat, lon, alt = place = place or earth.lla(x, y, z, xp)
+                if each.name == LLA:
+                    found += place
+                    continue
+                zone = _held(each.zone, lat, lon, xp)
+                easting, northing, *grid = mercator.utm(zone, lat, lon, xp)
+                found += [zone, easting, northing, alt, *grid[: len(each.fields) - 4]]
+        return found
+
+    def local(self, x: Any, y: Any, z: Any, rotation: Components) -> Components:
+        """Return a rotation of ECEF, as x y z w, in the axes at a position of ECEF."""
+        if self.axes == ECEF:
+            return rotation
+        if self.origin is not None:
+            base = self.origin.pose(self.axes)[3:]
+        else:
+            xp = namespace((x, y, z))
+            lat, lon, alt = earth.lla(x, y, z, xp)
+            base = earth.pose(lat, lon, alt, self.axes, xp, self._convergence(lat, lon, self.zone, xp))[3:]
+        return quaternion.compose(*quaternion.conjugate(*base), *rotation)
+
+    def check_result(self, x: float, y: float, z: float) -> None:
+        """Raise ValueInvalid unless a position in ECEF can be written so."""
+        for each in (self, *self.more):
+            if each.name in (LLA, UTM):
+                earth.check_ecef(x, y, z)
+            if each.name == UTM or each.axes == GRID:
+                lat, lon, _ = earth.lla(x, y, z, floats)
+                mercator.check_utm(_held(each.zone, lat, lon, floats), lat, lon)
+
+    def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
+        """Return its numbers as the keys that a mapping has."""
+        own = dict(zip(self.fields, numbers, strict=False))
+        if self.name == UTM:
+            zone = own[ZONE]
+            own = {UTM: own | {ZONE: zone if zone == SAMPLE else mercator.ZONES[int(zone)]}}
+        elif self.name == ECEF:
+            own = {ECEF: [*own.values()]}
+        rest = numbers[len(self.fields) :]
+        for each in self.more:
+            own |= each.entry(rest)
+            rest = rest[each.size :]
+        return own
+
+
+class Earth(NamedTuple):
+    """What is said of all positions on the Earth in one run.
+
+    origin: of enu and ned; axes: of rotations; zone: of UTM, which holds everywhere
+    """
+
+    origin: Origin | None = None
+    axes: str = ""
+    zone: float | None = None
+
+
+def _held(zone: Any, lat: Any, lon: Any, xp: Namespace) -> Any:
+    """Return the zone that is held, or that of each place."""
+    if zone is None:
+        return mercator.standard_zone(lat, lon, xp)
+    return zone + (lat - lat)
+
+
+def namespace(numbers: Sequence[Any]) -> Namespace:
+    """Return what computes with numbers: floats, or arrays."""
+    if all(type(number) is float for number in numbers):
+        return floats
+    from frametool.geometry import arrays
+
+    return arrays
+
+
+def axes_number(text: str) -> float:
+    """Read the name of axes in a cell of a table as its place among `earth.AXES`; raises ValueInvalid."""
+    name = text.strip()
+    if name not in earth.AXES:
+        raise ValueInvalid(f"{shown(name)}: axes at a place are {', '.join(earth.AXES)}")
+    return float(earth.AXES.index(name))
+
+
+READERS = {ZONE: mercator.zone_number, AXES: axes_number}  # of words

@@ -1,0 +1,420 @@
+"""Places on the Earth in the grammar of poses: keys that say a position, and what a rotation there is given in.
+
+    {lat: 48.1, lon: 11.5, alt: 520}                             a point of `ecef`, WGS84; degrees, metres
+    {lat: 48.1, lon: 11.5, axes: enu, rpy_deg: [0, 0, 90]}       a pose in `ecef`, its rotation seen from these axes
+    {at: {lat: 48.1, lon: 11.5}, axes: enu, xyz: [1, 2, 3]}      ecef_from_axes there, then what stands beside it
+
+Loaded where a mapping has such keys.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import ValueInvalid, shown
+from frametool.geometry import earth as wgs84
+from frametool.geometry import floats, placed
+from frametool.geometry.place import ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
+from frametool.geometry.representations import HEADING, REPRESENTATIONS
+from frametool.geometry.transverse_mercator import zone_number
+from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.pose import Pose, read_pose, read_position
+from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
+from frametool.grammar.rotation_spelling import AXES_KEY
+from frametool.text.numbers import NotFinite, parse_angle, parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Sequence
+
+    from frametool.grammar.readers import Quaternion
+
+AT = "at"
+# what others call them; those behind the first two count only beside these
+SAME = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng": "lon", "long": "lon"}
+SAME |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt"}
+SEA_LEVEL = ("msl", "ele", "elevation", "orthometric")
+GEOID = {"undulation": "undulation", "geoid_separation": "undulation"}
+LLA_KEYS = frozenset((*SAME, "lat_rad", "lon_rad", *SEA_LEVEL, *GEOID))
+LOCAL_KEYS = frozenset(("east", "north", "up", "down"))
+UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
+HEADINGS = {"heading_deg": True, "heading_rad": False}
+SAID = frozenset(("datum", "epsg", "mgrs", "convergence_deg", "grid_scale"))
+EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}
+NO_ALT = "no alt: 0 is taken, on the ellipsoid"
+DATUMS = ("WGS84", "WGS 84", "WGS-84", "wgs84")
+NEAR = 0.01  # metres: how far two positions of one entry may lie apart
+MINUTE, SECOND = "['\u2032\u2019]", "(?:[\"\u2033\u201d]|'')"
+DMS = re.compile(
+    r"\s*([-+]?)(\d+(?:\.\d*)?)\s*[°d]\s*"
+    rf"(?:(\d+(?:\.\d*)?)\s*{MINUTE}\s*(?:(\d+(?:\.\d*)?)\s*{SECOND}\s*)?)?([NSEWnsew]?)\s*"
+)
+COMPASS = re.compile(r"\s*(\d+(?:\.\d*)?)\s*([NSEWnsew])\s*")
+
+
+def not_on_ellipsoid(name: str) -> str:
+    """Say that a height is not above the ellipsoid."""
+    return f"{shown(name)} is above sea level, alt above the ellipsoid; give undulation (the geoid there) too, or alt"
+
+
+class Spot(NamedTuple):
+    """A position that was read: how it is written, and its numbers."""
+
+    place: Place
+    numbers: tuple[float, ...]
+
+
+def read_placed(
+    mapping: dict[str, Any], reading: Reading, also: Collection[str] = (), beside: Pose | None = None
+) -> Pose:
+    """Read a pose or a point that is placed on the Earth: its frame is `ecef`.
+
+    beside: the pose that stands beside the place, where it was read already
+    Raises Misfit with the path of what is wrong below this mapping.
+    """
+    own = {key: value for key, value in mapping.items() if key in EARTH_KEYS}
+    rest = {key: value for key, value in mapping.items() if key not in own}
+    spots = _spots(own, reading)
+    if not spots:
+        raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
+    axes = _axes(rest, reading, spots[0].place.name)
+    _check_parent(rest, own)
+    if "inverse" in rest:
+        raise Misfit("a place on the Earth is given in ecef; leave inverse out", ("inverse",), key=True)
+    inner = read_pose(rest, reading, also) if beside is None else beside
+    turn = _heading(own, axes)
+    if turn is not None and inner.rotation is not None:
+        raise Misfit("a heading is a rotation; keep one", (next(key for key in HEADINGS if key in own),), key=True)
+    (place, numbers), *others = spots
+    position = _position(spots[0])
+    for other in others:
+        _agree(position, _position(other))
+    if AT not in own and inner.position is not None:
+        _agree(position, inner.position)  # the same said in ecef: of that the rotation is
+        return inner._replace(parent=inner.parent or ECEF)
+    rotation = turn or inner.rotation
+    needs_axes = rotation is not None or AT in own or inner.covariance is not None
+    if needs_axes and not axes:
+        raise Misfit(UNSAID)
+    if not needs_axes:
+        return inner._replace(position=position, parent=inner.parent or ECEF)
+    place = place._replace(axes=axes)
+    try:
+        place.check(numbers)
+    except ValueInvalid as error:
+        raise Misfit(str(error)) from None
+    base = _base(place, numbers)
+    made = placed.compose(base, inner._replace(rotation=rotation, scale=1.0).placed)
+    found = Pose.of(made, inner.name, inner.parent or ECEF)
+    return found if rotation is not None or AT in own else found._replace(rotation=None)
+
+
+def _base(place: Place, numbers: tuple[float, ...]) -> tuple[float, ...]:
+    found = place.base(numbers) if place.axes != ECEF else (*place.ecef(numbers), 0.0, 0.0, 0.0, 1.0)
+    return tuple(found)
+
+
+def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
+    """Read every position that the keys of a mapping say."""
+    _check_datum(own)
+    found = []
+    if AT in own:
+        found += within((AT,), _placed_at, own[AT], reading)
+    if ECEF in own:
+        found.append(Spot(Place(ECEF, ("x", "y", "z")), within((ECEF,), read_position, own[ECEF], 1.0)))
+    if UTM in own:
+        found.append(within((UTM,), _utm, own[UTM], reading))
+    elif "easting" in own:
+        found.append(_utm({key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}, reading))
+    if any(key in own for key in ("lat", "latitude", "lat_rad")):
+        found.append(_lla(own, reading))
+    if LOCAL_KEYS.intersection(own):
+        found.append(_local(own, reading))
+    for spot in found:
+        try:
+            spot.place.check(spot.numbers)
+        except ValueInvalid as error:
+            raise Misfit(str(error)) from None
+    return found
+
+
+def read_at(value: Any, reading: Reading) -> Spot:
+    """Read the one place of a mapping."""
+    return _placed_at(value, reading)[0]
+
+
+def _placed_at(value: Any, reading: Reading) -> list[Spot]:
+    """Read what `at:` holds: lat lon alt, utm or ecef, and nothing else."""
+    if type(value) is not dict:
+        raise Misfit(f"expected a place like {{lat: 48.1, lon: 11.5, alt: 520}}, found {kind(value)}")
+    if unknown := [key for key in value if key not in EARTH_KEYS or key in (AT, *HEADINGS, *LOCAL_KEYS)]:
+        what = f"unknown key {shown(unknown[0])} of a place; it has lat lon alt, utm or ecef"
+        raise Misfit(what, (unknown[0],), key=True)
+    found = _spots(value, reading)
+    if not found:
+        raise Misfit(_incomplete(value))
+    first = _position(found[0])
+    for other in found[1:]:
+        _agree(first, _position(other))
+    return found[:1]
+
+
+def _lla(own: dict[str, Any], reading: Reading) -> Spot:
+    """Read latitude, longitude and height."""
+    named: dict[str, str] = {}
+    for key in own:
+        field = SAME.get(key) or GEOID.get(key) or ("msl" if key in SEA_LEVEL else key)
+        if field in ("lat", "lon", "alt", "msl", "undulation", "lat_rad", "lon_rad"):
+            if field in named:
+                raise Misfit(f"{named[field]} and {key} are both {field}; keep one", (key,), key=True)
+            named[field] = key
+    latitude, longitude = ([each for each in (name, f"{name}_rad") if each in named] for name in ("lat", "lon"))
+    if len(latitude) != 1 or len(longitude) != 1:
+        raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
+    fields = [*latitude, *longitude]
+    if "alt" in named:
+        fields.append("alt")
+    elif "msl" in named:
+        if "undulation" not in named:
+            raise Misfit(not_on_ellipsoid(named["msl"]), (named["msl"],), key=True)
+        fields += ["msl", "undulation"]
+    else:
+        reading.note(NO_ALT, named[fields[0]], rule="no-alt")
+    numbers = [_member(named[field], _coordinate, own[named[field]], field) for field in fields]
+    return Spot(Place(LLA, tuple(fields)), tuple(numbers))
+
+
+def _coordinate(value: Any, field: str) -> float:
+    """Read a number, of latitude and longitude also with marks: 48°08'14.5"N, 48.1N."""
+    if type(value) is not str:
+        raise Misfit(f"expected a number, found {kind(value)}")
+    if field not in ("lat", "lon"):
+        return parse_number(value)
+    if match := COMPASS.fullmatch(value):
+        return _signed(parse_number(match[1]), match[2], value, field)
+    if match := DMS.fullmatch(value):
+        sign, degrees, minutes, seconds, letter = match.groups()
+        parts = [float(part or 0.0) for part in (degrees, minutes, seconds)]
+        if max(parts[1:]) >= 60.0 or (sign and letter):
+            raise Misfit(f"{shown(value)}: minutes and seconds are below 60, and a sign or a letter says the side")
+        size = (parts[0] * 3600.0 + parts[1] * 60.0 + parts[2]) / 3600.0
+        return _signed(-size if sign == "-" else size, letter, value, field)
+    try:
+        return parse_number(value)
+    except ValueInvalid as error:
+        if len(re.findall(r"\d+(?:\.\d+)?", value)) > 1:
+            raise Misfit(f"{shown(value)}: degrees, minutes and seconds need their marks: 48°08'14.5\"N") from None
+        raise Misfit(str(error), rule=error.rule) from None
+
+
+def _signed(size: float, letter: str, text: str, field: str) -> float:
+    """Return an angle with the sign that its letter says."""
+    letter = letter.upper()
+    if letter and letter not in ("NS" if field == "lat" else "EW"):
+        raise Misfit(f"{shown(text)} is no {field}: {letter} belongs to {'lon' if field == 'lat' else 'lat'}")
+    return -size if letter in ("S", "W") else size
+
+
+def _utm(value: Any, reading: Reading) -> Spot:
+    """Read a position in UTM."""
+    if type(value) is not dict:
+        example = "{zone: 32N, easting: .., northing: .., alt: ..}"
+        raise Misfit(f"expected {example}, found {kind(value)}")
+    known = {*REPRESENTATIONS[UTM].names, "utm_zone", "epsg", *GEOID, *SEA_LEVEL, "altitude", "height", "hae",
+             "convergence_deg", "grid_scale", "datum"}  # fmt: skip
+    if unknown := [key for key in value if key not in known]:
+        what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
+        raise Misfit(what, (unknown[0],), key=True)
+    _check_datum(value)
+    zones = [_member(key, _zone, value[key]) for key in (ZONE, "utm_zone") if key in value]
+    zones += [_zone_of_epsg(value["epsg"])] if "epsg" in value else []
+    zones += [reading.earth.zone] if not zones and reading.earth and reading.earth.zone is not None else []
+    if not zones or len({*zones}) > 1:
+        raise Misfit("utm needs its zone: 32N, or 32S south of the equator" if not zones else "two zones; keep one")
+    missing = [key for key in ("easting", "northing") if key not in value]
+    if missing:
+        raise Misfit(f"missing {' and '.join(missing)}; utm has zone, easting, northing, alt")
+    numbers = [zones[0], *(_member(key, read_number, value[key]) for key in ("easting", "northing"))]
+    height = next((key for key in value if SAME.get(key) == "alt"), "")
+    if sea := next((key for key in SEA_LEVEL if key in value and not height), ""):
+        geoid = next((key for key in GEOID if key in value), "")
+        if not geoid:
+            raise Misfit(not_on_ellipsoid(sea), (sea,), key=True)
+        numbers.append(_member(sea, read_number, value[sea]) + _member(geoid, read_number, value[geoid]))
+    elif height:
+        numbers.append(_member(height, read_number, value[height]))
+    else:
+        reading.note(NO_ALT, rule="no-alt")
+        numbers.append(0.0)
+    if zones[0] < 0.0 and 3.5e6 <= numbers[2] <= 4.5e6:
+        south = f"zone {value.get(ZONE, value.get('utm_zone', ''))} with northing {numbers[2]:g}"
+        reading.note(f"{south}: S is south of the equator; the band S lies north, write N", rule="band-s")
+    return Spot(Place(UTM, REPRESENTATIONS[UTM].names), tuple(numbers))
+
+
+def _zone(value: Any) -> float:
+    """Read the name of a zone."""
+    if type(value) is not str:
+        raise Misfit(f"expected a zone like 32N, found {kind(value)}")
+    return zone_number(value)
+
+
+def _member(key: str, read: Callable[..., float], *arguments: Any) -> float:
+    """Read the value of a key; what is wrong with it names the key."""
+    try:
+        return read(*arguments)
+    except ValueInvalid as error:
+        misfit = NotARotation if isinstance(error, NotFinite) else Misfit
+        raise misfit(str(error), (key,), rule=error.rule) from None
+
+
+def _zone_of_epsg(value: Any) -> float:
+    """Return the zone that a code of EPSG names: 326zz north, 327zz south."""
+    text = str(value).upper().removeprefix("EPSG:")
+    if len(text) == 5 and text[:3] in ("326", "327") and "01" <= text[3:] <= "60":
+        return zone_number(f"{int(text[3:])}{'N' if text[:3] == '326' else 'S'}")
+    raise Misfit(_other_epsg(text), ("epsg",))
+
+
+def _other_epsg(text: str) -> str:
+    known = "4326, 4979 (lat lon), 4978 (ecef), 32601 to 32660 and 32701 to 32760 (utm)"
+    return f"epsg {shown(text)} is not read; convert with cs2cs or pyproj to one of {known}"
+
+
+def _local(own: dict[str, Any], reading: Reading) -> Spot:
+    """Read east, north, up or north, east, down of the origin."""
+    name = NED if "down" in own else ENU
+    if "up" in own and "down" in own:
+        raise Misfit("up and down are both there; keep one")
+    missing = [key for key in REPRESENTATIONS[name].names if key not in own]
+    if missing:
+        raise Misfit(f"missing {' and '.join(missing)}; write east, north, up or north, east, down")
+    origin = reading.earth.origin if reading.earth else None
+    if origin is None:
+        raise Misfit("east, north and up need an origin: --origin {lat: .., lon: ..}, or place the frame with at:")
+    numbers = tuple(_member(key, read_number, own[key]) for key in REPRESENTATIONS[name].names)
+    return Spot(Place(name, REPRESENTATIONS[name].names, name, None, origin), numbers)
+
+
+def _position(spot: Spot) -> tuple[float, float, float]:
+    x, y, z = spot.place.ecef(spot.numbers)
+    return x, y, z
+
+
+def _agree(first: Any, second: Any) -> None:
+    """Raise Misfit unless two positions are the same."""
+    apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
+    if not apart <= NEAR:
+        raise Misfit(f"two positions in one entry disagree by {apart:.6g} m; keep one")
+
+
+def _axes(rest: dict[str, Any], reading: Reading, name: str) -> str:
+    """Take what rotations are given in out of a mapping, else what holds for all."""
+    default = reading.earth.axes if reading.earth else ""
+    default = name if name in LOCAL else default
+    if AXES_KEY not in rest:
+        return default
+    value = rest.pop(AXES_KEY)
+    if value not in wgs84.AXES:
+        found = shown(value) if type(value) is str else kind(value)
+        raise Misfit(f"axes {found}: at a place they are enu, ned, grid or ecef", (AXES_KEY,))
+    return str(value)
+
+
+def _check_parent(rest: dict[str, Any], own: dict[str, Any]) -> None:
+    """Refuse a place on the Earth under another frame."""
+    for key in ("parent", "frame"):
+        value = rest.get(key)
+        if value in REPRESENTATIONS and value == UTM:
+            raise Misfit("utm is no rigid frame and no parent; place the frame: at: {utm: {..}}, axes: grid", (key,))
+        if value not in (None, *EARTH_FRAMES):
+            what = "at" if AT in own else next(iter(own))
+            raise Misfit(f"{what} places a frame in ecef; {key} is {shown(value)}", (key,))
+
+
+def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
+    """Read a heading as the rotation that it is in some axes."""
+    key = next((key for key in HEADINGS if key in own), "")
+    if not key:
+        return None
+    if axes == ECEF:
+        raise Misfit("a heading is clockwise from north, which axes ecef do not have; axes: enu, ned or grid", (key,))
+    try:
+        angle, unit = parse_angle(own[key]) if type(own[key]) is str else (read_number(own[key]), None)
+    except ValueInvalid as error:
+        raise Misfit(str(error), (key,)) from None
+    degrees = HEADINGS[key] if unit is None else unit == "deg"
+    turn = HEADING.to_quaternion((angle,), floats, degrees=degrees)
+    if not axes:
+        raise Misfit(UNSAID)
+    x, y, z, w = Place(LLA, ("lat", "lon"), axes, level=True).levelled(turn)
+    return x, y, z, w
+
+
+def _check_datum(own: dict[str, Any]) -> None:
+    """Refuse other datums, codes of other systems, and MGRS."""
+    datum = own.get("datum", DATUMS[0])
+    if datum not in DATUMS:
+        what = f"datum {shown(str(datum))} is not WGS84 (up to a metre off, and drifting)"
+        raise Misfit(f"{what}; convert with cs2cs or pyproj first", ("datum",))
+    if "mgrs" in own:
+        what = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
+        raise Misfit(what, ("mgrs",), key=True)
+    text = str(own.get("epsg", "4326")).upper().removeprefix("EPSG:")
+    if text not in ("4326", "4979", "4978") and not ("easting" in own or UTM in own):
+        raise Misfit(_other_epsg(text), ("epsg",))
+
+
+def _incomplete(own: dict[str, Any]) -> str:
+    """Say what is missing of a place."""
+    names = ", ".join(own)
+    whole = "lat, lon, alt, or ecef: [x, y, z], or utm: {zone, easting, northing}"
+    return f"{names}: half a place on the Earth; write {whole}"
+
+
+# --- writing ---
+
+NOT_IN_ECEF = "--to {} wants poses in ecef: {}"
+
+
+def check_in_ecef(parent: str | None, place: Place) -> None:
+    """Raise ValueInvalid unless a result is in the Earth's frame, or its position could be anywhere."""
+    if parent in EARTH_FRAMES:
+        return
+    names = ",".join(each.name for each in (place, *place.more))
+    unnamed = "this one does not name its frame (--from ecef, or parent: ecef)"
+    found = f"this one is in {shown(parent)}" if parent else unnamed
+    raise ValueInvalid(NOT_IN_ECEF.format(names, found))
+
+
+def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
+    """Return the position of a pose in ecef as a mapping has it, with the axes of its rotation; and the pose in these.
+
+    Raises ValueInvalid for a pose in another frame, and for a position that cannot be written so.
+    """
+    check_in_ecef(pose.parent, place)
+    x, y, z = pose.components[:3]
+    place.settle(x, y, z)
+    place.check_result(x, y, z)
+    entry = place.entry([number + 0.0 for number in place.numbers(x, y, z)])
+    if place.name == ECEF:
+        entry = {"xyz": entry.pop(ECEF)} | entry
+    if pose.rotation is None:
+        return entry, pose._replace(position=None)
+    local = place.local(x, y, z, pose.rotation)
+    axes = {} if place.name == ECEF else {AXES_KEY: place.axes}
+    return entry | axes, pose._replace(position=None, rotation=(local[0], local[1], local[2], local[3]))
+
+
+def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict[str, Any]:
+    """Return a point of ecef as a mapping has it: at a place, which says what it is given in, or with its frame.
+
+    Raises ValueInvalid for a point of another frame, and for one that cannot be written so.
+    """
+    check_in_ecef(frame, place)
+    x, y, z = point
+    place.settle(x, y, z)
+    place.check_result(x, y, z)
+    entry = place.entry([number + 0.0 for number in place.numbers(x, y, z)])
+    in_metres = entry.pop(ECEF, None)
+    return ({"frame": frame, "point": in_metres} if in_metres else {}) | entry

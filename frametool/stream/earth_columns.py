@@ -1,0 +1,284 @@
+"""Find a position on the Earth among columns or keys by their names: lat lon alt, ecef_x .., utm_zone easting ..
+
+A common prefix is one that is set off (`field.latitude`, `gps_lat`); units stand behind names or in brackets.  Knows
+names only; loaded where one of them may say such a position.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place
+from frametool.geometry.representations import HEADING, REPRESENTATIONS, Notation
+from frametool.grammar.names import PARENT_COLUMNS, may_be_on_earth
+from frametool.grammar.place import GEOID, NO_ALT, SAME, SEA_LEVEL, check_in_ecef, not_on_ellipsoid
+from frametool.stream.faults import Misused
+from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, places_named
+from frametool.stream.row_layout import VECTOR
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from frametool.stream.request import Request
+    from frametool.stream.row_layout import Shape
+    from frametool.stream.table import Table
+
+ECEF_COLUMNS = REPRESENTATIONS[ECEF].columns
+OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES)
+FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for name in OTHERS}
+PATTERN = re.compile(
+    rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
+    r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
+    re.IGNORECASE,
+)
+DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
+
+
+class Spot(NamedTuple):
+    """A column: its place, its name, and the unit that this says."""
+
+    place: int
+    name: str
+    unit: str
+
+
+def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | None:
+    """Find the one position on the Earth among names, and a heading beside it; None where there is none.
+
+    given: the representation that --from names.
+    Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
+    """
+    groups: dict[str, dict[str, Spot]] = {}
+    for at, name in enumerate(names):
+        if name and (match := PATTERN.fullmatch(name)):
+            unit = (match[4] if match[4] is not None else match[3] or "").lower()
+            groups.setdefault(match[1].lower(), {}).setdefault(FIELDS[match[2].lower()], Spot(at, name, unit))
+    found = [
+        (prefix, columns)
+        for prefix, spots in groups.items()
+        for kind in ((given,) if given else (LLA, ECEF, UTM, ENU, NED))
+        if (columns := _position(kind, spots, groups, earth)) is not None
+    ]
+    if not found:
+        return None
+    plain = [each for each in found if not each[0]] or found
+    if len(plain) > 1:
+        several = "; ".join(columns.shown for _, columns in plain)
+        raise ValueInvalid(f"several positions on the Earth: {several}; choose with --columns NAMES --from lla")
+    prefix, columns = plain[0]
+    return PoseColumns(columns, _heading(groups[prefix], columns))
+
+
+def _position(
+    kind: str, spots: dict[str, Spot], groups: dict[str, dict[str, Spot]], earth: Earth
+) -> Columns | None:
+    """Return the columns of a position of one kind, if they are there."""
+    if kind == ECEF:
+        axes = [(axis, spots[name]) for axis, name in zip("xyz", ECEF_COLUMNS, strict=True) if name in spots]
+        return _columns(kind, axes, spots, earth) if len(axes) == 3 else None
+    if kind in LOCAL:
+        return _local(kind, spots, earth)
+    fields: list[tuple[str, Spot]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
+    if kind == UTM:
+        zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
+        if zone is None and earth.zone is None and {"easting", "northing"} <= spots.keys():
+            raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
+        fields = [(ZONE, zone)] if zone is not None else []
+        fields += [(name, spots[name]) for name in ("easting", "northing") if name in spots]
+        size = 2 + (zone is not None)
+    else:
+        fields = [(f"{name}_rad" if _in_radians(spot) else name, spot) for name, spot in fields]
+        size = 2
+    return None if len(fields) < size else _columns(kind, [*fields, *_height(spots)], spots, earth)
+
+
+def _local(kind: str, spots: dict[str, Spot], earth: Earth) -> Columns | None:
+    """Return the columns of local axes, where an origin says of which; without one they are other data."""
+    wanted = REPRESENTATIONS[kind].names
+    if earth.origin is None or wanted[2] not in spots:
+        return None
+    there = [(name, spots[name]) for name in wanted if name in spots]
+    return _columns(kind, there, spots, earth) if len(there) == len(wanted) else None
+
+
+def _height(spots: dict[str, Spot]) -> list[tuple[str, Spot]]:
+    """Return the height above the ellipsoid, or that above the sea and the geoid's; raise ValueInvalid without it."""
+    if "alt" in spots:
+        return [("alt", spots["alt"])]
+    name = next((name for name in SEA_LEVEL if name in spots), "")
+    if name and "undulation" not in spots:
+        raise ValueInvalid(not_on_ellipsoid(spots[name].name))
+    return [("msl", spots[name]), ("undulation", spots["undulation"])] if name else []
+
+
+def _columns(kind: str, fields: Sequence[tuple[str, Spot]], spots: dict[str, Spot], earth: Earth) -> Columns:
+    """Put the columns together, with that of the axes."""
+    for field, spot in fields:
+        if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
+            what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
+            raise ValueInvalid(what)
+    if AXES in spots:
+        fields = [*fields, (AXES, spots[AXES])]
+    zone = earth.zone if kind == UTM and fields[0][0] != ZONE else None
+    place = Place(kind, tuple(field for field, _ in fields), earth.axes or kind * (kind in LOCAL), zone,
+                  earth.origin if kind in LOCAL else None)  # fmt: skip
+    places, names = zip(*((spot.place, spot.name) for _, spot in fields), strict=True)
+    return Columns(places, names, unit=place)
+
+
+def _in_radians(spot: Spot) -> bool:
+    if spot.unit not in DEGREES:
+        unknown = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)}"
+        raise ValueInvalid(f"{unknown}; lat and lon are degrees, or rad")
+    return DEGREES[spot.unit]
+
+
+def _heading(spots: dict[str, Spot], position: Columns) -> Columns | None:
+    """Return the rotation that a heading with its unit says."""
+    spot = spots.get("heading")
+    if spot is None or spot.unit == "" or position.unit is None:
+        return None
+    radians = _in_radians(spot)
+    notation = Notation(f"heading_{'rad' if radians else 'deg'}", HEADING, None, degrees=not radians)
+    return Columns((spot.place,), (spot.name,), notation=notation, degrees=(not radians,))
+
+
+def chosen(places: Sequence[int], names: Sequence[str], kind: str, earth: Earth) -> Columns:
+    """Take columns that --columns and --from say are a position on the Earth, in the order of its numbers.
+
+    Raises ValueInvalid for a count that it does not have.
+    """
+    fields = REPRESENTATIONS[kind].names
+    least = {LLA: 2, UTM: 3}.get(kind, 3)
+    if kind == UTM and earth.zone is not None:
+        fields, least = fields[1:], 2
+    if not least <= len(places) <= len(fields):
+        raise ValueInvalid(f"{kind} has {len(fields)} numbers ({' '.join(fields)}); found {len(places)}")
+    spots = [(field, Spot(place, names[at], "")) for at, (field, place) in enumerate(zip(fields, places, strict=False))]
+    return _columns(kind, spots, {}, earth)
+
+
+def unsaid_heading(names: Iterable[str]) -> str:
+    """Return the name of a heading whose unit nobody says, so that it stays data; "" without one."""
+    matches = ((name, PATTERN.fullmatch(name)) for name in names if name)
+    return next((name for name, match in matches if match and match[2].lower() == "heading" and not match[3]
+                 and match[4] is None), "")  # fmt: skip
+
+
+def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
+    """Find a position on the Earth and the rotation beside it; None for rows that are given by x, y, z.
+
+    Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
+    """
+    header = Header(names)
+    earth, given = request.earth or Earth(), request.given_place
+    if not given and (others := find_positions(header)):
+        if not request.operation.keeps_frames and (said := [name for name in names if may_be_on_earth(name)]):
+            told = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
+            warn(f"{source}: {told}; --columns lat,lon,alt --from lla turns it round")
+        return None
+    try:
+        found = find(names, earth, given)
+        if found is None and given == ECEF and (positions := find_positions(header)):
+            found = PoseColumns(positions[0]._replace(unit=Place(ECEF, tuple(REPRESENTATIONS[ECEF].names), earth.axes)),
+                                None)  # fmt: skip
+        if found is None and not given and (half := _half(names)):
+            raise ValueInvalid(half)  # noqa: TRY301 - so that it gets its place as others do
+    except ValueInvalid as error:
+        raise FormatError(str(error), source=source, line=1) from None
+    if found is None or found.position is None:
+        return None
+    taken = {*found.position.places, *(found.rotation.places if found.rotation else ())}
+    rest = Header(["" if at in taken else name for at, name in enumerate(names)])
+    turned = find_rotations(rest, request.given)
+    if len(turned) + (found.rotation is not None) > 1:
+        shown_ = " and ".join(each.shown for each in (*turned, *filter(None, [found.rotation])))
+        raise FormatError(f"expected one rotation, found {shown_}", source=source, line=1)
+    if found.rotation is None and (name := unsaid_heading(names)) and not turned:
+        warn(f"{source}: {shown(name)} has no unit and stays data; name it heading_deg")
+    return PoseColumns(found.position, found.rotation or next(iter(turned), None))
+
+
+def _half(names: Iterable[str]) -> str:
+    """Say what is missing of a position that is there by half; "" where there is none."""
+    fields = {FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
+    if len(fields & {"lat", "lon"}) == 1:
+        missing = "lon" if "lat" in fields else "lat"
+        return f"half a place on the Earth: no {missing}; add it, or choose with --columns"
+    if {"east", "north"} <= fields:
+        return "east, north and up or down are of an origin; give --origin '{lat: .., lon: ..}'"
+    return ""
+
+
+def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request) -> PoseColumns:
+    """Take the columns that --columns names for a place, as --from says, and a rotation behind it.
+
+    Raises Misused for names that are not there, or a count that the place does not have.
+    """
+    numbers = {name: at for at, name in reversed([*enumerate(names or ())])}
+    places = [at for word in spec.split(",") for at in places_named(word.strip(), numbers, width)]
+    called = names or [f"column {at + 1}" for at in range(width)]
+    most = len(REPRESENTATIONS[request.given_place].names) - (
+        request.given_place == UTM and request.earth is not None and request.earth.zone is not None
+    )
+    try:
+        position = chosen(places[:most], called, request.given_place, request.earth or Earth())
+    except ValueInvalid as error:
+        raise Misused(f"--columns: {error}") from None
+    behind = places[most:]
+    turned = find_rotations([name if at in behind else "" for at, name in enumerate(called)], None) if behind else []
+    if behind and len(turned) != 1:
+        others = ", ".join(called[at] for at in behind)
+        raise Misused(f"--columns: {others} are no rotation behind {request.given_place}")
+    return PoseColumns(position, turned[0] if turned else None)
+
+
+def of_width(width: int, request: Request) -> str:
+    """Say which columns of a table without names are a place: all of them, or those behind a stamp."""
+    fields = len(REPRESENTATIONS[request.given_place].names)
+    fields -= request.given_place == UTM and request.earth is not None and request.earth.zone is not None
+    return f"2-{width}" if width == fields + 1 else f"1-{width}"
+
+
+def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tuple[Request, tuple[Shape, ...]]:
+    """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
+
+    Raises FormatError for a rotation whose axes nobody says.
+    """
+    (shape,) = shapes
+    place = shape.place
+    if place is None:
+        return request, shapes
+    reads = request.operation.moves or not request.operation.keeps_frames or request.place is not None
+    if shape.kind == VECTOR:
+        raise Misused("a vector has no place on the Earth; leave --as vector out")
+    if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and (reads or request.all_numbers):
+        warn(f"{source}: {NO_ALT}")
+    if request.operation.keeps_frames and request.place is None:
+        request = request._replace(place=Place.written((ECEF,), Earth()))
+    if shape.notation is None:
+        return request, shapes
+    if not (place.axes or AXES in place.fields):
+        raise FormatError(UNSAID, source=source, line=1)
+    level = shape.notation.representation is HEADING
+    if level and place.axes == ECEF:
+        raise FormatError("a heading is clockwise from north, which axes ecef do not have", source=source, line=1)
+    return request, (shape._replace(unit=place._replace(level=level)),)
+
+
+def refuse_elsewhere(table: Table, request: Request, source: str) -> None:
+    """Stop where places are asked for of rows whose frame is not the Earth's, or is not said.
+
+    Raises FormatError.
+    """
+    if request.place is None:
+        return
+    frame = request.result_frame if request.operation.moves else None
+    if frame is None and any(name in PARENT_COLUMNS for name in table.names or ()) and not request.operation.moves:
+        return  # each row says its own
+    try:
+        check_in_ecef(frame, request.place)
+    except ValueInvalid as error:
+        raise FormatError(str(error), source=source, line=1) from None
