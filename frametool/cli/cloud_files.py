@@ -130,11 +130,15 @@ class BagOfClouds:
 
 
 def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:
-    """Return the clouds of a bag if -i names one."""
-    return BagOfClouds(stream.path, output, stream) if stream.path and _is_bag(stream.path) else None
+    """Return the clouds of a bag if -i names one whose messages are no records."""
+    if not stream.path or not is_bag(stream.path):
+        return None
+    if not holds_arrays(output.told or "") and stream.messages() is not None:
+        return None
+    return BagOfClouds(stream.path, output, stream)
 
 
-def _is_bag(path: str) -> bool:
+def is_bag(path: str) -> bool:
     """Tell a bag by its first bytes, or as a folder."""
     bags = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
     if not os.path.isfile(path):

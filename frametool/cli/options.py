@@ -307,11 +307,13 @@ _STAMPS = _setting(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
 )
 _EDGES = _setting("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
-# of streams about trajectories: the times of their poses, the axes of cameras
-pose_reading_options = together(_CAMERA_AXES, _STAMPS, _EDGES, array_option)
+_TOPIC = _setting(
+    "--topic", "topics", type=TEXT, multiple=True, metavar="NAME", help="read only this topic; may be repeated"
+)
+# of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
+pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES, array_option)
 _READING = (
-    _setting("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
-             help="read only this topic; may be repeated"),
+    _TOPIC,
     _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
              help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",

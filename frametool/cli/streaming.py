@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     About = Callable[[], str] | None  # what else there is to say of a form
 
 MOST_JOBS = 256
+BAGS = (".bag", ".mcap", ".db3")
 _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
 OPTIONS = {
@@ -102,11 +103,31 @@ class Stream:
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None
+        self.within = ""  # the form of the records in a bag
 
     def opened(self) -> BufferedReader:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
         if self._opened is None:
-            self._opened = _opened(self.path)
+            self._opened = self.messages() or _opened(self.path)
+        return self._opened
+
+    def messages(self) -> BufferedReader | None:
+        """Return the points, poses or fixes of the bag that -i names as JSON lines; None for any other file.
+
+        Raises FormatError for a bag without any, unless it may hold clouds instead.
+        """
+        if self._opened is not None or not self.path or not _may_be_bag(self.path):
+            return self._opened
+        from frametool.cli.cloud_files import is_bag
+
+        if not is_bag(self.path):
+            return None
+        from frametool.grammar.edges import Tally
+        from frametool.ros.bag_records import open_records
+
+        topics = settings().topics
+        self._opened = open_records(self.path, topics, Tally())
+        self.within, settings().topics = "json", ()
         return self._opened
 
     def has_input(self) -> bool:
@@ -127,7 +148,8 @@ class Stream:
         What can be read once only, as `<(command)`, is streamed whatever it holds.
         """
         once = os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path))
-        if path == "-" or (not once and (self.told_form() or _form_of(path)) in ("", *RECORDS)):
+        is_rows = once or _may_be_bag(path) or (self.told_form() or _form_of(path)) not in ("", *RECORDS)
+        if path == "-" or not is_rows:
             return False
         self.path = path
         return True
@@ -161,7 +183,7 @@ class Stream:
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever form it is."""
-        form = self.told_form()
+        form = self.told_form() or self.within
         signed = form or _signed(stream.peek(), self.name)
         is_listed = is_trajectory(signed) or holds_arrays(signed)
         if not (form or tables_only or self._says_columns() or is_listed):
@@ -364,6 +386,11 @@ class Stream:
             return jobs
         say(f"--jobs does not help here: {obstacle}; one process does the work")
         return 1
+
+
+def _may_be_bag(path: str) -> bool:
+    """Tell a bag by its suffix, or a folder."""
+    return path.endswith(BAGS) or os.path.isdir(path)
 
 
 def _counted(form: str) -> str:

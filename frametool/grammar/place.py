@@ -19,14 +19,14 @@ from frametool.geometry.place import ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZO
 from frametool.geometry.representations import HEADING, REPRESENTATIONS
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.grammar.pose import Pose, read_pose, read_position
-from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
+from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Sequence
 
+    from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Quaternion
 
 AT = "at"
@@ -64,24 +64,24 @@ class Spot(NamedTuple):
     numbers: tuple[float, ...]
 
 
-def read_placed(
-    mapping: dict[str, Any], reading: Reading, also: Collection[str] = (), beside: Pose | None = None
-) -> Pose:
-    """Read a pose or a point that is placed on the Earth: its frame is `ecef`.
+def without_place(mapping: dict[str, Any]) -> dict[str, Any]:
+    """Return what stands beside a place: the pose that begins there."""
+    return {key: value for key, value in mapping.items() if key not in EARTH_KEYS and key != AXES_KEY}
 
-    beside: the pose that stands beside the place, where it was read already
+
+def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
+    """Return the pose or point in `ecef` of a mapping with a place, and of the pose that stands beside it.
+
     Raises Misfit with the path of what is wrong below this mapping.
     """
     own = {key: value for key, value in mapping.items() if key in EARTH_KEYS}
-    rest = {key: value for key, value in mapping.items() if key not in own}
     spots = _spots(own, reading)
     if not spots:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
-    axes = _axes(rest, reading, spots[0].place.name)
-    _check_parent(rest, own)
-    if "inverse" in rest:
+    axes = _axes(mapping, reading, spots[0].place.name)
+    _check_parent(mapping, own)
+    if "inverse" in mapping:
         raise Misfit("a place on the Earth is given in ecef; leave inverse out", ("inverse",), key=True)
-    inner = read_pose(rest, reading, also) if beside is None else beside
     turn = _heading(own, axes)
     if turn is not None and inner.rotation is not None:
         raise Misfit("a heading is a rotation; keep one", (next(key for key in HEADINGS if key in own),), key=True)
@@ -102,10 +102,10 @@ def read_placed(
     try:
         place.check(numbers)
     except ValueInvalid as error:
-        raise Misfit(str(error)) from None
+        raise Misfit(str(error), (next(iter(own)),)) from None
     base = _base(place, numbers)
     made = placed.compose(base, inner._replace(rotation=rotation, scale=1.0).placed)
-    found = Pose.of(made, inner.name, inner.parent or ECEF)
+    found = inner.of(made, inner.name, inner.parent or ECEF)
     return found if rotation is not None or AT in own else found._replace(rotation=None)
 
 
@@ -121,7 +121,7 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if AT in own:
         found += within((AT,), _placed_at, own[AT], reading)
     if ECEF in own:
-        found.append(Spot(Place(ECEF, ("x", "y", "z")), within((ECEF,), read_position, own[ECEF], 1.0)))
+        found.append(Spot(Place(ECEF, ("x", "y", "z")), within((ECEF,), read_numbers, own[ECEF], ("x", "y", "z"))))
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
@@ -134,7 +134,7 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
         try:
             spot.place.check(spot.numbers)
         except ValueInvalid as error:
-            raise Misfit(str(error)) from None
+            raise Misfit(str(error), (next(iter(own)),)) from None
     return found
 
 
@@ -308,23 +308,23 @@ def _agree(first: Any, second: Any) -> None:
         raise Misfit(f"two positions in one entry disagree by {apart:.6g} m; keep one")
 
 
-def _axes(rest: dict[str, Any], reading: Reading, name: str) -> str:
-    """Take what rotations are given in out of a mapping, else what holds for all."""
+def _axes(mapping: dict[str, Any], reading: Reading, name: str) -> str:
+    """Return what rotations are given in, as a mapping says, else as holds for all."""
     default = reading.earth.axes if reading.earth else ""
     default = name if name in LOCAL else default
-    if AXES_KEY not in rest:
+    if AXES_KEY not in mapping:
         return default
-    value = rest.pop(AXES_KEY)
+    value = mapping[AXES_KEY]
     if value not in wgs84.AXES:
         found = shown(value) if type(value) is str else kind(value)
         raise Misfit(f"axes {found}: at a place they are enu, ned, grid or ecef", (AXES_KEY,))
     return str(value)
 
 
-def _check_parent(rest: dict[str, Any], own: dict[str, Any]) -> None:
+def _check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
     """Refuse a place on the Earth under another frame."""
     for key in ("parent", "frame"):
-        value = rest.get(key)
+        value = mapping.get(key)
         if value in REPRESENTATIONS and value == UTM:
             raise Misfit("utm is no rigid frame and no parent; place the frame: at: {utm: {..}}, axes: grid", (key,))
         if value not in (None, *EARTH_FRAMES):

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import ROTATIONS
-from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
 from frametool.grammar.rotation_spelling import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
 from frametool.text.numbers import parse_number
@@ -98,11 +97,13 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     Raises Misfit with the path of what is wrong below this mapping.
     """
     if not POSE_KEYS.issuperset(mapping):
+        from frametool.grammar.names import may_be_on_earth
+
         if any(map(may_be_on_earth, mapping)):
-            from frametool.grammar.place import EARTH_KEYS, read_placed
+            from frametool.grammar.place import EARTH_KEYS, placed_by, without_place
 
             if not EARTH_KEYS.isdisjoint(mapping):
-                return read_placed(mapping, reading, also)
+                return placed_by(mapping, read_pose(without_place(mapping), reading, also), reading)
         _refuse_unknown_keys(mapping, also)
     position: Vector | None = None
     rotation: Quaternion | None = None

@@ -256,6 +256,8 @@ def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tupl
         raise Misused("a vector has no place on the Earth; leave --as vector out")
     if place.name in (LLA, UTM) and not {"alt", "msl"}.intersection(place.fields) and (reads or request.all_numbers):
         warn(f"{source}: {NO_ALT}")
+    if request.gathered is not None:
+        request.gathered.frame = ECEF
     if request.operation.keeps_frames and request.place is None:
         request = request._replace(place=Place.written((ECEF,), Earth()))
     if shape.notation is None:

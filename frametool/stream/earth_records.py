@@ -9,30 +9,28 @@ Loaded where a mapping has such keys.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import uncertainty
-from frametool.geometry.place import ENU, LLA, Earth
+from frametool.geometry.place import ENU, LLA, Place
 from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.grammar.place import AT, EARTH_KEYS, SAME, read_placed
+from frametool.grammar.place import AT, EARTH_KEYS, SAME, placed_by, without_place
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within
 from frametool.grammar.rotation_spelling import AXES_KEY
-from frametool.stream import earth_columns
 from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from frametool.grammar.readers import Path
-    from frametool.stream.record import Record
     from frametool.stream.request import Request
 
-QUATERNION = notation("quaternion")
+    Inner = Callable[[dict[str, Any]], tuple[Pose, Sequence[str]]]
+
 FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
 STAYS = ("{} stay data: x, y, z are the position; to read the place, leave these out")
@@ -44,11 +42,24 @@ def is_on_earth(value: dict[str, Any]) -> bool:
     return not {*WHOLE, "mgrs"}.isdisjoint(value) and not EARTH_KEYS.isdisjoint(value)
 
 
-def record_on_earth(
-    value: dict[str, Any], path: Path, positions: Sequence[str], reading: Reading, request: Request
-) -> Record | None:
+class Placed(NamedTuple):
+    """What a record on the Earth says.
+
+    keys: those that say it; is_numbered: they are the numbers, one each
+    """
+
+    shape: Shape
+    values: tuple[float, ...]
+    keys: tuple[str, ...]
+    is_numbered: bool = False
+
+
+def placed_record(
+    value: dict[str, Any], positions: Sequence[str], inner: Inner, reading: Reading, request: Request
+) -> Placed | None:
     """Read a record that is placed on the Earth; None for one that is given by x, y, z.
 
+    inner: reads the pose that stands beside a place, and names its keys
     Raises Misfit for half a place, for a pose whose axes nobody says, and for what is no place.
     """
     if not is_on_earth(value):
@@ -61,8 +72,11 @@ def record_on_earth(
         return None
     if request.kind == VECTOR:
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
-    plain = _plain_point(value, request)
-    return _numbered(value, path, plain, request) if plain else _read(value, path, positions, reading, request)
+    if request.gathered is not None:
+        request.gathered.frame = EARTH_FRAMES[0]
+    pose, used = inner(without_place(value))
+    plain = _plain_point(value, request) if not used else ()
+    return _numbered(value, plain, request) if plain else _read(value, pose, used, reading, request)
 
 
 def _plain_point(value: dict[str, Any], request: Request) -> tuple[str, ...]:
@@ -70,9 +84,8 @@ def _plain_point(value: dict[str, Any], request: Request) -> tuple[str, ...]:
     own = [key for key in value if key in EARTH_KEYS]
     fields = [SAME.get(key, "") for key in own]
     usual = {"lat", "lon", "alt"} == {*fields} and len(own) == 3
-    if not usual or not _takes_points(request):
-        return ()
-    if "header" in value or not COVARIANCE_KEYS.isdisjoint(value) or _turns(value, request):
+    others = "header" in value or not COVARIANCE_KEYS.isdisjoint(value) or AXES_KEY in value
+    if not usual or not _takes_points(request) or others:
         return ()
     try:
         for key in own:
@@ -82,54 +95,33 @@ def _plain_point(value: dict[str, Any], request: Request) -> tuple[str, ...]:
     return tuple(sorted(own, key=lambda key: ("lat", "lon", "alt").index(SAME[key])))
 
 
-def _turns(value: dict[str, Any], request: Request) -> bool:
-    """Tell whether there is a rotation beside a place."""
-    from frametool.stream.record import _flat_pose, _is_rotation
-
-    rest = {key: each for key, each in value.items() if key not in EARTH_KEYS and key != AXES_KEY}
-    flat = _flat_pose(rest, []) if not any(_is_rotation(key, each) for key, each in rest.items()) else None
-    return request.kind == POSE or flat is not None or any(_is_rotation(key, each) for key, each in rest.items())
-
-
-def _numbered(value: dict[str, Any], path: Path, keys: tuple[str, ...], request: Request) -> Record:
+def _numbered(value: dict[str, Any], keys: tuple[str, ...], request: Request) -> Placed:
     """Return a point whose numbers are members of the record."""
-    from frametool.stream.record import Name, Record
-
-    place = earth_columns.chosen((0, 1, 2), keys, LLA, request.earth or Earth()).unit
+    place = Place(LLA, ("lat", "lon", "alt"), request.earth.axes if request.earth else "")
     numbers = tuple(parse_number(value[key]) for key in keys)
     try:
-        place.check(numbers)  # type: ignore[union-attr]
+        place.check(numbers)
     except ValueInvalid as error:
         raise Misfit(str(error), (keys[0],)) from None
-    return Record(path, Shape(POINT, place), tuple((*path, key) for key in keys), numbers, members=keys,
-                  parent=Name("ecef"))  # fmt: skip
+    return Placed(Shape(POINT, place), numbers, keys, is_numbered=True)
 
 
-def _read(
-    value: dict[str, Any], path: Path, positions: Sequence[str], reading: Reading, request: Request
-) -> Record:
+def _read(value: dict[str, Any], inner: Pose, used: Sequence[str], reading: Reading, request: Request) -> Placed:
     """Read a pose or point by the grammar of places; none of its numbers stays where it is."""
-    from frametool.stream.record import Name, Record
-
     own = [key for key in value if key in EARTH_KEYS]
-    rest = {key: each for key, each in value.items() if key not in own and key != AXES_KEY}
-    inner, used = _inner(rest, positions, path, reading, request)
-    mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame") if key in value}
+    mapping = {key: value[key] for key in (*own, AXES_KEY, "parent", "frame", "inverse") if key in value}
     is_fix = "header" in value
-    covariance = _of_fix(value, mapping, reading, request) if is_fix else None
-    pose = read_placed(mapping, reading, ("frame",), inner)
+    covariance = _of_fix(value, mapping, reading, request) if is_fix else ()
+    pose = placed_by(mapping, inner, reading)
     is_point = pose.rotation is None and request.kind != POSE and _takes_points(request)
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
-    shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else QUATERNION)
+    shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
     beside = covariance or _beside(pose, reading, request, is_point=is_point)
     if beside:
         shape = shape._replace(covariance=(len(beside),), rewritten=True)
-    used = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
-    used += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if is_fix else []
-    return Record(
-        path, shape, (None,) * (len(numbers) + len(beside)), (*numbers, *beside), members=tuple(used[:1]),
-        others=tuple(used[1:]), parent=Name("ecef"), placed=tuple(used),
-    )  # fmt: skip
+    keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
+    keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if is_fix else []
+    return Placed(shape, (*numbers, *beside), tuple(keys))
 
 
 def _beside(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:
@@ -144,30 +136,8 @@ def _beside(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -
 
 
 def _takes_points(request: Request) -> bool:
-    return request.operation.takes_points or request.operation.keeps_frames
-
-
-def _inner(
-    rest: dict[str, Any], positions: Sequence[str], path: Path, reading: Reading, request: Request
-) -> tuple[Pose, list[str]]:
-    """Read the rotation, the shift and the covariance beside a place, and return the keys that say the first two."""
-    from frametool.stream.record import _flat_pose, _is_rotation, _mapping
-    from frametool.stream.record_values import pose_of
-
-    covariance = None
-    if not COVARIANCE_KEYS.isdisjoint(rest):
-        from frametool.grammar.covariance import read_covariance
-
-        covariance = read_covariance(rest, reading)
-    bare = {key: each for key, each in rest.items() if key not in COVARIANCE_KEYS}
-    rotations = [key for key, each in bare.items() if _is_rotation(key, each)]
-    if not (rotations or positions or _flat_pose(bare, rotations)):
-        return Pose(covariance=covariance), []
-    asked = request._replace(kind=POSE, gathered=None)
-    record = _mapping(bare, path, reading, asked)
-    pose = pose_of(record, asked)
-    keys = [*rotations, *positions, *record.members, *record.flat, *(key for key in ("angles",) if key in bare)]
-    return Pose(pose.position, pose.rotation, None, None, None, covariance), keys
+    operation = request.operation
+    return (operation.takes_points or operation.keeps_frames) and request.gathered is None
 
 
 def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, request: Request) -> tuple[float, ...]:
@@ -183,5 +153,5 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     entries = [number for _, number in within((FIX,), entries_of, value[FIX], (9,))]
     within((FIX,), check, entries)
     level = Pose(rotation=(0.0, 0.0, 0.0, 1.0))
-    at = read_placed(mapping | {AXES_KEY: ENU}, Reading(reading.source), ("frame",), level)
+    at = placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
     return tuple(uncertainty.turned(tuple(entries), *at.components[3:]))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import ValueInvalid
+from frametool.grammar.names import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Sequence
@@ -27,6 +28,7 @@ class Gathered:
         self.places: list[str] = []
         self._lines: list[int] | None = [] if named else None  # of the block that was read last
         self.placed = self.turned = self.uncertain = False
+        self.frame: str | None = None  # that of the Earth, where what was gathered is placed there
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
 
@@ -58,6 +60,7 @@ class Gathered:
         self.places += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
         self.placed |= any(pose.position is not None for pose in poses)
         self.turned |= any(pose.rotation is not None for pose in poses)
+        self.frame = next((pose.parent for pose in poses if pose.parent in EARTH_FRAMES), self.frame)
         self.uncertain |= any(pose.covariance is not None for pose in poses)
         self._poses.append(np.array([pose.components for pose in poses], np.float64).reshape(-1, 7))
 

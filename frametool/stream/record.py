@@ -20,6 +20,7 @@ from frametool.grammar.pose import (
     POSE_KEYS,
     POSITION_KEYS,
     SCALE,
+    Pose,
     read_angle_unit,
     read_position,
     unknown_keys,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.errors import FormatError
     from frametool.grammar.readers import Path
+    from frametool.stream.earth_records import Placed
     from frametool.stream.header import Columns, PoseColumns
     from frametool.stream.request import Formula, Request
 
@@ -423,10 +425,13 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else parts, path, request)
     positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
     if any(map(may_be_on_earth, value)):
-        from frametool.stream.earth_records import record_on_earth
+        from frametool.stream.earth_records import placed_record
 
-        if (record := record_on_earth(value, path, positions, reading, request)) is not None:
-            return record
+        def inner(rest: dict[str, Any]) -> tuple[Pose, list[str]]:
+            return _beside_place(rest, path, reading, request)
+
+        if (found := placed_record(value, positions, inner, reading, request)) is not None:
+            return _placed(found, path)
     rotations = [key for key, each in value.items() if _is_rotation(key, each)]
     flat = _flat_pose(value, rotations)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
@@ -450,6 +455,41 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = record._replace(others=tuple(rotations[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
     return record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
+
+
+def _beside_place(rest: dict[str, Any], path: Path, reading: Reading, request: Request) -> tuple[Pose, list[str]]:
+    """Read the pose that stands beside a place on the Earth, and return the keys that say it but its covariance."""
+    covariance = None
+    if not COVARIANCE_KEYS.isdisjoint(rest):
+        from frametool.grammar.covariance import read_covariance
+
+        covariance = read_covariance(rest, reading)
+    bare = {key: each for key, each in rest.items() if key not in COVARIANCE_KEYS}
+    rotations = [key for key, each in bare.items() if _is_rotation(key, each)]
+    positions = [key for key in bare if key in POINT_KEYS and _holds(key, bare[key])]
+    if not (rotations or positions or _flat_pose(bare, rotations)):
+        return Pose(covariance=covariance), []
+    record = _mapping(bare, path, reading, request._replace(kind=POSE))
+    shape = record.shape
+    placed_at = shape.position(record.values) if shape.whole or shape.unit is not None else None
+    turned = None
+    if shape.notation is not None:
+        turned, _ = checked_rotation(shape, record.values, normalize=request.normalize)
+    position: Any = placed_at
+    keys = [*rotations, *positions, *record.members, *record.flat, *(key for key in ("angles",) if key in bare)]
+    return Pose(position, turned, covariance=covariance), keys
+
+
+def _placed(found: Placed, path: Path) -> Record:
+    """Return the record of what is placed on the Earth; where its keys are no numbers, none of them stays."""
+    first, *others = found.keys
+    if found.is_numbered:
+        numbers = tuple((*path, key) for key in found.keys)
+        return Record(path, found.shape, numbers, found.values, members=found.keys, parent=Name(EARTH_FRAMES[0]))
+    return Record(
+        path, found.shape, (None,) * len(found.values), found.values, members=(first,), others=tuple(others),
+        parent=Name(EARTH_FRAMES[0]), placed=found.keys,
+    )  # fmt: skip
 
 
 def _is_matrix(key: str) -> bool:

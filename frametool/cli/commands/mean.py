@@ -114,4 +114,4 @@ def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tup
         extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": math.degrees(spread.angle_rms)}
         extras |= {"angle_max": spread.angle_max, "angle_max_deg": math.degrees(spread.angle_max)}
     position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
-    return Result(Pose(position, rotation), extras), left_out
+    return Result(Pose(position, rotation, None, gathered.frame), extras), left_out

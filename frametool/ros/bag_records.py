@@ -1,0 +1,124 @@
+"""Messages of a bag as a stream of JSON lines, one a message: what reads such records reads bags so.
+
+Points, poses, fixes, twists, wrenches and the like; transforms make a tree and clouds are files of their own.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import fields, is_dataclass
+from io import BufferedReader, RawIOBase
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.json import dump
+from frametool.documents.source import Verbatim
+from frametool.errors import FormatError, Unanswered, listing
+from frametool.ros.bags import opened_bag
+
+CLOUD = "sensor_msgs/msg/PointCloud2"
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from frametool.grammar.edges import Tally
+
+FIX = "sensor_msgs/msg/NavSatFix"
+STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
+           "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
+RECORDS = frozenset((
+    FIX, "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField", "nav_msgs/msg/Odometry",
+    *(f"geometry_msgs/msg/{name}Stamped" for name in STAMPED),
+))  # fmt: skip
+
+
+def record_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
+    """Return the topics whose messages are wanted: those chosen, or the only one that holds fixes; [] for none.
+
+    chosen: with or without a leading `/`
+    Raises Unanswered where several hold records and none is chosen.
+    """
+    there = {each.topic: each.msgtype for each in reader.connections if each.msgtype in RECORDS}
+    wanted = {topic.strip("/") for topic in chosen}
+    if wanted:
+        return [topic for topic in there if topic.strip("/") in wanted]
+    if len(there) > 1:
+        raise Unanswered(f"several topics hold records; give --topic {'|'.join(sorted(there)[:8])}", source=path)
+    return list(there)
+
+
+def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedReader | None:
+    """Open the messages of a bag as JSON lines; None where the topics that are wanted hold clouds.
+
+    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds neither.
+    """
+    with ExitStack() as opened:
+        reader = opened.enter_context(opened_bag(path, tally))
+        topics = record_topics(reader, chosen, path)
+        if topics:
+            return BufferedReader(_Lines(_lines(reader, topics, path), opened.pop_all()))
+        wanted = {topic.strip("/") for topic in chosen}
+        clouds = [each.topic.strip("/") for each in reader.connections if each.msgtype == CLOUD]
+        if any(not wanted or topic in wanted for topic in clouds):
+            return None
+        known = listing(sorted({f"{each.topic} ({each.msgtype})" for each in reader.connections})) or "none"
+    named = f" on {listing(chosen)}" if chosen else ""
+    raise FormatError(f"no points, poses or fixes{named}; topics: {known}", source=path)
+
+
+def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[bytes]:
+    """Yield each message as a line."""
+    connections = [each for each in reader.connections if each.topic in topics]
+    for number, (connection, _, data) in enumerate(reader.messages(connections=connections), 1):
+        try:
+            message = reader.deserialize(data, connection.msgtype)
+        except Exception as error:  # noqa: BLE001 - a broken message makes the library raise anything
+            raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=path) from None
+        yield dump(_plain(message)).encode() + b"\n"
+
+
+def _plain(value: Any) -> Any:
+    """Return a message, or a part of one, as a plain value."""
+    if is_dataclass(value):
+        return {each.name: _plain(getattr(value, each.name)) for each in fields(value) if _is_data(each.name)}
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    if isinstance(value, bool) or value is None or isinstance(value, str):
+        return value
+    if isinstance(value, float) and not isfinite(value):
+        return str(value)
+    return Verbatim(repr(value))
+
+
+def _is_data(name: str) -> bool:
+    """Tell a field from the library's own marks and from the constants of a message's type."""
+    return not name.isupper() and not name.startswith("__")
+
+
+class _Lines(RawIOBase):
+    """Bytes that an iterator yields, as a stream."""
+
+    def __init__(self, lines: Iterator[bytes], opened: ExitStack) -> None:
+        """Take the lines, and what is closed behind the last."""
+        self._lines = lines
+        self._opened = opened
+        self._rest = b""
+
+    def readable(self) -> bool:
+        """Tell that it is read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer; 0 at the end."""
+        if not self._rest:
+            self._rest = next(self._lines, b"")
+        size = min(len(self._rest), len(buffer))
+        buffer[:size], self._rest = self._rest[:size], self._rest[size:]
+        return size
+
+    def close(self) -> None:
+        """Close the bag too."""
+        self._opened.close()
+        super().close()
