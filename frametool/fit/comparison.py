@@ -16,8 +16,11 @@ from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_
 from frametool.fit.mounting import lever_arm
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import way
+from frametool.geometry import earth, quaternion
+from frametool.geometry.place import ENU, Origin
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.grammar.names import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
     from frametool.fit.metrics import AbsoluteErrors, RelativeErrors, SegmentErrors
     from frametool.fit.pairs import Pairs
     from frametool.frames.trajectory import Trajectory
-    from frametool.geometry.types import Array
+    from frametool.geometry.types import Array, Rigid
 
 AUTO = "auto"
 CLEAR = 0.5  # score of a clock offset that can be relied on
@@ -152,6 +155,7 @@ def compare(
     """
     hints: list[str] = []
     sizes = (ref.size, est.size)
+    ref, est = _on_the_ground(ref, est, names, hints)
     if not settings.evo:
         ref, est = (_in_order(each, name, hints) for each, name in zip((ref, est), names, strict=True))
     pairs, offset_ns, score = _paired(ref, est, settings, names, hints)
@@ -172,6 +176,35 @@ def compare(
         list(_relative(pairs.ref, moved, walked, settings, hints)),
         segment_errors(pairs.ref, moved, settings.segments, settings.segment_step), hints,
     )  # fmt: skip
+
+
+def _on_the_ground(
+    ref: Trajectory, est: Trajectory, names: tuple[str, str], hints: list[str]
+) -> tuple[Trajectory, Trajectory]:
+    """Return trajectories of the Earth's frame along east, north, up of the first position: there z is up."""
+    found = next(((each, name) for each, name in ((ref, names[0]), (est, names[1])) if _is_of_earth(each)), None)
+    if found is None:
+        return ref, est
+    origin = Origin()
+    origin.settle(*found[0].xyz.T)
+    pose = origin.pose(ENU)
+    lat, lon, alt = origin.place or (0.0, 0.0, 0.0)
+    hints.append(f"compared along east, north, up of lat {lat!r}, lon {lon!r}, alt {alt!r}, the first of {found[1]}")
+    ref, est = (_seen_from(each, pose) if _is_of_earth(each) else each for each in (ref, est))
+    return ref, est
+
+
+def _is_of_earth(each: Trajectory) -> bool:
+    return each.world in EARTH_FRAMES and each.size > 0
+
+
+def _seen_from(each: Trajectory, pose: Rigid) -> Trajectory:
+    """Return a trajectory as it is seen from a pose in its world."""
+    xyz = np.stack(earth.seen_from(*pose, *each.xyz.T), -1)
+    if each.xyzw is None:
+        return each._replace(xyz=xyz, world=ENU)
+    turned = quaternion.compose(*quaternion.conjugate(*pose[3:]), *each.xyzw.T)
+    return each._replace(xyz=xyz, xyzw=np.stack(turned, -1), world=ENU)
 
 
 def _in_order(each: Trajectory, name: str, hints: list[str]) -> Trajectory:

@@ -182,8 +182,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     try:
         found = find(names, earth, given)
         if found is None and given == ECEF and (positions := find_positions(header)):
-            found = PoseColumns(positions[0]._replace(unit=Place(ECEF, tuple(REPRESENTATIONS[ECEF].names), earth.axes)),
-                                None)  # fmt: skip
+            found = PoseColumns(positions[0]._replace(unit=Place(ECEF, REPRESENTATIONS[ECEF].names, ECEF)), None)
         if found is None and not given and (half := _half(names)):
             raise ValueInvalid(half)  # noqa: TRY301 - so that it gets its place as others do
     except ValueInvalid as error:
