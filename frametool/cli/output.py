@@ -92,8 +92,15 @@ class Output:
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
 
+    def _refuse_place(self) -> None:
+        """Stop where a form has no place for latitude and longitude."""
+        if self.style.place is not None and self.style.form not in ("text", "yaml", "json", "csv"):
+            names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
+            raise ValueInvalid(f"{self.style.form} has no place for {names}; write csv, json, yaml or text")
+
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
+        self._refuse_place()
         if self._holds_arrays or self.is_trajectory:
             self.pieces(self._blocks(iter(results)))
         else:
@@ -114,6 +121,7 @@ class Output:
 
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
+        self._refuse_place()
         self.pieces(self._blocks(results) if self._holds_arrays or self.is_trajectory else self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:

@@ -262,7 +262,8 @@ class Stream:
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
-        request = request._replace(by_default=into is not module and not output.notations)
+        usual = request.by_default or (into is not module and not output.notations)
+        request = request._replace(by_default=usual)
         outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
         now = f", now in {request.result_frame}" if request.result_frame and request.operation.moves else ""
         return outcomes, lambda: now

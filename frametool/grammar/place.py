@@ -406,6 +406,22 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     return entry | axes, pose._replace(position=None, rotation=(local[0], local[1], local[2], local[3]))
 
 
+def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
+    """Return the position of a pose in ecef as the cells of a table, with the axes of its rotation; and the pose there.
+
+    Raises as `placed_entry`.
+    """
+    entry, local = placed_entry(pose, place)
+    x, y, z = pose.components[:3]
+    numbers = place.numbers(x, y, z)
+    cells = {
+        name: place.words[at][int(number)] if at in place.words else number + 0.0
+        for at, (name, number) in enumerate(zip(place.columns, numbers, strict=True))
+    }
+    axes = {} if pose.rotation is None else {AXES_KEY: entry.get(AXES_KEY, ECEF)}
+    return cells | axes, local
+
+
 def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict[str, Any]:
     """Return a point of ecef as a mapping has it: at a place, which says what it is given in, or with its frame.
 

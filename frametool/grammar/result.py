@@ -108,7 +108,7 @@ class Result:
             from frametool.grammar.place import placed_entry
 
             written, pose = placed_entry(pose, style.place)
-            entry |= written
+            entry = without_frame(entry, style.place) | written
         elif pose.rotation is None:
             return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | extras
         elif pose.position is not None and not any(carries_position(each) for each in style.notations):
@@ -137,6 +137,11 @@ class NoResult(Result):
             return dict(self.extras)
         entry = Result(self.pose).mapping(style)
         return {key: value if key in NAMES else None for key, value in entry.items()} | with_entries(self.extras)
+
+
+def without_frame(entry: dict[str, Any], place: Place) -> dict[str, Any]:
+    """Return a result without the frame it is given in, where that is an origin's: its keys say its axes."""
+    return entry if place.origin is None else {key: value for key, value in entry.items() if key != "parent"}
 
 
 def with_entries(extras: dict[str, Any]) -> dict[str, Any]:

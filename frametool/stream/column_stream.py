@@ -35,7 +35,7 @@ from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
 from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
-from frametool.stream.table import Naming, Table, rename_of
+from frametool.stream.table import Naming, Table, unnamed
 from frametool.stream.table_plan import plan_table
 from frametool.stream.table_stream import moves_in_time, settle_stamps
 from frametool.text.cells import Cells
@@ -202,9 +202,7 @@ class ColumnRows:
             for place in range(self.table.width)
             if place not in used and self.table.names
         }
-        rename = rename_of(self.request.for_kind(self.shape.kind))
-        unnamed = (None, None) if rename is None else rename(None, None)
-        names: list[Sequence[str | None]] = [[name] for name in unnamed]
+        names: list[Sequence[str | None]] = [[name] for name in unnamed(self.request, self.shape)]
         for role, texts in results.names.items():
             names[role] = [text or None for text in texts]
         own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.numbers.shape[1]

@@ -440,7 +440,8 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
-    record = Record(path, Shape(_kind(key, turned, request), None), key=key)
+    kind = _kind(key, turned or (not request.operation.moves and _turns_in_doubt(value)), request)
+    record = Record(path, Shape(kind, None), key=key)
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
     elif flat and flat.position:
@@ -634,6 +635,12 @@ def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading:
     if largest is not None and abs(given[largest]) > TURN:
         name = names[shape.number_at(largest) - shape.position_size]
         reading.note(doubt(shape, given[largest], KEYS_REMEDY), name, rule="degrees")
+
+
+def _turns_in_doubt(value: dict[str, Any]) -> bool:
+    """Tell whether a mapping says how sure its rotation is, so that it is a pose, if only by that."""
+    sigma = value.get("sigma")
+    return type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
 
 
 def _kind(key: str, rotations: object, request: Request) -> str:

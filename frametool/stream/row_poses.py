@@ -14,7 +14,7 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_places
+from frametool.grammar.names import in_nanoseconds, stamp_places
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.evaluate import Run, State
@@ -25,7 +25,7 @@ from frametool.stream.row_layout import PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
-from frametool.stream.table import UNCLOSED, Naming, cells_of, coded, rename_of, table_block
+from frametool.stream.table import UNCLOSED, Naming, cells_of, coded, table_block, unnamed
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -86,9 +86,7 @@ class TablePoses:
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         named = request.for_kind(self.shape.kind)
         self.naming = Naming(self.table, layout, named)
-        rename = rename_of(named)
-        own = EARTH_FRAMES[0] if self.shape.place is not None else None
-        self.unnamed = (own, None) if rename is None else rename(own, None)
+        self.unnamed = unnamed(request, self.shape)
         self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
         if layout.time is None:
             time, below = stamp_places(self.table.names)

@@ -17,7 +17,7 @@ import numpy as np
 from frametool.errors import FormatError, FrametoolError, shown, warn
 from frametool.formats.table import FORMATS
 from frametool.geometry.representations import UPPER_ROWS, notation
-from frametool.grammar.names import in_nanoseconds, stamp_column
+from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
 from frametool.stream.layout import NAME, NAMED, PARENT, quoted
 from frametool.stream.rows import Block, Broken
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
+    from frametool.stream.row_layout import Shape
     from frametool.text.cells import Cells
     from frametool.text.spans import Ints
     Names = tuple[str | None, str | None]  # parent, name
@@ -157,6 +158,13 @@ def rename_of(request: Request) -> Rename | None:
     if request.operation.looks_back:
         return lambda _parent, name: (name, name)
     return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None
+
+
+def unnamed(request: Request, shape: Shape) -> Names:
+    """Return the frames of results whose rows name none: what is placed on the Earth is given in its frame."""
+    own = EARTH_FRAMES[0] if shape.place is not None else None
+    rename = rename_of(request.for_kind(shape.kind))
+    return (own, None) if rename is None else rename(own, None)
 
 
 class Coded(NamedTuple):

@@ -13,14 +13,14 @@ from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.grammar.pose import TIMES
-from frametool.grammar.result import is_locked, rotation_entry, rotation_numbers
+from frametool.grammar.result import Result, is_locked, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result, Style
+    from frametool.grammar.result import Style
 
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
 
@@ -65,13 +65,40 @@ def _describe(result: Result, style: Style) -> str:
     """Return the heading and the aligned lines of one pose."""
     pose = result.pose
     lines: list[NumberLine] = []
-    if pose.position is not None:
+    if style.place is not None:
+        from frametool.grammar.place import placed_entry
+
+        entry, pose = placed_entry(pose, style.place)
+        lines += _place_lines(entry)
+    elif pose.position is not None:
         lines.append(NumberLine("translation", list(zip("xyz", pose.position, strict=True)), "m"))
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
     lines += _extra_lines(result.said(style))
+    if style.place is not None and style.place.origin is not None:  # of its axes, not of the Earth's
+        result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
+
+
+def _place_lines(entry: dict[str, Any]) -> Iterator[NumberLine]:
+    """Yield the lines of a position on the Earth as a mapping has it."""
+    at = [(name, entry[name]) for name in ("lat", "lon") if name in entry]
+    if at:
+        yield NumberLine("lla", at, "deg")
+        yield NumberLine("", [("alt", entry["alt"])], "m")
+    if "xyz" in entry or "ecef" in entry:
+        yield NumberLine("ecef", list(zip("xyz", entry.get("xyz") or entry["ecef"], strict=True)), "m")
+    if utm := entry.get("utm"):
+        yield NumberLine("utm", [(name, utm[name]) for name in ("easting", "northing")], f"m in {utm['zone']}")
+        yield NumberLine("", [("alt", utm["alt"])], "m")
+        yield NumberLine("convergence", [("", utm["convergence_deg"])], "deg")
+        yield NumberLine("grid scale", [("", utm["grid_scale"])], "")
+    local = [(name, entry[name]) for name in ("east", "north", "up", "down") if name in entry]
+    if local:
+        yield NumberLine("enu" if "up" in entry else "ned", sorted(local, key=lambda at: [*entry].index(at[0])), "m")
+    if "axes" in entry:
+        yield NumberLine("axes", [], f"{entry['axes']}: of what follows")
 
 
 def _heading(result: Result) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
-from frametool.grammar.result import NoResult, carries_position, in_columns, pose_numbers
+from frametool.grammar.result import NoResult, carries_position, in_columns, pose_numbers, without_frame
 from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
@@ -46,7 +46,12 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
     cells: dict[str, Any] = {
         key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name is not None
     }
-    if pose.position is not None and not any(carries_position(each) for each in style.notations):
+    if style.place is not None and not isinstance(result, NoResult):
+        from frametool.grammar.place import placed_cells
+
+        placed, pose = placed_cells(pose, style.place)
+        cells = without_frame(cells, style.place) | placed
+    elif pose.position is not None and not any(carries_position(each) for each in style.notations):
         cells |= zip("xyz", pose.position, strict=True)
     for notation in style.notations if pose.rotation is not None else ():
         columns, numbers = pose_numbers(pose, notation, style)
@@ -70,6 +75,8 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
             numbers = value.values() if isinstance(value, dict) else value or [None] * 3
             yield from zip("xyz" if key in PLAIN else [f"{key}_{axis}" for axis in "xyz"], numbers, strict=False)
+        elif key == "utm" and isinstance(value, dict):
+            yield from ((f"utm_{name}" if name == "zone" else name, cell) for name, cell in value.items())
         elif key in SIX and isinstance(value, dict):
             for name, cell in _record_cells(value):
                 yield name if name.startswith(HALVES) else f"{key}_{name}", cell
