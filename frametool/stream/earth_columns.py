@@ -259,9 +259,9 @@ def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tupl
         request.gathered.frame = ECEF
     if request.operation.keeps_frames and request.place is None:
         request = request._replace(place=Place.written((ECEF,), Earth()))
-    if shape.notation is None:
+    if shape.notation is None and not (request.operation.inverse or request.operation.similar):
         return request, shapes
-    if not (place.axes or AXES in place.fields):
+    if shape.notation is None or not (place.axes or AXES in place.fields):
         raise FormatError(UNSAID, source=source, line=1)
     level = shape.notation.representation is HEADING
     if level and place.axes == ECEF:

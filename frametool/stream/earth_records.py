@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.geometry import uncertainty
-from frametool.geometry.place import ENU, LLA, Place
+from frametool.geometry.place import ENU, LLA, UNSAID, Place
 from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
 from frametool.grammar.names import EARTH_FRAMES
@@ -113,6 +113,9 @@ def _read(value: dict[str, Any], inner: Pose, used: Sequence[str], reading: Read
     is_fix = "header" in value
     covariance = _of_fix(value, mapping, reading, request) if is_fix else ()
     pose = placed_by(mapping, inner, reading)
+    operation = request.operation
+    if pose.rotation is None and (operation.inverse or operation.similar) and request.gathered is None:
+        raise Misfit(UNSAID)  # as a factor it is a pose
     is_point = pose.rotation is None and request.kind != POSE and _takes_points(request)
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
