@@ -7,14 +7,17 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
 import pytest
 
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.help import topic, topics
+from frametool.cli.commands.sim import SUBCOMMANDS
 from frametool.cli.options import EXIT_CODES
 from frametool.geometry.conventions import AXES
 from frametool.geometry.representations import REPRESENTATIONS
@@ -84,8 +87,29 @@ def test_a_word_that_is_no_subject_names_the_nearest(run: Callable[..., Any]) ->
     assert "no topic 'rotation'; did you mean 'rotations'?" in done.err
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_help_of_a_command_has_at_most_sixty_lines_and_no_group_that_is_empty(name: str, run: Callable[..., Any]) -> None:
-    lines = run(name, "--help").out.splitlines()
-    assert len(lines) <= (66 if name == "check" else 60)  # `check` lists its rules too
+WORDS = [(name,) for name in COMMANDS] + [("sim", name) for name in SUBCOMMANDS]
+
+
+@pytest.mark.parametrize("words", WORDS, ids=" ".join)
+def test_the_help_of_a_command_has_at_most_45_lines_of_80_and_no_group_that_is_empty(words: tuple[str, ...], run: Callable[..., Any]) -> None:
+    lines = run(*words, "--help").out.splitlines()
+    assert len(lines) <= 45
+    assert max(map(len, lines)) <= 80
     assert not [line for line, after in pairwise(lines) if line.endswith("):") and not after.startswith("  ")]
+
+
+def options_of(words: tuple[str, ...]) -> list[click.Option]:
+    command = import_module(COMMANDS[words[0]][0]).command
+    command = command.commands[words[1]] if words[1:] else command
+    return [each for each in command.get_params(click.Context(command)) if isinstance(each, click.Option) and not each.hidden]
+
+
+@pytest.mark.parametrize("words", WORDS, ids=" ".join)
+def test_every_option_stands_in_the_short_help_or_its_group_and_with_a_word_in_the_whole(words: tuple[str, ...], run: Callable[..., Any]) -> None:
+    brief, whole = run(*words, "--help").out, run(*words, "--help-all").out
+    own = brief[brief.index("\nOptions:") : brief.find("\nCommon options")]
+    for option in options_of(words):
+        assert option.help
+        assert any(f"  {name}" in own for name in option.opts) or f" {option.opts[0]}" in brief or " ..\n" in brief  # a long line is cut
+        assert re.search(rf"(?m)^  (?:-\w, )?{option.opts[-1]}\b.*\n?.*[a-z]", whole)
+    assert own.count("\n  -") >= 1
