@@ -15,7 +15,7 @@ from click.core import iter_params_for_processing
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
-from frametool.errors import SHOWN, alternatives, did_you_mean, shown
+from frametool.errors import SHOWN, any_near, did_you_mean, shown
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -132,7 +132,9 @@ GROUPS = {
         "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "jobs", "unwrap", "frame_column",
         "target_column", "source_column",
     ),
-    "Result (help errors)": ("output", "force", "precision", "covariance", "explain", "explain_full", "explain_step", "color"),
+    "Result (help errors)": (
+        "output", "force", "precision", "covariance", "explain", "explain_full", "explain_step", "color",
+    ),
     "Forms that leave something open (help formats)": (
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
     ),
@@ -143,20 +145,12 @@ GROUPS = {
 }  # fmt: skip
 # command -> what it is about although it stands under a heading elsewhere
 OWN = {
-    "convert": ("given", "notations", "unwrap"),
-    "relative": ("time_column",),
-    "between": ("notations",),
-    "interpolate": ("notations",),
-    "lookup": ("at", "times", "source_at", "fixed", "notations", "covariance"),
-    "apply": ("at", "time_column", "frame_column", "input_path", "output", "covariance"),
-    "fk": ("input_path", "joints"),
-    "tree": ("at", "notations", "joints"),
-    "view": ("at", "fixed", "output"),
-    "calc": ("input_path",),
-    "resample": ("times",),
-    "sweep": ("gain_linear", "gain_angular"),
-    "diff": ("at", "with_a", "with_b"),
-}
+    "convert": ("given", "notations", "unwrap"), "relative": ("time_column",), "between": ("notations",),
+    "interpolate": ("notations",), "lookup": ("at", "times", "source_at", "fixed", "notations", "covariance"),
+    "apply": ("at", "time_column", "frame_column", "input_path", "output", "covariance"), "calc": ("input_path",),
+    "fk": ("input_path", "joints"), "tree": ("at", "notations", "joints"), "view": ("at", "fixed", "output"),
+    "resample": ("times",), "diff": ("at", "with_a", "with_b"), "sweep": ("gain_linear", "gain_angular"),
+}  # fmt: skip
 WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
 
@@ -253,7 +247,9 @@ class Group(WithHelp, click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
-            raise click.UsageError(f"no command {shown(cmd_name)}{alternatives(cmd_name, self.table, 'commands')}", ctx)
+            otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
+            hint = any_near(cmd_name, self.table, otherwise)
+            raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
         return found
 
