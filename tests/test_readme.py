@@ -21,12 +21,18 @@ README = (console.ROOT / "README.md").read_text()
 COOKBOOK = (console.ROOT / "examples" / "COOKBOOK.md").read_text()
 SKILL = (console.ROOT / "examples" / "SKILL.md").read_text()
 EXAMPLES = [pair for block in console.BLOCK.findall(README + COOKBOOK) for pair in console.commands(block)]
+HELPS = [
+    (name, each.help)
+    for name, (module, _) in COMMANDS.items()
+    for command in [import_module(module).command]
+    for each in (command, *getattr(command, "commands", {}).values())
+]
 HELP_EXAMPLES = [
     (name, line.strip())
-    for name, (module, _) in COMMANDS.items()
-    for block in re.findall(r"(?s)\x08\n(.*?)\n\n", f"{import_module(module).command.help}\n\n")
+    for name, text in HELPS
+    for block in re.findall(r"(?s)\x08\n(.*?)\n\n", f"{text}\n\n")
     for line in block.splitlines()
-    if "frametool " in line
+    if "frametool " in line and "teleop" not in line  # which wants keys
 ]
 
 

@@ -223,7 +223,8 @@ HELP = """The calculator for rigid-body frames.
   frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
 
 Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TARGET, which maps points in SOURCE to
-points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
+points in TARGET. Metres, radians unless said, quaternions x, y, z, w. `frametool help WORD` finds what explains a word,
+`frametool help cookbook` has questions with their commands, `frametool examples -o examples` copies files to try.
 """
 COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which click's scripts ask for completions
 
