@@ -153,6 +153,7 @@ OWN = {
 }  # fmt: skip
 WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
+LONGEST_LINE = 62  # of names of common options
 
 
 def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
@@ -177,16 +178,14 @@ def write_options(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[
 
 
 def _write_names(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[click.Option]]) -> None:
-    """Write a line of names for each heading; what it has no room for is left to --help-all."""
-    formatter.write("Common options (explained by --help-all and help common):\n")
+    """Write a line of names for each heading; what one of 80 columns has no room for is left to --help-all."""
+    rows = []
     for title, options in groups.items():
-        line = f"  {title.partition(' ')[0]:10}"
-        for each in options:
-            if len(line) + len(each.opts[0]) > formatter.width - 4:
-                line += " .."
-                break
-            line += f" {each.opts[0]}"
-        formatter.write(f"{line}\n")
+        line = " ".join(each.opts[0] for each in options)
+        cut = f"{line[:LONGEST_LINE].rpartition(' ')[0]} .." if len(line) > LONGEST_LINE else line
+        rows.append((title.partition(" ")[0], cut))
+    with formatter.section("Common options (explained by --help-all and help common)"):
+        formatter.write_dl(rows)
 
 
 class WithHelp(click.Command):

@@ -6,7 +6,6 @@ import sys
 from functools import partial
 from math import radians
 from shutil import get_terminal_size
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import click
@@ -41,8 +40,7 @@ class CheckCommand(Command):
             with formatter.section("Rules"):
                 formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
         else:
-            names = f"Rules (explained by --help-all): {', '.join(RULES)}."
-            formatter.write(f"{fill(names, formatter.width, break_on_hyphens=False)}\n")
+            formatter.write_text(f"{len(RULES)} rules, explained by --help-all: {', '.join([*RULES][:6])} ..")
         super().format_epilog(ctx, formatter)
 
 

@@ -135,7 +135,7 @@ def common(ctx: click.Context) -> str:
     found: dict[str, click.Option] = {}
     for command in _commands(ctx).values():
         found = {each.name or "": each for each in command.params if isinstance(each, click.Option)} | found
-    formatter = click.HelpFormatter(width=79)
+    formatter = ctx.make_formatter()
     write_options(
         formatter, {title: [found[name] for name in names if name in found] for title, names in GROUPS.items()}
     )
