@@ -233,6 +233,12 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
     return [each for _, each in sorted(near, reverse=True)]
 
 
+def any_near(name: str, known: Iterable[str], otherwise: str) -> str:
+    """Return `; did you mean 'x' or 'y'?` for all names that are near, or else a hint."""
+    near = nearest(name, known)
+    return f"; did you mean {' or '.join(map(shown, near))}?" if near else f"; {otherwise}"
+
+
 def _likely(name: str, known: list[str]) -> list[str]:
     """Return the names worth comparing: of many those with the same first or second half that share the most beyond it.
 

@@ -118,6 +118,7 @@ COMMANDS: tuple[tuple[str, str], ...] = (
     ("diff examples/robot.yaml - -f json", "robot.yaml"),
     ("formats -f json tum", ""),
     ("batch", "commands.txt"),
+    ("examples cloud.csv", ""),
     ("sim follow --duration 0.1", ""),
     ("sim follow --duration 0.1 --emit poses -f csv", ""),
     ("sim follow --duration 0.05 --emit tf", ""),

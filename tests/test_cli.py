@@ -282,7 +282,9 @@ WRONG = {
     ("lookup rows.yaml a b", 1): "rows.yaml:1:30: the last row of a 4x4 pose is 0 0 0 1, found 0 0 0 2",
     ("compose '{name: b, parent: a, xyz: [0,0,0]}' '{name: d, parent: c, xyz: [0,0,0]}'", 1):
         "frames do not touch: a <- b is followed by c <- d; change the order, or invert one",
-    ("loookup arm.yaml a b", 2): "no command 'loookup'; did you mean 'lookup'? commands: ",
+    ("loookup arm.yaml a b", 2): "no command 'loookup'; did you mean 'lookup'?",
+    ("transform arm.yaml a b", 2):
+        "no command 'transform'; `frametool --help` lists all, `frametool help WORD` searches",
     ("lookup arm.yaml base", 2):
         "lookup: missing argument 'SOURCE'; usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
     ("lookup arm.yaml base tip --presicion 3", 2):

@@ -15,7 +15,7 @@ from click.core import iter_params_for_processing
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
-from frametool.errors import SHOWN, alternatives, did_you_mean, shown
+from frametool.errors import SHOWN, any_near, did_you_mean, shown
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from frametool.geometry.place import Earth
 
-SETTINGS = "frametool.settings"  # the key in a context's `meta`
+SETTINGS = "frametool.settings"  # the keys in a context's `meta`
+EVERYTHING = "frametool.everything"
 
 
 class CommandSettings:
@@ -89,15 +90,16 @@ def _is_told(ctx: click.Context, name: str) -> bool:
     return ctx.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
-def show_help(ctx: click.Context) -> None:
-    """Print the help of a command."""
+def show_help(ctx: click.Context, *, everything: bool = False) -> None:
+    """Print the help of a command, with `everything` of all its options."""
+    ctx.meta[EVERYTHING] = everything
     with writing(None) as write:
         write(f"{ctx.get_help()}\n")
 
 
-def _help(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+def _help(ctx: click.Context, option: click.Parameter, chosen: bool) -> None:  # click's signature
     if chosen:
-        show_help(ctx)
+        show_help(ctx, everything=option is HELP_ALL)
         ctx.exit()
 
 
@@ -118,56 +120,97 @@ def option_row(option: click.Option) -> tuple[str, str]:
 
 # made without click's translations: those load `locale`, 2 ms of every start
 HELP_OPTION = click.Option(
-    ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help, help="Show this message."
+    ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help,
+    help="this message; --help-all explains every option",
+)  # fmt: skip
+HELP_ALL = click.Option(
+    ["--help-all"], is_flag=True, is_eager=True, expose_value=False, callback=_help, hidden=True, help="all options"
 )
 
 
-# heading -> names of the parameters under it; all others stand first, they are what the command is about
+# heading -> names of the parameters under it, those asked for most first; all others are what a command is about
 GROUPS = {
-    "Files": ("more", "with_a", "with_b", "input_forms", "topics", "quiet", "verbose"),
+    "Files (help formats)": ("input_forms", "more", "with_a", "with_b", "topics", "quiet", "verbose"),
     "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
-    "Rotations (help rotations)": ("given", "notations", "deg", "keep_sign", "normalize"),
+    "Rotations (help rotations)": ("given", "notations", "deg", "normalize", "keep_sign"),
     "Rows (help streams)": (
-        "input_path", "columns", "frame_column", "target_column", "source_column", "keep", "prefix", "header", "unwrap",
-        "on_error", "max_errors", "jobs",
+        "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "jobs", "unwrap", "frame_column",
+        "target_column", "source_column",
     ),
-    "Result": ("format_name", "precision", "covariance", "output", "force", "explain", "explain_full", "explain_step"),
-    "What a form of file leaves open (help formats)": (
+    "Result (help errors)": (
+        "output", "force", "precision", "covariance", "explain", "explain_full", "explain_step", "color",
+    ),
+    "Forms that leave something open (help formats)": (
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
     ),
+    "Turtles (help turtles)": (
+        "target", "delay", "gain_linear", "gain_angular", "max_linear", "max_angular", "turtlesim", "holonomic", "seed",
+        "reach", "realtime",
+    ),
 }  # fmt: skip
-NAMES_ONLY = tuple(GROUPS)[-1]  # explained by the topic alone
+# command -> what it is about although it stands under a heading elsewhere
+OWN = {
+    "convert": ("given", "notations", "unwrap"), "relative": ("time_column",), "between": ("notations",),
+    "interpolate": ("notations",), "lookup": ("at", "times", "source_at", "fixed", "notations", "covariance"),
+    "apply": ("at", "time_column", "frame_column", "input_path", "output", "covariance"), "calc": ("input_path",),
+    "fk": ("input_path", "joints"), "tree": ("at", "notations", "joints"), "view": ("at", "fixed", "output"),
+    "resample": ("times",), "diff": ("at", "with_a", "with_b"), "sweep": ("gain_linear", "gain_angular"),
+}  # fmt: skip
 WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
+LONGEST_LINE = 62  # of names of common options
 
 
 def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
     """Return the options of a command under the headings of GROUPS, those of its own first; no heading is empty."""
-    placed = {name: title for title, names in GROUPS.items() for name in names}
-    groups: dict[str, list[click.Option]] = {title: [] for title in ("Options", *GROUPS)}
-    for each in command.get_params(ctx):
-        if isinstance(each, click.Option) and not each.hidden:
-            groups[placed.get(each.name or "", "Options")].append(each)
-    return {title: options for title, options in groups.items() if options}
+    own = OWN.get(command.name or "", ())
+    options = {each.name or "": each for each in command.get_params(ctx) if isinstance(each, click.Option)}
+    placed = {title: [name for name in names if name not in own] for title, names in GROUPS.items()}
+    common = {name for names in placed.values() for name in names}
+    grouped = {"Options": [name for name in options if name not in common], **placed}
+    found = {title: [options[name] for name in names if name in options] for title, names in grouped.items()}
+    return {title: shown for title, each in found.items() if (shown := [one for one in each if not one.hidden])}
+
+
+def write_options(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[click.Option]]) -> None:
+    """Write options under their headings, each with its meaning."""
+    rows = {title: list(map(option_row, options)) for title, options in groups.items()}
+    width = max((len(left) for each in rows.values() for left, _ in each if len(left) <= WIDEST), default=0)
+    for title, each in rows.items():
+        formatter.write(f"{title}:\n")
+        with formatter.indentation():
+            formatter.write_dl([(left.ljust(width), text) for left, text in each], WIDEST, col_spacing=1)
+
+
+def _write_names(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[click.Option]]) -> None:
+    """Write a line of names for each heading; what one of 80 columns has no room for is left to --help-all."""
+    rows = []
+    for title, options in groups.items():
+        line = " ".join(each.opts[0] for each in options)
+        cut = f"{line[:LONGEST_LINE].rpartition(' ')[0]} .." if len(line) > LONGEST_LINE else line
+        rows.append((title.partition(" ")[0], cut))
+    with formatter.section("Common options (explained by --help-all and help common)"):
+        formatter.write_dl(rows)
 
 
 class WithHelp(click.Command):
-    """A command with -h and --help, its options in groups."""
+    """A command with -h, --help and --help-all."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """Add --help-all, which click does not know."""
+        super().__init__(*args, **kwargs)
+        self.params.append(HELP_ALL)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options group by group, those of this command first; then the commands of a group."""
+        """Write the options of this command, and a line for each group that others have too; then the commands."""
         groups = option_groups(self, ctx)
-        rows = [option_row(each) for title, options in groups.items() if title != NAMES_ONLY for each in options]
-        width = max((len(left) for left, _ in rows if len(left) <= WIDEST), default=0)
         formatter.write_paragraph()
-        for title, options in groups.items():
-            formatter.write(f"{title}:\n")
-            with formatter.indentation():
-                if title == NAMES_ONLY:
-                    formatter.write_text("  ".join(each.opts[-1] for each in options))
-                else:
-                    padded = [(left.ljust(width), text) for left, text in map(option_row, options)]
-                    formatter.write_dl(padded, WIDEST, col_spacing=1)
+        if ctx.meta.get(EVERYTHING):
+            write_options(formatter, groups)
+        else:
+            write_options(formatter, {"Options": groups.pop("Options")})
+            if groups:
+                _write_names(formatter, groups)
         if isinstance(self, click.Group):
             self.format_commands(ctx, formatter)
 
@@ -184,7 +227,8 @@ HELP = """The calculator for rigid-body frames.
   frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
 
 Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TARGET, which maps points in SOURCE to
-points in TARGET. Metres, radians unless said, quaternions x, y, z, w.
+points in TARGET. Metres, radians unless said, quaternions x, y, z, w. `frametool help WORD` finds what explains a word,
+`frametool help cookbook` has questions with their commands, `frametool examples -o examples` copies files to try.
 """
 COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which click's scripts ask for completions
 
@@ -208,7 +252,9 @@ class Group(WithHelp, click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
-            raise click.UsageError(f"no command {shown(cmd_name)}{alternatives(cmd_name, self.table, 'commands')}", ctx)
+            otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
+            hint = any_near(cmd_name, self.table, otherwise)
+            raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
         return found
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -150,19 +151,7 @@ class Parsed(Text):
             self.fail(str(error), param, ctx)
 
 
-class Number(Text):
-    """A finite number."""
-
-    name = "number"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it as documents read theirs."""
-        try:
-            return parse_number(super().convert(value, param, ctx)) if isinstance(value, str) else value
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
-
-
+Number = partial(Parsed, "number", parse_number)  # finite, read as documents read theirs
 FULL = -1  # digits: as many as the number has
 
 

@@ -134,6 +134,21 @@ class Rotation(Batched):
         return cls.from_columns("matrix", validation.matrices(matrices, 3, "matrix"), "matrix", normalize=normalize)
 
     @classmethod
+    def from_notation(cls, name: str, numbers: Numbers, *, normalize: bool = False) -> Rotation:
+        """Take a representation by its name, `rpy_deg` or `euler:rzyx`: shape (..., its columns), matrices (..., 3, 3).
+
+        A quaternion is asked for by its order, xyzw or wxyz.
+        """
+        form = _form(name)
+        form.bound_axes()
+        if name == "quaternion":
+            raise ValueInvalid("quaternion does not say its order; give xyzw=[..] or wxyz=[..]")
+        if name == "matrix":
+            return cls.from_matrix(numbers, normalize=normalize)
+        columns = validation.columns(numbers, len(form.columns), name)
+        return cls.from_columns(name, columns, name, normalize=normalize)
+
+    @classmethod
     def from_rotvec(cls, rotvec_xyz: Numbers) -> Rotation:
         """Take rotation vectors, axis times angle in radians, of shape (..., 3)."""
         return cls.from_columns("rotvec", validation.columns(rotvec_xyz, 3, "rotvec"), "rotvec")

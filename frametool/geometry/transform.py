@@ -33,8 +33,12 @@ class Transform(Batched):
 
     def __init__(self, rotation: Rotation, translation: Numbers) -> None:
         """Join a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
+        if not isinstance(rotation, Rotation):
+            kind = type(rotation).__name__
+            advice = "Transform(rotation, xyz) takes a Rotation first; from_parts(xyz=.., rpy=..) says which is which"
+            raise ValueInvalid(f"rotation: expected a Rotation, got {kind}; {advice}")
         shift = validation.columns(translation, 3, "translation")
-        parts = (*shift, *require(rotation, "rotation").components)
+        parts = (*shift, *rotation.components)
         self._components = validation.joined(parts, "translation")
 
     @classmethod
@@ -62,6 +66,24 @@ class Transform(Batched):
         generator = np.random.default_rng(seed)
         rotation = Rotation.random(n, seed=generator)
         return cls(rotation, radius * generator.normal(size=(3,) if n is None else (n, 3)))
+
+    @classmethod
+    def from_parts(cls, xyz: Numbers = (0.0, 0.0, 0.0), *, normalize: bool = False, **rotation: Any) -> Transform:
+        """Make one, or many, of a position and a rotation: `Transform.from_parts(xyz=[1, 2, 3], rpy_deg=[0, 0, 90])`.
+
+        xyz: metres, shape (..., 3)
+        rotation: at most one, named as `frametool help rotations` has it: rpy, rpy_deg, xyzw, wxyz, rotvec, matrix ..;
+            or `rotation=` a Rotation, as of `Rotation.from_euler`.
+        Raises ValueInvalid for any other name, wrong shapes, not finite, or no rotation.
+        """
+        if isinstance(xyz, Rotation):
+            raise ValueInvalid("xyz: the position comes first, the rotation by its name: from_parts(xyz, rotation=..)")
+        if len(rotation) > 1:
+            raise ValueInvalid(f"from_parts takes one rotation beside xyz, not {' and '.join(rotation)}")
+        (name, given), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
+        turn = given if name == "rotation" else Rotation.from_notation(name, given, normalize=normalize)
+        shift = validation.columns(xyz, 3, "xyz")
+        return cls._of_columns(validation.joined((*shift, *require(turn, "rotation").components), "xyz"))
 
     @classmethod
     def from_arrays(cls, xyz: Numbers, xyzw: Numbers, *, normalize: bool = False) -> Transform:
@@ -210,7 +232,7 @@ class Transform(Batched):
         if self.shape:
             return f"<Transform of shape {self.shape}>"
         shown = [repr(part) for part in self._components]
-        return f"Transform(Rotation([{', '.join(shown[3:])}]), [{', '.join(shown[:3])}])"
+        return f"Transform.from_parts(xyz=[{', '.join(shown[:3])}], xyzw=[{', '.join(shown[3:])}])"
 
 
 def _components_of(other: object) -> Rigid:

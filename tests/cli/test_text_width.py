@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Run = Callable[..., Outcome]
 
 # what the golden lines print for machines, printed for people; findings are lines for compilers, `place: level: ..`
-ROWS = re.compile(r"-i \S+\.(?:csv|tum)|^check|^batch")  # tables stay tables
+ROWS = re.compile(r"-i \S+\.(?:csv|tum)|^check|^batch|^examples")  # tables stay tables
 TABLE = [
     (re.sub(r" -f \w+", "", line) + " -f text", name)
     for line, name in COMMANDS
@@ -54,13 +54,17 @@ sim run examples/turtles.yaml -f text
 --help
 --version -v
 help
+help common
+help hand-eye
+help extrinsics
+help cookbook
 sim follow --help
 sim run --help
 sim sweep --help
 sim teleop --help
 """
 LINES = [*dict.fromkeys([*TABLE, *((line, "") for line in FURTHER.split("\n") if line)])]
-LINES += [(f"{name} --help", "") for name in NAMES] + [(f"help {name}", "") for name in topics()]
+LINES += [(f"{name} {option}", "") for name in NAMES for option in ("--help", "--help-all")] + [(f"help {name}", "") for name in topics()]
 DRAWN = ("view",)  # a picture has no words to lose
 
 

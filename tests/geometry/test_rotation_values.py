@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from frametool.errors import FrametoolWarning, ValueInvalid
-from frametool.geometry import euler
+from frametool.geometry import arrays, euler, floats
 from frametool.geometry.conventions import AXES, axes_change
+from frametool.geometry.representations import REPRESENTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -201,12 +202,40 @@ def test_the_sign_that_leaves_is_canonical() -> None:
         (lambda: Transform.from_arrays([[0.0, 0.0, math.inf]], [[0, 0, 0, 1]]), r"xyz\[0\]: 0 0 inf is not finite"),
         (lambda: Rotation.identity().distance(1), r"expected a Rotation, got int"),  # type: ignore[arg-type]
         (lambda: Transform.identity().relative(Rotation.identity()), r"expected a Transform"),  # type: ignore[arg-type]
+        (lambda: Transform([1, 2, 3], Rotation.identity()), r"got list; Transform\(rotation, xyz\) takes a Rotation first; from_parts\(xyz=.., rpy=..\) says which is which"),  # type: ignore[arg-type]
+        (lambda: Transform.from_parts(Rotation.identity()), r"xyz: the position comes first, the rotation by its name"),  # type: ignore[arg-type]
+        (lambda: Transform.from_parts([1, 2, 3], rotation=[0, 0, 0, 1]), r"rotation: expected a Rotation, got list"),
+        (lambda: Transform.from_parts([1, 2, 3], rpy=[0, 0, 1], xyzw=[0, 0, 0, 1]), r"takes one rotation beside xyz, not rpy and xyzw"),
+        (lambda: Transform.from_parts(quaternion=[0, 0, 0, 1]), r"does not say its order; give xyzw=\[..\] or wxyz=\[..\]"),
+        (lambda: Transform.from_parts(euler=[0, 0, 1]), r"euler needs its axes: write euler:rzyx"),
+        (lambda: Transform.from_parts(position=[0, 0, 1]), r"unknown representation 'position'"),
+        (lambda: Transform.from_parts([1, 2]), r"xyz: expected shape \(\.\.\., 3\), got \(2,\)"),
+        (lambda: Transform.from_parts(rpy_deg=[[0.0] * 3, [0.0, 0.0, math.nan]]), r"rpy_deg\[1\]: 0 0 nan is not finite"),
         (lambda: axes_change("opticl", "ned"), r"unknown axes 'opticl'; did you mean 'optical'"),
     ],
 )
 def test_bad_input_is_named(call: Callable[[], Any], message: str) -> None:
     with pytest.raises(ValueInvalid, match=message):
         call()
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("name", [*(each for each in REPRESENTATIONS if each not in ("quaternion", "euler")), "rpy_deg", "euler:rzyx", "euler_deg:sxyz"])
+def test_a_transform_is_made_of_a_position_and_any_notation(name: str, shape: tuple[int, ...]) -> None:
+    turn, xyz = batch(shape), np.random.default_rng(2).normal(size=(*shape, 3))
+    form = notation(name)
+    numbers = np.stack([np.asarray(each) for each in form.from_quaternion(*turn.components, arrays if shape else floats)], axis=-1)
+    given = numbers.reshape(*shape, 3, 3) if name == "matrix" else numbers
+    rotation: dict[str, Any] = {name: given}
+    made = Transform.from_parts(xyz, **rotation)
+    assert made.shape == shape
+    assert np.all(made.is_close(Transform(turn, xyz), angle=1e-12, distance=0.0))
+
+
+def test_what_a_transform_shows_makes_it_again() -> None:
+    one = Transform.from_parts(xyz=[1, 2, 3], rpy_deg=[10, 20, 30])
+    assert eval(repr(one), {"Transform": Transform}).is_close(one, angle=0.0, distance=0.0)  # noqa: S307
+    assert Transform.from_parts().is_close(Transform.identity(), angle=0.0, distance=0.0)
 
 
 def test_only_values_of_one_kind_compose() -> None:

@@ -26,7 +26,8 @@ COMMANDS = {
     "diff": ("frametool.cli.commands.diff", "what differs between two trees, calibrations or recordings"),
     "batch": ("frametool.cli.commands.batch", "many commands, one a line, in one process"),
     "formats": ("frametool.cli.commands.formats", "the forms of files that are read and written, and what they mean"),
-    "help": ("frametool.cli.commands.help", "a subject on one screen: pose, euler, axes, time, streams and more"),
+    "examples": ("frametool.cli.commands.examples", "the example files and the cookbook, printed or copied"),
+    "help": ("frametool.cli.commands.help", "a subject on one screen, the cookbook, any word: pose, axes, extrinsics"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 TROUBLE = {"diff": 2}  # command -> its one exit code for whatever goes wrong, as that of diff(1)

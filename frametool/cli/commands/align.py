@@ -32,7 +32,8 @@ def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) ->
       frametool align truth.tum mono.tum --align sim3 --to matrix
 
     -o FILE takes all of EST as it was compared: on REF's clock, mounted and moved, in the form of its suffix or of -f.
-    The scale of sim3 is beside the pose: p' = scale R p + t; such an entry is no part of a tree.
+    `frametool help trajectories` says what is fitted. The scale of sim3 is beside the pose: p' = scale R p + t; such
+    an entry is no part of a tree.
     """
     shaping = {name: options.pop(name) for name in SHAPING}
     into = Output("poses", **shaping, deg=deg) if shaping["output"] else None

@@ -91,10 +91,10 @@ def command(
       frametool apply robot.yaml map camera_optical 0 0 1
       frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
-      ros2 topic echo /clicked_point | frametool apply tf.txt map
+      frametool apply robot.yaml base_link lidar -i cloud.csv
 
     A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its
-    frame. -i FILE or stdin holds many.
+    frame. -i FILE or stdin holds many: rows, JSON lines, clouds, what `ros2 topic echo` prints.
     """
     task = PoseTask(options, "points", "trajectory")
     stream, output = task.stream, task.output

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.group import EVERYTHING
 from frametool.cli.options import FILE, Command, Parsed, file_options
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
@@ -33,9 +34,13 @@ class CheckCommand(Command):
     """A command whose help lists the rules."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the rules with their levels, then the exit codes."""
-        with formatter.section("Rules"):
-            formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
+        """Name the rules, with --help-all their levels and what they are about, then the exit codes."""
+        formatter.write_paragraph()
+        if ctx.meta.get(EVERYTHING):
+            with formatter.section("Rules"):
+                formatter.write_dl([(f"{rule} ({level})", about) for rule, (level, about) in RULES.items()])
+        else:
+            formatter.write_text(f"{len(RULES)} rules, explained by --help-all: {', '.join([*RULES][:6])} ..")
         super().format_epilog(ctx, formatter)
 
 
@@ -59,10 +64,10 @@ def command(
       frametool check robot.yaml
       frametool check drive.yaml --strict
       frametool check robot.yaml --measured measurements.yaml
-      ros2 topic echo /tf > tf.txt; frametool check tf.txt tf_static.txt
+      frametool check robot.yaml drive.yaml -f json || true
 
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
-    --strict also if there is a warning; notes never fail. - is standard input.
+    --strict also if there is a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
     """
     if tolerance is not None and not measured:
         raise click.UsageError("--tolerance is about --measured; name the measurements")

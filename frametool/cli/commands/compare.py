@@ -63,7 +63,7 @@ def command(
     ref: str, est: Sequence[str], rows: str | None, explain: str | None, limits: list[Limit] | None, report: str | None,
     **options: Any,
 ) -> int:  # fmt: skip
-    """Compare trajectories with a reference: pairs, the fit, errors in place and along the way.
+    """Compare trajectories with a reference: errors in place and along the way.
 
     \b
       frametool compare truth.tum odometry.tum --offset auto
@@ -71,9 +71,7 @@ def command(
       frametool compare gps.csv truth.tum --mount auto --report error.html
       frametool compare truth.tum mono.tum --align sim3 --fail 'ate>1m,paired<90%'
 
-    REF and EST are trajectories in any form, tables of positions, recordings as FILE:TOPIC or FILE:TARGET:SOURCE, or -.
-    ate is the distance in place after the fit, and its parts along, across and above the path; rpe that of the way
-    between two poses a delta apart; kitti the mean error of stretches of path, in percent of their length.
+    REF and EST are trajectories or positions in any form (help trajectories).
     """
     shaping = {name: options.pop(name) for name in ("format_name", "output", "force")}
     path, told = shaping["output"], shaping["format_name"]

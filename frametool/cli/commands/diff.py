@@ -46,8 +46,8 @@ def command(
     """Compare two trees, calibrations or recordings, A and B, in any forms.
 
     \b
-      frametool diff robot.yaml arm.yaml
-      frametool diff robot.yaml arm.yaml --tolerance 1mm,0.1deg -f json
+      frametool diff robot.yaml robot.yaml
+      sed 's/0.285/0.3/' robot.yaml | frametool diff - robot.yaml --tolerance 9mm
       frametool diff drive.yaml drive.yaml --at 2.5 --seen-from base_link
 
     Told are the frames that only one has, those that hang under another parent, and of all others how far they moved

@@ -49,11 +49,11 @@ def command(
       frametool echo drive.yaml map base_link
       frametool echo drive.yaml map lidar --rate 10 --format csv
       frametool echo drive.yaml lidar box --start 2.5 --limit 1 --precision 6
-      ros2 topic echo /tf > tf.txt; frametool echo tf.txt map camera
 
     Order is TARGET SOURCE, and the first line says in words what is seen from what: tf2_echo names its arguments the
     other way round and then does the same. Blocks are text unless --format or the suffix of --output says otherwise;
-    they have 3 decimals unless --precision says otherwise. Stamps are seconds with nine decimals.
+    they have 3 decimals unless --precision says otherwise. Stamps are seconds with nine decimals. TREE is also what
+    `ros2 topic echo /tf` printed (help recordings).
     """
     if start is not None and stop is not None and start > stop:
         raise click.UsageError("--start is after --stop")

@@ -42,12 +42,12 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
       frametool fk arm.urdf arm_base tool -i joints.csv
       frametool fk arm.urdf tool right_finger -i joints.csv --prefix finger_
       printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
-      ros2 topic echo /joint_states | frametool fk arm.urdf arm_base tool -f csv
 
     Rows are a table with a column for each joint, JSON lines or YAML documents with a key for each, or JointState
-    messages. Columns are called as the joints: radians and metres, or elbow_deg, elbow [deg], finger_mm. All other
-    columns pass.  A joint on the way that has no column needs --joint or --joints; one that mimics another follows
-    it. For one posture there is `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
+    messages as `ros2 topic echo` prints them. Columns are called as the joints: radians and metres, or elbow_deg,
+    elbow [deg], finger_mm. All other columns pass.  A joint on the way that has no column needs --joint or --joints;
+    one that mimics another follows it. For one posture there is
+    `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
     stream = Stream(options)
     output = Output("poses", deg=deg, **options)

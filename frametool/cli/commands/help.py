@@ -1,20 +1,33 @@
-"""`frametool help`: a subject on one screen, or the help of a command."""
+"""`frametool help`: a subject on one screen, the help of a command, questions of the cookbook, any word in them."""
 
 from __future__ import annotations
 
 import os
+import re
 from shutil import get_terminal_size
 from textwrap import fill
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool import __version__
 from frametool.cli.commands import COMMANDS
-from frametool.cli.group import show_help
-from frametool.cli.options import Command, Text
+from frametool.cli.commands.examples import example
+from frametool.cli.group import GROUPS, option_groups, show_help, write_options
+from frametool.cli.options import EXIT_CODES, Command, Text
 from frametool.cli.sink import writing
-from frametool.errors import alternatives, shown
+from frametool.errors import any_near, shown
+from frametool.formats.table import FORMATS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
+MADE = {  # topics that are no file of their own
+    "common": "The options that many commands share, each with its meaning",
+    "cookbook": "Questions with commands and what they print: help cookbook [WORD..]",
+    "skill": "The whole tool in brief, for an assistant or a program",
+}
 
 
 def topics() -> dict[str, str]:
@@ -29,9 +42,135 @@ def topic(name: str) -> str:
         return file.read()
 
 
-def _wrapped(line: str, indent: int) -> str:
-    """Return a line, or several in the width of the terminal."""
+def questions() -> dict[str, str]:
+    """Return the questions of the cookbook, each with its answer; commands are indented, as in the topics."""
+    text = re.sub(r"(?m)^## .*\n+", "", example("COOKBOOK.md").decode()).partition("\n### ")[2]
+    text = re.sub(r"(?ms)^```\w*\n(.*?)^```\n", lambda block: re.sub(r"(?m)^(?=.)", "  ", block[1]), text)
+    return {title: answer.strip("\n") for title, _, answer in (each.partition("\n") for each in text.split("\n### "))}
+
+
+def finder(words: Iterable[str]) -> Callable[[str], bool]:
+    """Return what tells whether a text holds all these words, in any case and number."""
+    found = re.findall(r"\w+", " ".join(words).lower())
+    stems = [re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", each)) if len(each) > 3 else each for each in found]
+    return lambda text: bool(stems) and all(re.search(rf"\b{each}", text.lower()) for each in stems)
+
+
+def _listed(rows: dict[str, str]) -> str:
+    """Return names with what they are about, each in a line or several in the width of the terminal."""
+    width = max(map(len, rows), default=0)
+    return "".join(_wrapped(f"  {each:{width}}  {about}", width + 4) for each, about in rows.items())
+
+
+def _wrapped(line: str, indent: int = 2) -> str:
     return fill(line, min(get_terminal_size().columns, 100), subsequent_indent=" " * indent) + "\n"
+
+
+def _titles(label: str, titles: list[str], most: int = 12) -> str:
+    more = [f".. and {len(titles) - most} more"] if len(titles) > most else []
+    return "".join([f"{label}:\n\n", *(f"  {each}\n" for each in titles[:most] + more)])
+
+
+def _joined(parts: dict[str, Any]) -> str:
+    """Return the texts that there is something to tell in, with a line between them."""
+    return "\n".join(text for text, found in parts.items() if found)
+
+
+def cookbook(words: tuple[str, ...]) -> str:
+    """Return the answers whose question has these words, else those that have them in their text; or all questions."""
+    known, holds = questions(), finder(words)
+    if not words:
+        return _titles("Questions of the cookbook (frametool help cookbook WORD shows them)", list(known), len(known))
+    asked = [each for each in known if holds(each)]
+    inside = [each for each in known if each not in asked and holds(f"{each} {known[each]}")]
+    if not asked:
+        asked, inside = inside[:3], inside[3:]
+    if not asked:
+        raise click.UsageError(f"no question has {shown(' '.join(words))}; `frametool help cookbook` lists all")
+    answers = "".join(f"{each}\n\n{known[each]}\n\n" for each in asked)
+    files = "The files: `frametool examples -o examples` copies them into a folder `examples`.\n"
+    return answers + _joined({_titles("Also in", inside): inside, files: True})
+
+
+def _commands(ctx: click.Context) -> dict[str, click.Command]:
+    """Return all commands and subcommands by their names."""
+    from frametool.cli.group import group
+
+    found: dict[str, click.Command] = {}
+    for name in COMMANDS:
+        found[name] = group.get_command(ctx, name)
+        found |= {f"{name} {inner}": each for inner, each in getattr(found[name], "commands", {}).items()}
+    return found
+
+
+def _search(ctx: click.Context, name: str) -> str:
+    """Return the topics, commands, forms and questions that hold these words, those about them first."""
+    known, asked, holds = topics(), questions(), finder([name])
+    for each in known:
+        if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same in another number
+            return topic(each)
+    about = sorted((each for each in known if holds(f"{each} {topic(each)}")), key=lambda each: not holds(known[each]))
+    calls = [each for each, one in _commands(ctx).items() if each != "help" and any(map(holds, _texts(one, ctx)))]
+    forms = [each for each, row in FORMATS.items() if holds(f"{each} {row.summary}")]
+    titles = sorted((each for each in asked if holds(f"{each} {asked[each]}")), key=lambda each: not holds(each))
+    if not (about or calls or forms or titles):
+        hint = any_near(name.lower(), [*known, *MADE, *COMMANDS], "`frametool help` lists all topics")
+        raise click.UsageError(f"no topic, command or text has {shown(name)}{hint}")
+    return _joined({
+        f"Topics with {shown(name)} (frametool help TOPIC):\n\n{_listed({each: known[each] for each in about})}": about,
+        _wrapped(f"Commands (frametool help COMMAND): {', '.join(calls)}"): calls,
+        _wrapped(f"Forms of files (frametool formats NAME): {', '.join(forms)}"): forms,
+        _titles(f"Cookbook (frametool help cookbook {name})", titles): titles,
+    })  # fmt: skip
+
+
+def _texts(command: click.Command, ctx: click.Context) -> list[str]:
+    """Return what a command says of itself, and of each of its own options."""
+    own = option_groups(command, ctx)["Options"]
+    return [f"{command.name} {command.help}", *(f"{each.opts[-1]} {each.help}" for each in own)]
+
+
+def common(ctx: click.Context) -> str:
+    """Return the options that stand in groups, each as the first command has it that does."""
+    found: dict[str, click.Option] = {}
+    for command in _commands(ctx).values():
+        found = {each.name or "": each for each in command.params if isinstance(each, click.Option)} | found
+    formatter = ctx.make_formatter()
+    write_options(
+        formatter, {title: [found[name] for name in names if name in found] for title, names in GROUPS.items()}
+    )
+    return f"{MADE['common']}\n\n{formatter.getvalue()}"
+
+
+def described(name: str, command: click.Command, ctx: click.Context) -> dict[str, Any]:
+    """Return all that there is to say of a command for a program."""
+    lines = [line.strip() for line in (command.help or "").replace("\b\n", "").split("\n")]
+    first, *others = (command.epilog or EXIT_CODES).removeprefix("Exit codes: ").rstrip(".").split("; ")
+    codes = dict(re.findall(r"(\d+|else) ((?:[^,]|, (?!\d|else))+)", first)) | dict(each.split(": ") for each in others)
+    groups = option_groups(command, ctx).items()
+    return {
+        "name": name,
+        "summary": lines[0],
+        "usage": f"frametool {name} {' '.join(command.collect_usage_pieces(ctx))}",
+        "help": "\n".join(lines).strip(),
+        "examples": [line for line in lines if re.match(r"(frametool|printf|sed) .*", line)],
+        "arguments": [
+            {"name": each.make_metavar(ctx), "required": each.required, "repeated": each.nargs == -1}
+            for each in command.params if isinstance(each, click.Argument)
+        ],
+        "options": [_option(each, title.partition(" (")[0], ctx) for title, options in groups for each in options],
+        "exit_codes": codes | {"130": "interrupted"},
+    }  # fmt: skip
+
+
+def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, Any]:
+    kind, is_flag = option.type, option.is_flag or option.count
+    values = kind.offers(ctx, "") if isinstance(kind, Text) else getattr(kind, "choices", ())
+    takes = option.metavar or (option.opts[-1].strip("-") if values else kind.name).upper()
+    return {
+        "names": option.opts, "takes": None if is_flag else takes, "values": list(values or ()),
+        "repeated": option.multiple, "group": group, "help": option.help,
+    }  # fmt: skip
 
 
 class Topic(Text):
@@ -41,30 +180,51 @@ class Topic(Text):
 
     def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
         """Offer the subjects and the commands."""
-        return topics() | {name: row[1] for name, row in COMMANDS.items()}
+        return topics() | MADE | {name: row[1] for name, row in COMMANDS.items()}
 
 
 @click.command(cls=Command, name="help")
-@click.argument("name", type=Topic(), required=False, metavar="[TOPIC | COMMAND]")
+@click.argument("words", type=Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
+@click.option("-f", "--format", "form", type=click.Choice(("text", "json")), default="text", show_default=True,
+              help="json, of all or a COMMAND: options, values, exit codes")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, name: str | None) -> None:
-    """Explain a subject on one screen, or a command.
+def command(ctx: click.Context, words: tuple[str, ...], form: str) -> None:
+    """Explain a subject on one screen, or a command; find any word in them and in the cookbook.
 
     \b
       frametool help
       frametool help pose
       frametool help convert
+      frametool help hand-eye
+      frametool help cookbook quaternion
+      frametool help -f json lookup
     """
-    known = topics()
-    if name in COMMANDS and name not in known:  # calc and formats are subjects too
-        from frametool.cli.group import group
-
-        show_help(click.Context(group.get_command(ctx, name), parent=ctx.parent, info_name=name))
+    name = " ".join(words)
+    named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
+    if form == "json":
+        text = _json(ctx, name, named)
+    elif named and name not in topics():  # calc and formats are subjects too
+        show_help(click.Context(named, parent=ctx.parent, info_name=name))
         return
-    if name is not None and name not in known:
-        raise click.UsageError(f"no topic {shown(name)}{alternatives(name, tuple(known | COMMANDS), 'topics')}")
-    width = max(map(len, known))
-    listed = "".join(_wrapped(f"  {each:{width}}  {about}", width + 4) for each, about in known.items())
-    all_commands = _wrapped(f"Commands: {', '.join(COMMANDS)}", 2)
+    elif not words:
+        text = f"Topics (frametool help TOPIC; any other WORD is searched for):\n\n{_listed(topics() | MADE)}\n"
+        text += _wrapped(f"Commands: {', '.join(COMMANDS)}")
+    elif words[0] == "cookbook":
+        text = cookbook(words[1:])
+    elif name in MADE:
+        text = common(ctx) if name == "common" else example("SKILL.md").decode()
+    else:
+        text = topic(name) if name in topics() else _search(ctx, name)
     with writing(None) as write:
-        write(topic(name) if name else f"Topics (frametool help TOPIC):\n\n{listed}\n{all_commands}")
+        write(text)
+
+
+def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
+    from frametool.documents.json import dump
+
+    if name and not named:
+        hint = any_near(name, COMMANDS, "`frametool help` lists all")
+        raise click.UsageError(f"-f json is about commands, and {shown(name)} is not one{hint}")
+    every = [described(each, one, ctx) for each, one in ({name: named} if named else _commands(ctx)).items()]
+    whole = {"version": __version__, "topics": topics() | MADE, "commands": every}
+    return f"{dump(every[0] if named else whole)}\n"

@@ -33,9 +33,10 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
     \b
       frametool monitor drive.yaml
       frametool monitor drive.yaml map box --format json
-      ros2 topic echo /tf | frametool monitor -
+      frametool sim follow --duration 2 --emit tf | frametool monitor -
 
-    With TARGET and SOURCE only the edges between them are told, and the interval in which all of them have data.
+    RECORDING is a bag, a tree that moves, or what `ros2 topic echo /tf` prints. With TARGET and SOURCE only the edges
+    between them are told, and the interval in which all of them have data.
     Rates are in stamp time: what the recorder's clock did is the delay, known from bags and `rostopic echo -p` only.
     A gap is the longest pause between two stamps, in the order of time; back counts samples that come after a later
     stamp, reparented the changes of parent. A jump is a step 10 times the median one and longer than 0.1 m or

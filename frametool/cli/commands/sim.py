@@ -158,7 +158,7 @@ def run(scene: str, duration: float | None, seed: int | None, **options: Any) ->
 
     \b
       frametool sim run turtles.yaml
-      frametool sim run turtles.yaml --emit poses --format csv --plot turtles.svg
+      frametool sim run turtles.yaml --emit poses --format csv --plot scene.svg
 
     \b
       duration: 20

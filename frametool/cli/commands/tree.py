@@ -26,13 +26,15 @@ def command(tree: str, more: Sequence[str], at: int | str | None, color: str, **
 
     \b
       frametool tree robot.yaml
-      frametool tree robot.yaml --format dot | dot -Tsvg -o robot.svg
-      frametool tree arm.yaml --with gripper.yaml --format yaml --to rpy_deg
+      frametool tree robot.yaml --format dot -o robot.dot
+      frametool tree robot.yaml --format csv --to rpy_deg
+      frametool tree robot.yaml --with '{name: tip, parent: tool, xyz: [0, 0, 1]}'
       frametool tree drive.yaml --at 2.5
 
     TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. yaml and json are trees again
-    and read back, frames that move with all their samples. dot draws what moves as ROS's view_frames does, tf2 is the
-    listing of tf2's all_frames_as_yaml. --at draws the tree as it stood at one time.
+    and read back, frames that move with all their samples; csv is a table, a row an edge. dot draws what
+    moves as ROS's view_frames does, tf2 is the listing of tf2's all_frames_as_yaml. --at draws the tree as it stood
+    at one time.
     """
     taken = rules_of(options)
     output = Output("tree", "trajectory", **options)

@@ -72,7 +72,7 @@ def command(
       frametool view robot.yaml --below base_link --from side
       frametool view robot.yaml map tool -o robot.html
       frametool view drive.yaml --at 2.5 -o drive.svg
-      frametool view robot.yaml arm.yaml --overlay -o moved.html
+      sed s/0.28/0.3/ robot.yaml | frametool view robot.yaml - --overlay -o b.html
 
     The page needs nothing beside it and asks nothing of anybody: turn it, search, click a frame to see its transform
     from TARGET in every notation, play what moves. TREE is a file, a recording, - for standard input, or . for the

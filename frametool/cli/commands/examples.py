@@ -1,0 +1,92 @@
+"""`frametool examples`: the example files that come with the package, printed or copied."""
+
+from __future__ import annotations
+
+import os
+from os.path import splitext
+
+import click
+
+from frametool.cli.options import FILE, Command, Text
+from frametool.cli.sink import refuse_existing, writing
+from frametool.errors import FileProblem, nearest, printable, shown
+
+PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
+
+
+def folder() -> str:
+    """Return where the files are: in the installed package, or beside it in its sources."""
+    installed = os.path.join(PACKAGE, "examples")
+    return installed if os.path.isdir(installed) else os.path.join(os.path.dirname(PACKAGE), "examples")
+
+
+def names() -> list[str]:
+    """Return the names of the example files."""
+    try:
+        return sorted(each for each in os.listdir(folder()) if os.path.isfile(os.path.join(folder(), each)))
+    except OSError:
+        raise FileProblem(f"{folder()}: the example files are missing; install frametool anew") from None
+
+
+def example(name: str) -> bytes:
+    """Return what is in an example file."""
+    with open(os.path.join(folder(), name), "rb") as file:
+        return file.read()
+
+
+class Example(Text):
+    """The name of an example file."""
+
+    name = "name"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Refuse an unknown one with the nearest."""
+        name = value.removeprefix("examples/")
+        if name not in names():
+            stems = {each: splitext(each)[0] for each in names()}
+            near = nearest(splitext(name)[0], set(stems.values()))
+            likely = " or ".join(shown(each) for each, stem in stems.items() if stem in near)
+            hint = f"did you mean {likely}?" if near else "`frametool examples` lists all"
+            self.fail(f"no example {shown(name)}; {hint}", param, ctx)
+        return name
+
+    def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
+        """Offer the files."""
+        return dict.fromkeys(names(), "")
+
+
+@click.command(cls=Command, name="examples")
+@click.argument("name", type=Example(), required=False)
+@click.option("-o", "--output", type=FILE, metavar="FOLDER|FILE",
+              help="copy all files into this folder, or NAME into this file")  # fmt: skip
+@click.option("--force", is_flag=True, help="let --output replace files")
+def command(name: str | None, output: str | None, force: bool) -> None:
+    """List the example files, print one, or copy them.
+
+    \b
+      frametool examples
+      frametool examples robot.yaml
+      frametool examples -o frames
+
+    The examples of every `COMMAND --help` run inside the folder, those of the cookbook beside one called `examples`.
+    `frametool help cookbook` searches the cookbook, COOKBOOK.md; SKILL.md is the tool in brief for an assistant.
+    """
+    if output is None:
+        with writing(None) as write:
+            write(example(name) if name else "".join(f"{each}\n" for each in names()))
+        return
+    if name is None and output == "-":
+        raise click.UsageError("--output - prints one example; name it, or a folder for all")
+    if name is None or os.path.isdir(output):
+        targets = {each: os.path.join(output, each) for each in ([name] if name else names())}
+        try:
+            os.makedirs(output, exist_ok=True)
+        except OSError as error:
+            raise FileProblem(f"{printable(output)}: {(error.strerror or str(error)).lower()}") from None
+    else:
+        targets = {name: output}
+    for path in targets.values():  # all of them first: nothing is copied by half
+        refuse_existing(path, force=force)
+    for each, path in targets.items():
+        with writing(path, force=force) as write:
+            write(example(each))
