@@ -132,8 +132,9 @@ HELP_ALL = click.Option(
 GROUPS = {
     "Files (help formats)": ("input_forms", "more", "with_a", "with_b", "topics", "quiet", "verbose"),
     "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
-    "Rotations (help rotations)": ("given", "notations", "deg", "normalize", "keep_sign"),
-    "Earth (help earth)": ("local_axes", "origin", "zone"),
+    "Rotations (help rotations, help earth)": (
+        "given", "notations", "deg", "normalize", "keep_sign", "local_axes", "origin", "zone",
+    ),
     "Rows (help streams)": (
         "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "jobs", "unwrap", "frame_column",
         "target_column", "source_column",
