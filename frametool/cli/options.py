@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 STREAMED = ("records", "rows", "arrays")
-READ = readers("tree", "records", "rows", "arrays", "joints")
+READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 

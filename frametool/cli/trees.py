@@ -96,14 +96,17 @@ def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
 
 
 def load_tree(
-    argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False
-) -> FrameTree | TransformBuffer:
+    argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False,
+    drawings: bool = False,
+) -> FrameTree | TransformBuffer:  # fmt: skip
     """Read the tree of an argument and merge further files into it; say what files of other forms were taken for.
 
     streams: `--in` is about what is streamed wherever that can be
+    drawings: a file without poses is taken too, if it is alone
     """
-    arguments = (argument, *more)
-    return _read_once(arguments, f"{rules!r} {streams}", lambda: _loaded(opened(arguments, streams=streams), rules))
+    arguments, alone = (argument, *more), drawings and not more
+    how = f"{rules!r} {streams} {alone}"
+    return _read_once(arguments, how, lambda: _loaded(opened(arguments, streams=streams, drawings=alone), rules))
 
 
 def load_sides(
@@ -237,13 +240,14 @@ def state(files: Sequence[Recording], *, whole: bool = True) -> None:
 
 
 def opened(
-    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None
+    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None, drawings: bool = False
 ) -> list[Recording]:
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
     behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
     of: so many files there are in all
+    drawings: files without poses are taken too
     """
     from frametool.formats.load import Recording, close_all, opened_together
 
@@ -253,7 +257,8 @@ def opened(
     chosen = settings()
     chosen.reads_trees = True
     forms, named = input_forms(streams=streams)[0], [*map(_frame_names, chosen.named_frames)]
-    if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
+    reads = ("tree", "drawing") if drawings else ("tree",)
+    if other := [form for form in forms if {*reads}.isdisjoint(FORMATS[form].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
     for option, values in (("--in", forms), ("--frames", named)):
@@ -269,6 +274,7 @@ def opened(
             form=next(form_of_next, None),
             topics=chosen.topics,
             answers=general,
+            reads=reads,
         )
         for each in arguments
     )

@@ -220,14 +220,18 @@ def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
 def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
     """Return the form whose sign is shown, and by what it is known; a form that is read goes before one that is not."""
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *unread()))
-    found = [form for form in fitting if not FORMATS[form].instead] or fitting
+    found = [form for form in fitting if not _is_unread(form, reads)] or fitting
     if not found:
         return None, ""
-    if FORMATS[found[0]].instead:
+    if _is_unread(found[0], reads):
         raise not_read(found[0], name)
     if len(found) > 1:
         raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
     return found[0], _KNOWN_BY.get(kind, "its keys")
+
+
+def _is_unread(form: str, reads: tuple[str, ...]) -> bool:
+    return bool(FORMATS[form].instead) and set(reads).isdisjoint(FORMATS[form].reads)
 
 
 def not_read(form: str, name: str) -> FormatError:

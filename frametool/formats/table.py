@@ -29,7 +29,7 @@ class Format(NamedTuple):
     suffixes: of files in this form; names: what files are called to which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
         `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
-        holds one frame that moves
+        holds one frame that moves; a `drawing`: who hangs under whom without poses, by `read`, for `tree` alone
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
         are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`
@@ -85,6 +85,15 @@ def _tree(summary: str, module: str, **fields: Any) -> Format:
 def _read_tree(summary: str, module: str, **fields: Any) -> Format:
     """Return the row of a form of trees that one module reads and none writes."""
     return Format(summary, reads=("tree",), reader=module, **fields)
+
+
+def _drawing(summary: str, module: str, **fields: Any) -> Format:
+    """Return the row of a form that says how frames hang together and nothing of where they are."""
+    remedy = "no poses in it (frametool tree shows the frames); give what it was made from, as a bag of /tf, /tf_static"
+    return Format(
+        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, states="parent -> child, no poses",
+        instead=remedy, **fields,
+    )  # fmt: skip
 
 
 def _arrays(
@@ -255,14 +264,14 @@ FORMATS = {
     "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
-    "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
-    "dot": Format(
+    "tf2": _drawing(
+        "the listing of tf2's all_frames_as_yaml", "frametool.ros.tf2_listing", signs=(("yaml inner", "broadcaster"),)
+    ),
+    "dot": _drawing(
         "graphviz",
+        "frametool.formats.trees.drawings",
         suffixes=(".dot", ".gv"),
-        writes=("tree",),
-        writer="frametool.formats.trees.drawings",
-        signs=(("text", r"\A\s*(?:strict\s+)?digraph\b"),),
-        instead="a drawing holds no poses; give the tree or recording that it was made from",
+        signs=(("text", r"\A\ufeff?(?:\s|//[^\n]*\n)*(?:strict\s+)?digraph\b"),),
     ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(

@@ -346,7 +346,7 @@ def test_a_form_that_is_not_read_is_named_in_one_short_line_with_what_to_do(run:
 @pytest.mark.parametrize("suffix", [suffix for row in FORMATS.values() if row.instead for suffix in row.suffixes])
 def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Callable[..., Any], suffix: str) -> None:
     form = next(name for name, row in FORMATS.items() if suffix in row.suffixes)
-    assert FORMATS[form].instead in run("tree", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
+    assert FORMATS[form].instead in run("check", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
     assert run("tree", f"b{suffix}", files={f"b{suffix}": "frames: {a: {b: {xyz: [1, 2, 3]}}}"}).status == 0
 
 
