@@ -370,6 +370,15 @@ FORMATS = {
         states="target<-source as each key says; metres; intrinsics are not kept",
         asks=("direction", "frames"),
     ),
+    "kalibr": _read_tree(
+        "results of Kalibr as text",
+        "frametool.formats.trees.kalibr",
+        signs=(
+            ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|T_(?:ci|ic):?[ \t]*\(\w+ to|Camera-system parameters:)"),
+        ),
+        states="target<-source; metres; q of a baseline is the inverse's, as in T_cn_cnm1; +- and timeshifts not read",
+        asks=("frames",),
+    ),
     "opencv": _tree(
         "OpenCV FileStorage",
         "frametool.formats.trees.opencv",
