@@ -169,6 +169,8 @@ class Stream:
         if form == "kitti" and self.given and not self.told_form():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
         refuse_not_needed((form,), "stamps", "edges", "array")
+        if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
+            raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
@@ -231,12 +233,13 @@ class Stream:
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
+        file.form = form
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
         into: Any = module
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
-        request = request._replace(by_default=into is not module and not output.notations)
+        request = request._replace(by_default=not output.notations)
         outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
         now = f", now in {request.result_frame}" if request.result_frame and request.operation.moves else ""
         return outcomes, lambda: now

@@ -32,7 +32,7 @@ from functools import cached_property
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, bare
-from frametool.formats.table import FORMATS, by_suffix, readers, unread
+from frametool.formats.table import BAG, FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -220,6 +220,8 @@ def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
 def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
     """Return the form whose sign is shown, and by what it is known; a form that is read goes before one that is not."""
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *unread()))
+    if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
+        return None, ""  # bytes that look like a line of something by chance
     found = [form for form in fitting if not _is_unread(form, reads)] or fitting
     if not found:
         return None, ""
@@ -260,18 +262,20 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if form:
         return form, known_by
     if "tree" not in reads and (what := not_text(head)):
-        raise FormatError(f"{what}; {_LISTED}", source=name or "stdin")
+        raise _no_text(what, name)
     if "tree" in reads and begin.xml:
         raise _unknown(begin, *reads, name=name)
     if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
         what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
         raise FormatError(what, source=name or "stdin")
     if form := by_suffix(name, readers(*reads)):
+        if (what := not_text(head)).startswith("not text but") and FORMATS[form].reader != BAG:
+            raise _no_text(what, name)
         return form, f"the suffix {name[name.rfind('.') :].lower()}"
     if form := by_suffix(name, unread()):
         raise not_read(form, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
-        raise FormatError(f"{what}; {_LISTED}", source=name or "stdin")
+        raise _no_text(what, name)
     found, _ = _fitting(begin, _WEAK, readers(*reads))
     if found and (otherwise or begin.has_data):
         return found[0], "its first line"
@@ -284,6 +288,21 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^\s*[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
     return "yaml", "nothing else"
+
+
+def _no_text(what: str, name: str) -> FormatError:
+    """Make the error for bytes that are no text: a cloud without a header can only be told."""
+    if name.lower().endswith(".bin"):
+        what = "binary data; of a cloud say which: --in kitti-bin (float32 x y z intensity) or nuscenes-bin (and ring)"
+    return FormatError(f"{what}; {_LISTED}", source=name or "stdin")
+
+
+def instead_of_text(error: FormatError, path: str) -> FormatError:
+    """Return the error for a file that is no text where a pose is wanted: what it is, not where its first byte is."""
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    what = not_text(head)
+    return (_points_to_lookup(head, path) or _no_text(what, path)) if what else error
 
 
 _LISTED = "`frametool formats` lists what is read"

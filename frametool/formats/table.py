@@ -152,6 +152,11 @@ _EUROC = (
 _ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.echo_format")
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
 _LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), states="metres")
+_BIN = _arrays(
+    "", "frametool.formats.rows.bin_cloud", writes=("points", "arrays"),
+    states="float32, metres, frame of the lidar; only --in tells it from other .bin",
+)  # fmt: skip
+_XYZI = ("x", "y", "z", "intensity")
 _LAS_HEAD = rb"LASF.{100}"
 _ARROW = _arrays("", "frametool.formats.rows.arrow_files", texts=True)
 
@@ -508,6 +513,8 @@ FORMATS = {
         signs=(("magic", rb"ply\r?\n"),),
         states="metres",
     ),
+    "kitti-bin": _BIN._replace(summary="point cloud of KITTI, .bin", columns=_XYZI),
+    "nuscenes-bin": _BIN._replace(summary="point cloud of nuScenes, .pcd.bin", columns=(*_XYZI, "ring")),
     "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), signs=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
     "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), signs=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
     "parquet": _ARROW._replace(
