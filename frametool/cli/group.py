@@ -16,6 +16,7 @@ from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, alternatives, did_you_mean, shown
+from frametool.formats.table import ORDERS
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -51,8 +52,15 @@ class CommandSettings:
     stamps: str | None = None
     edges = False
     array: str | None = None
+    given: Any = None
     reads_trees = False
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
+
+    @property
+    def order(self) -> str:
+        """Return in which order --from says that quaternions stand in lists, "" if it does not."""
+        name = self.given if isinstance(self.given, str) else self.given[0].spec if self.given else ""
+        return name if name in ORDERS else ""
 
 
 def settings(context: click.Context | None = None) -> CommandSettings:

@@ -50,7 +50,7 @@ OPTIONS = {
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
     ),
     "given": click.option(
-        "--from", "given", type=Notations(), metavar="REP",
+        "--from", "given", type=Notations(), metavar="REP", callback=keep_setting,
         help="what unnamed numbers are",
     ),
     "columns": click.option(

@@ -203,7 +203,8 @@ OPEN_IN_TREES = ("frames", "direction", "dh", "stamps")  # what forms of files o
 
 def refuse_idle(files: Sequence[Recording]) -> None:
     """Refuse options about files that were read which none of them leaves open."""
-    refuse_not_needed([file.form for file in files], *OPEN_IN_TREES)
+    order = ["order"] * isinstance(settings().given, str)  # of streams --from says more
+    refuse_not_needed([file.form for file in files], *OPEN_IN_TREES, *order)
     if settings().topics and not any(file.topics.counts or file.topics.seen for file in files):
         raise click.UsageError(f"--topic is not used: no topic is named in {listing(file.name for file in files)}")
 

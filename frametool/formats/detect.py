@@ -13,6 +13,8 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
     yaml key   a pattern of a key at the beginning of a line
     yaml inner a pattern of a key that stands deeper
     text       a pattern found in the first characters
+    entries    a pattern of keys that stand in the maps, or lists of seven numbers, which all outermost keys have, or
+               the outermost `transforms` or `extrinsics`; no key of a message stands there
     line       a pattern of the first line of data, behind blank lines, comments and what tools print
     leaves     a pattern of the keys that have a number beside them, behind a slash for each key above them; of five
                one may be another, so that a misspelt one is told where it stands
@@ -138,6 +140,32 @@ class Beginning:
         return found
 
     @cached_property
+    def document(self) -> dict[str, Any]:
+        """Return the first map of YAML or JSON as plain values, as far as the text is looked at; {} for no map."""
+        from frametool.documents.source import END, LEAF, MAP
+        from frametool.documents.yaml import yaml_events
+
+        top: list[Any] = []
+        ways: list[tuple[Any, str | None]] = [(top, None)]  # what is open, and the key that waits for a value
+        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
+            inside, key = ways[-1]
+            if kind == END:
+                ways.pop()
+                continue
+            if isinstance(inside, dict) and key is None and kind == LEAF:
+                ways[-1] = (inside, word)
+                continue
+            value: Any = word if kind == LEAF else {} if kind == MAP else []
+            if isinstance(inside, dict):
+                inside[key or ""] = value
+                ways[-1] = (inside, None)
+            else:
+                inside.append(value)
+            if kind != LEAF:
+                ways.append((value, None))
+        return top[0] if top and isinstance(top[0], dict) else {}
+
+    @cached_property
     def xml(self) -> str:
         """Return the text of XML from its root element on, without comments; "" for what is no XML."""
         if not self.text.lstrip().startswith("<"):
@@ -158,6 +186,30 @@ def _has_delimiter(line: str) -> bool:
     return "," in line or "\t" in line
 
 
+_NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angular|child_frame_id|name|parent|samples"
+
+
+def _are_poses(begin: Beginning, words: str) -> bool:
+    """Tell a map of names, or a list, whose entries are poses; of a long text the last one may be cut."""
+    if not (begin.yaml_keys or begin.text.lstrip().startswith("{")):
+        return False
+    top: dict[Any, Any] = {key: each for key, each in begin.document.items() if key != "angles"}
+    if len(top) == 1 and (inner := top.get("transforms", top.get("extrinsics"))):
+        top = dict(enumerate(inner)) if isinstance(inner, list) else inner if isinstance(inner, dict) else {}
+    entries = [*top.values()]
+    if len(begin.text) > LOOKED_AT and len(entries) > 1:
+        entries.pop()
+
+    def is_pose(entry: Any) -> bool:
+        if isinstance(entry, list):
+            return len(entry) == 7 and all(isinstance(each, str) for each in entry)
+        keys = set(entry) if isinstance(entry, dict) else set()
+        return any(re.fullmatch(words, key) for key in keys) and keys.isdisjoint(("header", "transform"))
+
+    names = [key for key in top if isinstance(key, str) and re.fullmatch(f"{words}|{_NO_NAME}", key)]
+    return bool(entries) and not names and all(map(is_pose, entries))
+
+
 # kind -> whether a beginning shows what a row says, the strongest first
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
@@ -170,6 +222,7 @@ _STRONG: dict[str, Shows] = {
     "yaml key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
     "yaml inner": lambda begin, what: _count(begin.yaml_inner_keys, what) > 0,
     "text": lambda begin, what: re.search(what, begin.text) is not None,
+    "entries": _are_poses,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
     "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
 }

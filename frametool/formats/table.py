@@ -107,7 +107,8 @@ def _arrays(
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
 DH = ("standard", "modified")
-CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
+ORDERS = ("xyzw", "wxyz")
+CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH, "order": ORDERS}
 _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
@@ -123,6 +124,11 @@ _OPEN3D = (
 )
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
+)
+_POSE_WORDS = (
+    r"[xyz](?:_mm|_cm)?|[pt][xyz]|xyz\w*|(?:trans|translation|pos|position|location)(?:_[xyz])?|t|tvec|value|pose|"
+    r"(?:rot|rotation|q|quat|quaternion)(?:_?[xyzw])?|orientation|(?:roll|pitch|yaw|rpy|euler|axis_angle|rotvec)\w*|"
+    r"xyzw|wxyz|matrix|a[xyz]|theta"
 )
 _SRDF = (
     "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
@@ -363,6 +369,13 @@ FORMATS = {
         "frametool.formats.trees.autoware",
         signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
         states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
+    ),
+    "named": _tree(
+        "extrinsics by hand: a pose under each name",
+        "frametool.formats.trees.named",
+        signs=(("entries", _POSE_WORDS),),
+        states="pose of the name in its parent, metres, radians unless _deg",
+        asks=("frames", "direction", "order"),
     ),
     "camchain": _tree(
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name",

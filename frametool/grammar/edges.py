@@ -240,6 +240,7 @@ class Answers(NamedTuple):
     joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
     joint_files: files with values of joints, over time or for good
     array: the one of several arrays that is read
+    order: of quaternions in lists, `xyzw` or `wxyz`
     """
 
     frames: tuple[str, ...] = ()
@@ -251,6 +252,7 @@ class Answers(NamedTuple):
     joints: Mapping[str, str] = MappingProxyType({})
     joint_files: tuple[str, ...] = ()
     array: str = ""
+    order: str = ""
 
     def names(self, *defaults: str) -> tuple[str, ...]:
         """Return the names of a form's frames: as told, then its own."""
