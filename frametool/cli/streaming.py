@@ -31,7 +31,7 @@ from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, reader
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Sequence
     from typing import TypeVar
 
     from frametool.cli.output import Output
@@ -82,9 +82,15 @@ OPTIONS = {
 }  # fmt: skip
 
 
-def stream_options(function: Function) -> Function:
-    """Add to a command the options of streams; `Stream` takes them."""
-    return together(OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
+SEVERAL = click.option(
+    "-i", "--input", "input_path", type=FILE, multiple=True, metavar="FILE",
+    help="stream this file, not stdin; several clouds become one",
+)  # fmt: skip
+
+
+def stream_options(function: Function, first: Any = OPTIONS["input_path"]) -> Function:
+    """Add to a command the options of streams; `Stream` takes them.  first: the option for the input."""
+    return together(first, in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
 
 
 class Stream:
@@ -95,7 +101,9 @@ class Stream:
         self._tell = partial(say_error, in_json=options.get("format_name") == "json")
         self.options = {name: options.pop(name) for name in OPTIONS if name in options}
         self.given = one_notation(self.options.get("given"))
-        self.path: str | None = self.options.get("input_path")
+        given = self.options.get("input_path")
+        self.paths: Sequence[str] = given if isinstance(given, tuple) else (given,) if given else ()
+        self.path: str | None = self.paths[0] if self.paths else None
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None

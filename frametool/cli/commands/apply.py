@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.cloud_files import clouds_of
+from frametool.cli.cloud_files import SeveralClouds, clouds_of
 from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options
 from frametool.cli.options import (
     FILE,
@@ -25,7 +25,7 @@ from frametool.cli.options import (
     scale_option,
 )
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.streaming import SEVERAL, Stream, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
@@ -68,7 +68,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @rules_options
 @reading_options(streams=True)
 @array_option
-@stream_options
+@partial(stream_options, first=SEVERAL)
 def command(
     arguments: tuple[str, ...],
     pose: str | None,
@@ -89,16 +89,16 @@ def command(
     \b
       frametool apply robot.yaml map camera_optical 0 0 1
       frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
-      frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
+      frametool apply robot.yaml map -i a.pcd -i b.pcd --frames left,right -o all.ply
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
-    A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its
-    frame. -i FILE or stdin holds many.
+    A RECORD (help records) is a pose, a point ..; its frame is SOURCE or its own.
     """
     task = PoseTask(options, "points", "trajectory")
     stream, output = task.stream, task.output
     plan = task.plan() if task.derives else None
-    clouds = clouds_of(stream, output) if stream.path else None
+    several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
+    clouds = clouds_of(stream, output) if stream.path and several is None else None
     if pose is None:
         chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
         if scale:
@@ -116,6 +116,9 @@ def command(
         if rest not in ((), ("-",)) or time_column or frame_column or kinds or plan is not None:
             raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
         return clouds.run(way.from_frame, way.target)
+    if several is not None:
+        several.refuse_beside(is_more=covariance or plan is not None or rest not in ((), ("-",)))
+        return several.run(way.from_frame, way.target, has_source=way.has_source)
     kind = _kind(kinds, stream)
     if plan is not None:
         if covariance or scale:
