@@ -16,7 +16,6 @@ from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, alternatives, did_you_mean, shown
-from frametool.formats.table import ORDERS
 from frametool.stream.faults import Misused
 
 if TYPE_CHECKING:
@@ -34,6 +33,7 @@ class CommandSettings:
     These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
     where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
 
+    row_order: no option of its own, but the --from of streams where it is the order of a quaternion
     reads_trees: no option, but set when files of frames are opened: --in is then about these too
     inputs: no option either, but the forms of what was read, each with what it asked of `OPEN`
     """
@@ -52,15 +52,10 @@ class CommandSettings:
     stamps: str | None = None
     edges = False
     array: str | None = None
-    given: Any = None
+    order: str | None = None
+    row_order = ""
     reads_trees = False
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
-
-    @property
-    def order(self) -> str:
-        """Return in which order --from says that quaternions stand in lists, "" if it does not."""
-        name = self.given if isinstance(self.given, str) else self.given[0].spec if self.given else ""
-        return name if name in ORDERS else ""
 
 
 def settings(context: click.Context | None = None) -> CommandSettings:
@@ -136,7 +131,7 @@ GROUPS = {
     ),
     "Result": ("format_name", "precision", "covariance", "output", "force", "explain", "explain_full", "explain_step"),
     "What a form of file leaves open (help formats)": (
-        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
+        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array", "order",
     ),
 }  # fmt: skip
 NAMES_ONLY = tuple(GROUPS)[-1]  # explained by the topic alone
@@ -167,7 +162,7 @@ class WithHelp(click.Command):
             formatter.write(f"{title}:\n")
             with formatter.indentation():
                 if title == NAMES_ONLY:
-                    formatter.write_text("  ".join(each.opts[-1] for each in options))
+                    formatter.write_text(" ".join(each.opts[-1] for each in options))
                 else:
                     padded = [(left.ljust(width), text) for left, text in map(option_row, options)]
                     formatter.write_dl(padded, WIDEST, col_spacing=1)

@@ -250,6 +250,7 @@ class ColumnNames(Text):
         """Offer those of the file that -i names."""
         done, comma, _ = incomplete.rpartition(",")
         path = ctx.params.get("input_path")
+        path = path[0] if isinstance(path, tuple) and path else path
         found = _names_in(str(path)) if path and path != "-" else []
         return dict.fromkeys((done + comma + name for name in found), "")
 
@@ -326,7 +327,7 @@ _READING = (
 )  # fmt: skip
 
 
-_ORDER = _setting("--from", "given", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
+_ORDER = _setting("--from", "order", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
 
 
 def reading_options(*, streams: bool = False, order: bool = True) -> Callable[[Function], Function]:

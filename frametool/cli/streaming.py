@@ -27,7 +27,7 @@ from frametool.cli.options import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
+from frametool.formats.table import FORMATS, ORDERS, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
@@ -45,12 +45,21 @@ if TYPE_CHECKING:
 MOST_JOBS = 256
 _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
+
+
+def _keep_order(context: click.Context, _option: click.Parameter, chosen: Any) -> Any:
+    """Keep --from for files of frames too, whose quaternions may stand in lists (a callback of click)."""
+    name = chosen[0].spec if chosen else ""
+    settings(context).row_order = name if name in ORDERS else ""
+    return chosen
+
+
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
     ),
     "given": click.option(
-        "--from", "given", type=Notations(), metavar="REP", callback=keep_setting,
+        "--from", "given", type=Notations(), metavar="REP", callback=_keep_order,
         help="what unnamed numbers are",
     ),
     "columns": click.option(

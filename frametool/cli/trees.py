@@ -198,13 +198,12 @@ class CarriedSigmas:
             say(f"edges count as independent{f'; {none} as exact' * bool(exact)}")
 
 
-OPEN_IN_TREES = ("frames", "direction", "dh", "stamps")  # what forms of files of frames may leave open
+OPEN_IN_TREES = ("frames", "direction", "dh", "stamps", "order")  # what forms of files of frames may leave open
 
 
 def refuse_idle(files: Sequence[Recording]) -> None:
     """Refuse options about files that were read which none of them leaves open."""
-    order = ["order"] * isinstance(settings().given, str)  # of streams --from says more
-    refuse_not_needed([file.form for file in files], *OPEN_IN_TREES, *order)
+    refuse_not_needed([file.form for file in files], *OPEN_IN_TREES)
     if settings().topics and not any(file.topics.counts or file.topics.seen for file in files):
         raise click.UsageError(f"--topic is not used: no topic is named in {listing(file.name for file in files)}")
 
@@ -301,6 +300,7 @@ def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
     chosen = settings()
     named = {name: getattr(chosen, name) for name in Answers._fields if name not in ("joints", "frames")}
+    named["order"] = chosen.order or chosen.row_order
     return Answers(joints=_joints(chosen.joints), **{name: value for name, value in named.items() if value})
 
 

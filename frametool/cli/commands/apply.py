@@ -89,7 +89,6 @@ def command(
     \b
       frametool apply robot.yaml map camera_optical 0 0 1
       frametool apply --transform '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' 1 0 0
-      frametool apply robot.yaml map -i a.pcd -i b.pcd --frames left,right -o all.ply
       ros2 topic echo /clicked_point | frametool apply tf.txt map
 
     A RECORD (help records) is a pose, a point ..; its frame is SOURCE or its own.
