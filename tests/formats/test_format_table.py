@@ -160,7 +160,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "documents behind dashes": (b"---\nx: 1\n", "rows records", "yaml"),
     "Autoware's poses": (b"# kit\nbase/x:\n  kit:\n    x: 0\n    y: -.5\n    roll: 1e-3\n    yaw: 0.0\n", "tree", "autoware"),
     "Autoware's poses in braces": (b"base: {kit: {x: 0, y: 1, z: 2, roll: 0, pitch: 0, yaw: 0}}\n", "tree", "autoware"),
-    "one level of numbers, as robot_calibration has it": (b"a_initial_values:\n  x: 0\n  roll: 0\n", "tree", "yaml"),
+    "one level of numbers, as robot_calibration has it": (b"a_initial_values:\n  x: 0\n  roll: 0\n", "tree", "named"),
     "three levels of numbers": (b"a:\n  b:\n    c:\n      x: 0\n      roll: 0\n", "tree", "yaml"),
     "a tree of ours with two levels": (b"frames:\n  a:\n    b:\n      x: 0\n", "tree", "yaml"),
     "a chain of Kalibr": (b"cam0:\n  T_cam_imu:\n  - [1, 0]\n  distortion_model: radtan\n", "tree", "camchain"),
