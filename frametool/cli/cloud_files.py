@@ -6,11 +6,12 @@ import os
 import re
 from contextlib import ExitStack
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import settings
+from frametool.cli.group import refuse_unused, settings
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -127,6 +128,94 @@ class BagOfClouds:
             remedy = "{number}" if "{" in self.pattern else "{stamp_ns}"
             raise FormatError(f"{both}; put {remedy} into its name", source=self.path)
         return name
+
+
+_NOT_OF_SEVERAL = (
+    "columns", "keep", "prefix", "given", "header", "jobs", "frame_column", "time_column", "kinds", "array",
+)  # fmt: skip
+
+
+class SeveralClouds:
+    """Clouds of several -i that become one: each is given in a frame of its own, or all in SOURCE."""
+
+    def __init__(self, output: Output, stream: Stream) -> None:
+        """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
+        self.output = output
+        self.stream = stream
+        self.paths = stream.paths
+        refuse_unused("is not for several clouds; they are moved whole", *_NOT_OF_SEVERAL)
+        if "-" in self.paths:
+            raise click.UsageError("-i - among several: standard input holds one cloud; name files")
+        if bags := [path for path in self.paths if is_bag(path)]:
+            raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
+        forms = settings().input_forms
+        told = [form for form in forms if "arrays" in FORMATS[form].reads]
+        if len(told) not in (0, 1, len(self.paths)):
+            raise click.UsageError(f"--in is given {len(told)} times for {len(self.paths)} clouds; once, or once each")
+        self.forms = told * (len(self.paths) if len(told) == 1 else 1) or [""] * len(self.paths)
+        settings().input_forms = [form for form in forms if form not in told]
+        self.frames = [name.strip() for text in settings().named_frames for name in text.split(",")]
+        settings().named_frames = ()
+        if self.frames and len(self.frames) != len(self.paths):
+            raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
+
+    def refuse_beside(self, *, is_more: bool) -> None:
+        """Raise a usage error where the command line has more to move, or to do, than the clouds."""
+        if is_more:
+            raise click.UsageError("several clouds are moved whole; no records, --covariance or --explain beside them")
+
+    def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None, *, has_source: bool) -> int:
+        """Move all and write them as one; return the exit status.
+
+        pose_of: the pose that moves what is given in a frame
+        has_source: whether all are given in one frame, or moved by one pose
+        """
+        from frametool.cli.trees import answers
+        from frametool.documents.source import InputFile
+        from frametool.formats.detect import detect
+        from frametool.grammar.edges import Options, Tally, Topics
+        from frametool.stream.column_stream import MergedClouds
+        from frametool.stream.request import Operation, Request
+        from frametool.stream.run import run
+
+        if has_source == bool(self.frames):
+            both = "SOURCE is one frame for all, --frames one for each; give one of them"
+            each = f"say what each cloud is given in: --frames A,B (one for each of the {len(self.paths)}), or SOURCE"
+            raise click.UsageError(both if has_source else each)
+        on_error = self.stream.options["on_error"]
+        with ExitStack() as opened:
+            planned = []
+            for path, told, frame in zip(self.paths, self.forms, self.frames or [""] * len(self.paths), strict=True):
+                file = InputFile(path)
+                opened.callback(file.close)
+                file.form = form = told or detect(file.head(), "records", "rows", "arrays", name=path)[0]
+                if "arrays" not in FORMATS[form].reads:
+                    hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
+                    raise FormatError(f"{FORMATS[form].summary}, no cloud; {hint}", source=path)
+                columns = import_module(FORMATS[form].reader).open_columns(
+                    file, Options(Tally(), Topics(), answers=answers())
+                )
+                request = Request(Operation(left=pose_of(frame or None, None), moves=True), on_error=on_error)
+                planned.append((columns, request, path))
+            into = self.output.told or form
+            if not holds_arrays(into):
+                forms = ", ".join(writers("arrays"))
+                raise click.UsageError(f"several clouds become one cloud: -o all.ply, or -f; forms: {forms}")
+            if self.output.path is None and self.output.told is None:
+                raise click.UsageError("several clouds become one file: give -o all.ply")
+            merged = MergedClouds(planned, self.output.style.in_form(into))
+            status = 0
+            with writing(self.output.path, force=self.output.force) as write:
+                for at, path in enumerate(self.paths):
+                    policy = self.stream.policy(path, "row")
+                    status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
+                for piece in merged.writer.end():
+                    write(piece)
+        if not self.stream.options["quiet"]:
+            where = f" in {target}" if target else ""
+            froms = f", from {', '.join(self.frames)}" if self.frames else ""
+            say(f"{len(self.paths)} clouds{where} as one{froms}; metres")
+        return status
 
 
 def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:

@@ -35,6 +35,7 @@ class CommandSettings:
     These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
     where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
 
+    row_order: no option of its own, but the --from of streams where it is the order of a quaternion
     reads_trees: no option, but set when files of frames are opened: --in is then about these too
     inputs: no option either, but the forms of what was read, each with what it asked of `OPEN`
     """
@@ -57,6 +58,8 @@ class CommandSettings:
     local_axes: str | None = None
     zone: str | None = None
     earth: Earth | None = None
+    order: str | None = None
+    row_order = ""
     reads_trees = False
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
 
@@ -143,7 +146,7 @@ GROUPS = {
         "output", "force", "precision", "covariance", "explain", "explain_full", "explain_step", "color",
     ),
     "Forms that leave something open (help formats)": (
-        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
+        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array", "order",
     ),
     "Turtles (help turtles)": (
         "target", "delay", "gain_linear", "gain_angular", "max_linear", "max_angular", "turtlesim", "holonomic", "seed",

@@ -15,7 +15,7 @@ import click
 from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
-from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, readers, writers
+from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # an argument that begins like this is a number, whatever short options there are
 NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 STREAMED = ("records", "rows", "arrays")
-READ = readers("tree", "records", "rows", "arrays", "joints")
+READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 
 
@@ -239,6 +239,7 @@ class ColumnNames(Text):
         """Offer those of the file that -i names."""
         done, comma, _ = incomplete.rpartition(",")
         path = ctx.params.get("input_path")
+        path = path[0] if isinstance(path, tuple) and path else path
         found = _names_in(str(path)) if path and path != "-" else []
         return dict.fromkeys((done + comma + name for name in found), "")
 
@@ -317,15 +318,19 @@ _READING = (
 )  # fmt: skip
 
 
-def reading_options(*, streams: bool = False) -> Callable[[Function], Function]:
+_ORDER = _setting("--from", "order", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
+
+
+def reading_options(*, streams: bool = False, order: bool = True) -> Callable[[Function], Function]:
     """Add to a command the options that say how files of frames are read; `opened` heeds them.
 
-    streams: the command has those of streams too, `--in` and `--quiet` among them
+    streams: the command has those of streams too, `--in`, `--quiet` and `--from` among them
+    order: it has no --from of its own
     """
     if streams:
         return together(*_READING)
     quiet = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
-    return together(in_option, quiet, *_READING)
+    return together(in_option, quiet, *_READING, *[_ORDER] * order)
 
 
 def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
@@ -360,7 +365,7 @@ def refuse_not_needed(forms: Collection[str], *asked: str) -> None:
     for ask in asked:
         chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
         if chosen and not any(ask in FORMATS[form].asks for form in forms):
-            option = f"--{ask.replace('_', '-')}"
+            option = "--from" if ask == "order" else f"--{ask.replace('_', '-')}"
             known = " and ".join(dict.fromkeys(forms))
             raise click.UsageError(f"{option} changes nothing: {known} does not leave that open")
 
@@ -521,8 +526,8 @@ times_option = click.option(
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
-moving_options = together(rules_options, reading_options(), verbose_option)
-tree_options = together(moving_options, pose_options, rotation_options)
+moving_options = together(rules_options, reading_options(order=False), verbose_option)
+tree_options = together(moving_options, _ORDER, pose_options, rotation_options)
 color_option = click.option(
     "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
     help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",

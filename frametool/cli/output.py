@@ -179,6 +179,10 @@ class Output:
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
+        if tree.drawn and self._form_is_default:
+            self.style = self.style.in_form("text")
+        if tree.drawn and self.style.form != "text":
+            raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.form}; -f text shows its frames")
         if tree.covariances and self.style.form not in ("yaml", "json", "text"):
             warn(f"{self.style.form}: covariances left out")
         if self.style.form not in ("yaml", "json") and (

@@ -177,7 +177,12 @@ def source_of(argument: str | Source) -> Source:
     if is_inline(argument):
         return Source(INLINE, argument)
     if argument != "-":
-        return Source(argument, read_text(argument))
+        try:
+            return Source(argument, read_text(argument))
+        except FormatError as error:
+            from frametool.formats.detect import instead_of_text
+
+            raise instead_of_text(error, argument) from None
     if sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or give values")
     return Source("stdin", read_text("-"))

@@ -27,11 +27,11 @@ from frametool.cli.options import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.table import FORMATS, holds_arrays, is_trajectory, readers
+from frametool.formats.table import FORMATS, ORDERS, holds_arrays, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Sequence
     from typing import TypeVar
 
     from frametool.cli.output import Output
@@ -46,12 +46,21 @@ MOST_JOBS = 256
 BAGS = (".bag", ".mcap", ".db3")
 _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
+
+
+def _keep_order(context: click.Context, _option: click.Parameter, chosen: Any) -> Any:
+    """Keep --from for files of frames too, whose quaternions may stand in lists (a callback of click)."""
+    name = chosen[0].spec if chosen else ""
+    settings(context).row_order = name if name in ORDERS else ""
+    return chosen
+
+
 OPTIONS = {
     "input_path": click.option(
         "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
     ),
     "given": click.option(
-        "--from", "given", type=Notations(), metavar="REP",
+        "--from", "given", type=Notations(), metavar="REP", callback=_keep_order,
         help="what unnamed numbers are",
     ),
     "columns": click.option(
@@ -83,9 +92,15 @@ OPTIONS = {
 }  # fmt: skip
 
 
-def stream_options(function: Function) -> Function:
-    """Add to a command the options of streams; `Stream` takes them."""
-    return together(OPTIONS["input_path"], in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
+SEVERAL = click.option(
+    "-i", "--input", "input_path", type=FILE, multiple=True, metavar="FILE",
+    help="stream this file, not stdin; several clouds become one",
+)  # fmt: skip
+
+
+def stream_options(function: Function, first: Any = OPTIONS["input_path"]) -> Function:
+    """Add to a command the options of streams; `Stream` takes them.  first: the option for the input."""
+    return together(first, in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
 
 
 class Stream:
@@ -99,7 +114,9 @@ class Stream:
         self.given_place = ""
         if self.given is not None and self.given.representation.is_place:
             self.given, self.given_place = None, self.given.representation.name
-        self.path: str | None = self.options.get("input_path")
+        given = self.options.get("input_path")
+        self.paths: Sequence[str] = given if isinstance(given, tuple) else (given,) if given else ()
+        self.path: str | None = self.paths[0] if self.paths else None
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None
@@ -194,6 +211,8 @@ class Stream:
         if form == "kitti" and self.given and not self.told_form():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
         refuse_not_needed((form,), "stamps", "edges", "array")
+        if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
+            raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
@@ -257,13 +276,13 @@ class Stream:
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
+        file.form = form
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
         into: Any = module
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
-        usual = request.by_default or (into is not module and not output.notations)
-        request = request._replace(by_default=usual)
+        request = request._replace(by_default=not output.notations)
         outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
         now = f", now in {request.result_frame}" if request.result_frame and request.operation.moves else ""
         return outcomes, lambda: now

@@ -97,14 +97,17 @@ def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
 
 
 def load_tree(
-    argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False
-) -> FrameTree | TransformBuffer:
+    argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False,
+    drawings: bool = False,
+) -> FrameTree | TransformBuffer:  # fmt: skip
     """Read the tree of an argument and merge further files into it; say what files of other forms were taken for.
 
     streams: `--in` is about what is streamed wherever that can be
+    drawings: a file without poses is taken too, if it is alone
     """
-    arguments = (argument, *more)
-    return _read_once(arguments, f"{rules!r} {streams}", lambda: _loaded(opened(arguments, streams=streams), rules))
+    arguments, alone = (argument, *more), drawings and not more
+    how = f"{rules!r} {streams} {alone}"
+    return _read_once(arguments, how, lambda: _loaded(opened(arguments, streams=streams, drawings=alone), rules))
 
 
 def load_sides(
@@ -196,7 +199,7 @@ class CarriedSigmas:
             say(f"edges count as independent{f'; {none} as exact' * bool(exact)}")
 
 
-OPEN_IN_TREES = ("frames", "direction", "dh", "stamps")  # what forms of files of frames may leave open
+OPEN_IN_TREES = ("frames", "direction", "dh", "stamps", "order")  # what forms of files of frames may leave open
 
 
 def refuse_idle(files: Sequence[Recording]) -> None:
@@ -238,13 +241,14 @@ def state(files: Sequence[Recording], *, whole: bool = True) -> None:
 
 
 def opened(
-    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None
+    arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None, drawings: bool = False
 ) -> list[Recording]:
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
     behind: so many files came before these; their --in and --frames are passed over, unless they are all there are
     of: so many files there are in all
+    drawings: files without poses are taken too
     """
     from frametool.formats.load import Recording, close_all, opened_together
 
@@ -254,7 +258,8 @@ def opened(
     chosen = settings()
     chosen.reads_trees = True
     forms, named = input_forms(streams=streams)[0], [*map(_frame_names, chosen.named_frames)]
-    if other := [form for form in forms if "tree" not in FORMATS[form].reads]:
+    reads = ("tree", "drawing") if drawings else ("tree",)
+    if other := [form for form in forms if {*reads}.isdisjoint(FORMATS[form].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
     for option, values in (("--in", forms), ("--frames", named)):
@@ -270,6 +275,7 @@ def opened(
             form=next(form_of_next, None),
             topics=chosen.topics,
             answers=general,
+            reads=reads,
         )
         for each in arguments
     )
@@ -295,6 +301,7 @@ def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
     chosen = settings()
     named = {name: getattr(chosen, name) for name in Answers._fields if name not in ("joints", "frames")}
+    named["order"] = chosen.order or chosen.row_order
     return Answers(joints=_joints(chosen.joints), **{name: value for name, value in named.items() if value})
 
 

@@ -63,7 +63,7 @@ MAGIC = {
     b"\x7fELF": "a program (ELF)",
     b"\x89PNG": "a PNG picture",
     b"\xff\xd8\xff": "a JPEG picture",
-    b"%PDF": "a PDF",
+    b"%PDF": "a PDF (view_frames leaves frames.gv beside its own)",
     b"\x1f\x8b": "gzip data; unpack it first",
     b"BZh": "bzip2 data; unpack it first",
     b"\xfd7zXZ": "xz data; unpack it first",
@@ -236,7 +236,11 @@ def not_text(data: bytes) -> str:
         if zeros > len(head) // 5 and others <= zeros // 20:
             return f"{encoding} without a byte order mark; convert it: iconv -f {encoding} -t UTF-8"
     controls = len(head) - len(head.translate(None, _CONTROLS))
-    return "not text but binary data" if controls > max(2, len(head) // 10) else ""
+    try:
+        most = len(head) // 10 if head[:-3].decode() else 0
+    except UnicodeDecodeError as error:  # Latin-1 has bytes that are no UTF-8, but no controls
+        most = 0 if error.start < len(head) - 6 else len(head) // 10
+    return "not text but binary data" if controls > max(2, most) else ""
 
 
 def check_text(source: Source) -> None:

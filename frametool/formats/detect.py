@@ -13,6 +13,8 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
     yaml key   a pattern of a key at the beginning of a line
     yaml inner a pattern of a key that stands deeper
     text       a pattern found in the first characters
+    entries    a pattern of keys that stand in the maps, or lists of seven numbers, which all outermost keys have, or
+               the outermost `transforms` or `extrinsics`; no key of a message stands there
     line       a pattern of the first line of data, behind blank lines, comments and what tools print
     leaves     a pattern of the keys that have a number beside them, behind a slash for each key above them; of five
                one may be another, so that a misspelt one is told where it stands
@@ -32,7 +34,7 @@ from functools import cached_property
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, bare
-from frametool.formats.table import FORMATS, by_suffix, readers, unread
+from frametool.formats.table import BAG, FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -138,6 +140,32 @@ class Beginning:
         return found
 
     @cached_property
+    def document(self) -> dict[str, Any]:
+        """Return the first map of YAML or JSON as plain values, as far as the text is looked at; {} for no map."""
+        from frametool.documents.source import END, LEAF, MAP
+        from frametool.documents.yaml import yaml_events
+
+        top: list[Any] = []
+        ways: list[tuple[Any, str | None]] = [(top, None)]  # what is open, and the key that waits for a value
+        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
+            inside, key = ways[-1]
+            if kind == END:
+                ways.pop()
+                continue
+            if isinstance(inside, dict) and key is None and kind == LEAF:
+                ways[-1] = (inside, word)
+                continue
+            value: Any = word if kind == LEAF else {} if kind == MAP else []
+            if isinstance(inside, dict):
+                inside[key or ""] = value
+                ways[-1] = (inside, None)
+            else:
+                inside.append(value)
+            if kind != LEAF:
+                ways.append((value, None))
+        return top[0] if top and isinstance(top[0], dict) else {}
+
+    @cached_property
     def xml(self) -> str:
         """Return the text of XML from its root element on, without comments; "" for what is no XML."""
         if not self.text.lstrip().startswith("<"):
@@ -158,6 +186,30 @@ def _has_delimiter(line: str) -> bool:
     return "," in line or "\t" in line
 
 
+_NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angular|child_frame_id|name|parent|samples"
+
+
+def _are_poses(begin: Beginning, words: str) -> bool:
+    """Tell a map of names, or a list, whose entries are poses; of a long text the last one may be cut."""
+    if not (begin.yaml_keys or begin.text.lstrip().startswith("{")):
+        return False
+    top: dict[Any, Any] = {key: each for key, each in begin.document.items() if key != "angles"}
+    if len(top) == 1 and (inner := top.get("transforms", top.get("extrinsics"))):
+        top = dict(enumerate(inner)) if isinstance(inner, list) else inner if isinstance(inner, dict) else {}
+    entries = [*top.values()]
+    if len(begin.text) > LOOKED_AT and len(entries) > 1:
+        entries.pop()
+
+    def is_pose(entry: Any) -> bool:
+        if isinstance(entry, list):
+            return len(entry) == 7 and all(isinstance(each, str) for each in entry)
+        keys = set(entry) if isinstance(entry, dict) else set()
+        return any(re.fullmatch(words, key) for key in keys) and keys.isdisjoint(("header", "transform"))
+
+    names = [key for key in top if isinstance(key, str) and re.fullmatch(f"{words}|{_NO_NAME}", key)]
+    return bool(entries) and not names and all(map(is_pose, entries))
+
+
 # kind -> whether a beginning shows what a row says, the strongest first
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
@@ -170,6 +222,7 @@ _STRONG: dict[str, Shows] = {
     "yaml key": lambda begin, what: _count(begin.yaml_keys, what) > 0,
     "yaml inner": lambda begin, what: _count(begin.yaml_inner_keys, what) > 0,
     "text": lambda begin, what: re.search(what, begin.text) is not None,
+    "entries": _are_poses,
     "line": lambda begin, what: re.match(what, begin.data_line) is not None,
     "leaves": lambda begin, what: 5 * _count(begin.leaves, what) >= 4 * max(1, len(begin.leaves)),
 }
@@ -220,14 +273,20 @@ def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
 def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
     """Return the form whose sign is shown, and by what it is known; a form that is read goes before one that is not."""
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *unread()))
-    found = [form for form in fitting if not FORMATS[form].instead] or fitting
+    if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
+        return None, ""  # bytes that look like a line of something by chance
+    found = [form for form in fitting if not _is_unread(form, reads)] or fitting
     if not found:
         return None, ""
-    if FORMATS[found[0]].instead:
+    if _is_unread(found[0], reads):
         raise not_read(found[0], name)
     if len(found) > 1:
         raise FormatError(f"fits {' and '.join(found)}; give --in {'|'.join(found)}", source=name or "stdin")
     return found[0], _KNOWN_BY.get(kind, "its keys")
+
+
+def _is_unread(form: str, reads: tuple[str, ...]) -> bool:
+    return bool(FORMATS[form].instead) and set(reads).isdisjoint(FORMATS[form].reads)
 
 
 def not_read(form: str, name: str) -> FormatError:
@@ -256,18 +315,20 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if form:
         return form, known_by
     if "tree" not in reads and (what := not_text(head)):
-        raise FormatError(f"{what}; {_LISTED}", source=name or "stdin")
+        raise _no_text(what, name)
     if "tree" in reads and begin.xml:
         raise _unknown(begin, *reads, name=name)
     if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
         what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
         raise FormatError(what, source=name or "stdin")
     if form := by_suffix(name, readers(*reads)):
+        if (what := not_text(head)).startswith("not text but") and FORMATS[form].reader != BAG:
+            raise _no_text(what, name)
         return form, f"the suffix {name[name.rfind('.') :].lower()}"
     if form := by_suffix(name, unread()):
         raise not_read(form, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
-        raise FormatError(f"{what}; {_LISTED}", source=name or "stdin")
+        raise _no_text(what, name)
     found, _ = _fitting(begin, _WEAK, readers(*reads))
     if found and (otherwise or begin.has_data):
         return found[0], "its first line"
@@ -280,6 +341,21 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^\s*[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
     return "yaml", "nothing else"
+
+
+def _no_text(what: str, name: str) -> FormatError:
+    """Make the error for bytes that are no text: a cloud without a header can only be told."""
+    if name.lower().endswith(".bin"):
+        what = "binary data; of a cloud say which: --in kitti-bin (float32 x y z intensity) or nuscenes-bin (and ring)"
+    return FormatError(f"{what}; {_LISTED}", source=name or "stdin")
+
+
+def instead_of_text(error: FormatError, path: str) -> FormatError:
+    """Return the error for a file that is no text where a pose is wanted: what it is, not where its first byte is."""
+    with open(path, "rb") as file:
+        head = file.read(HEAD)
+    what = not_text(head)
+    return (_points_to_lookup(head, path) or _no_text(what, path)) if what else error
 
 
 _LISTED = "`frametool formats` lists what is read"

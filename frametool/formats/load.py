@@ -58,11 +58,12 @@ class Recording(InputFile):
         form: str | None = None,
         topics: Iterable[str] = (),
         answers: Answers = Answers(),  # noqa: B008 - it is frozen
+        reads: Sequence[str] = ("tree",),
     ) -> None:
         """Open a file, a bag's folder, or standard input for `-`, and find its form, unless it is told.
 
         stream: what was opened already, with nothing of it read.  topics: those of a recording that are read.
-        answers: what the form may leave open.
+        answers: what the form may leave open.  reads: of what its form may be, as the table says it.
         Raises FileProblem.
         """
         folder = None if form else of_folder(str(path))
@@ -72,7 +73,7 @@ class Recording(InputFile):
         try:
             self.form, self.known_by = form or folder or "", "what it holds" if folder else ""
             if not self.form:
-                self.form, self.known_by = detect(self.head(), "tree", name=self.path, empty="yaml")
+                self.form, self.known_by = detect(self.head(), *reads, name=self.path, empty="yaml")
         except BaseException:
             self.close()
             raise
@@ -253,6 +254,7 @@ class Assembly:
         self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were taken in one piece
         self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
         self.covariances: dict[str, Components] = {}  # child -> how uncertain its edge is
+        self.drawn: dict[str, str] = {}  # child -> what a drawing says of its edge
 
     @property
     def places(self) -> dict[str, Place]:
@@ -374,6 +376,7 @@ class Assembly:
                 made = made if made.moves else tree
         made.camera_axes |= self.axes
         made.covariances |= self.covariances
+        made.drawn |= self.drawn
         return made
 
     def _moving(self) -> TransformBuffer:
@@ -571,3 +574,4 @@ def _add(assembly: Assembly, file: Recording) -> None:
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
     assembly.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
+    assembly.drawn |= file.tally.drawn

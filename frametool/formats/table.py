@@ -29,7 +29,7 @@ class Format(NamedTuple):
     suffixes: of files in this form; names: what files are called to which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
         `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
-        holds one frame that moves
+        holds one frame that moves; a `drawing`: who hangs under whom without poses, by `read`, for `tree` alone
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
         are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`
@@ -87,6 +87,15 @@ def _read_tree(summary: str, module: str, **fields: Any) -> Format:
     return Format(summary, reads=("tree",), reader=module, **fields)
 
 
+def _drawing(summary: str, module: str, **fields: Any) -> Format:
+    """Return the row of a form that says how frames hang together and nothing of where they are."""
+    remedy = "no poses in it (frametool tree shows the frames); give what it was made from, as a bag of /tf, /tf_static"
+    return Format(
+        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, states="parent -> child, no poses",
+        instead=remedy, **fields,
+    )  # fmt: skip
+
+
 def _arrays(
     summary: str, module: str, *, writes: tuple[str, ...] = ("poses", "points", "arrays"), **fields: Any
 ) -> Format:
@@ -98,7 +107,8 @@ def _arrays(
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
 DH = ("standard", "modified")
-CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH}
+ORDERS = ("xyzw", "wxyz")
+CHOICES = {"direction": DIRECTIONS, "camera_axes": CAMERA_AXES, "dh": DH, "order": ORDERS}
 _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
@@ -114,6 +124,11 @@ _OPEN3D = (
 )
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
+)
+_POSE_WORDS = (
+    r"[xyz](?:_mm|_cm)?|[pt][xyz]|xyz\w*|(?:trans|translation|pos|position|location)(?:_[xyz])?|t|tvec|value|pose|"
+    r"(?:rot|rotation|q|quat|quaternion)(?:_?[xyzw])?|orientation|(?:roll|pitch|yaw|rpy|euler|axis_angle|rotvec)\w*|"
+    r"xyzw|wxyz|matrix|a[xyz]|theta"
 )
 _SRDF = (
     "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
@@ -143,6 +158,11 @@ _EUROC = (
 _ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.echo_format")
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
 _LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), states="metres")
+_BIN = _arrays(
+    "", "frametool.formats.rows.bin_cloud", writes=("points", "arrays"),
+    states="float32, metres, frame of the lidar; only --in tells it from other .bin",
+)  # fmt: skip
+_XYZI = ("x", "y", "z", "intensity")
 _LAS_HEAD = rb"LASF.{100}"
 _ARROW = _arrays("", "frametool.formats.rows.arrow_files", texts=True)
 
@@ -255,14 +275,14 @@ FORMATS = {
     "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
-    "tf2": Format("the listing of tf2's all_frames_as_yaml", writes=("tree",), writer="frametool.ros.tf2_listing"),
-    "dot": Format(
+    "tf2": _drawing(
+        "the listing of tf2's all_frames_as_yaml", "frametool.ros.tf2_listing", signs=(("yaml inner", "broadcaster"),)
+    ),
+    "dot": _drawing(
         "graphviz",
+        "frametool.formats.trees.drawings",
         suffixes=(".dot", ".gv"),
-        writes=("tree",),
-        writer="frametool.formats.trees.drawings",
-        signs=(("text", r"\A\s*(?:strict\s+)?digraph\b"),),
-        instead="a drawing holds no poses; give the tree or recording that it was made from",
+        signs=(("text", r"\A\ufeff?(?:\s|//[^\n]*\n)*(?:strict\s+)?digraph\b"),),
     ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(
@@ -350,6 +370,13 @@ FORMATS = {
         signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
         states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
+    "named": _tree(
+        "extrinsics by hand: a pose under each name",
+        "frametool.formats.trees.named",
+        signs=(("entries", _POSE_WORDS),),
+        states="pose of the name in its parent, metres, radians unless _deg",
+        asks=("frames", "direction", "order"),
+    ),
     "camchain": _tree(
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
         "frametool.formats.trees.camchain",
@@ -360,6 +387,15 @@ FORMATS = {
         ),
         states="target<-source as each key says; metres; intrinsics are not kept",
         asks=("direction", "frames"),
+    ),
+    "kalibr": _read_tree(
+        "results of Kalibr as text",
+        "frametool.formats.trees.kalibr",
+        signs=(
+            ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|T_(?:ci|ic):?[ \t]*\(\w+ to|Camera-system parameters:)"),
+        ),
+        states="target<-source; metres; q of a baseline is the inverse's, as in T_cn_cnm1; +- and timeshifts not read",
+        asks=("frames",),
     ),
     "opencv": _tree(
         "OpenCV FileStorage",
@@ -490,6 +526,8 @@ FORMATS = {
         signs=(("magic", rb"ply\r?\n"),),
         states="metres",
     ),
+    "kitti-bin": _BIN._replace(summary="point cloud of KITTI, .bin", columns=_XYZI),
+    "nuscenes-bin": _BIN._replace(summary="point cloud of nuScenes, .pcd.bin", columns=(*_XYZI, "ring")),
     "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), signs=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
     "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), signs=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
     "parquet": _ARROW._replace(

@@ -202,6 +202,13 @@ class CacheEntry:
         self.rate = track.count / max(self.length, SHORTEST)
 
 
+def listed_motion(rate: float, length: float, newest: float) -> str:
+    """Return in a few words how an edge moves of which tf2 has listed this: hertz, and seconds."""
+    if length > 0.0:
+        return f"{rate:.4g} Hz over {length:.4g} s"
+    return f"one at {newest:.9g} s" if newest else "static"
+
+
 def cache_entries(tree: Frames) -> list[CacheEntry]:
     """Return what tf2 lists, in the order of first mention."""
     return [CacheEntry(track) for frame in tree.frames if (track := tree.track(frame))]

@@ -123,7 +123,8 @@ class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
     __slots__ = (
-        "about", "axes", "has_joints", "names", "noise", "notes", "others", "projected", "rough", "unknown_joints",
+        "about", "axes", "drawn", "has_joints", "names", "noise", "notes", "others", "projected", "rough",
+        "unknown_joints",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -131,12 +132,14 @@ class Tally:
 
         about: what this file holds and what was taken for granted, told beside what its form means
         axes: frame -> the axes of the camera it is, `optical` or `opengl`
+        drawn: of a file without poses, child -> how often its edge comes
         projected: how far the worst matrix was from a rotation, in forms that round them
         has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
         each with the error that says so, for another file may have them
         """
         self.about = ""
         self.axes: dict[str, str] = {}
+        self.drawn: dict[str, str] = {}
         self.has_joints = False
         self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
@@ -237,6 +240,7 @@ class Answers(NamedTuple):
     joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
     joint_files: files with values of joints, over time or for good
     array: the one of several arrays that is read
+    order: of quaternions in lists, `xyzw` or `wxyz`
     """
 
     frames: tuple[str, ...] = ()
@@ -248,6 +252,7 @@ class Answers(NamedTuple):
     joints: Mapping[str, str] = MappingProxyType({})
     joint_files: tuple[str, ...] = ()
     array: str = ""
+    order: str = ""
 
     def names(self, *defaults: str) -> tuple[str, ...]:
         """Return the names of a form's frames: as told, then its own."""

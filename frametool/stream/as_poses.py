@@ -171,6 +171,7 @@ class FormatConverter:
     def _columns(self, stream: BufferedReader) -> Iterator[Step]:
         """Yield the rows of columns of numbers."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
+        file.form = self.form
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, warn
+from frametool.errors import FormatError, listing, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.clouds import NORMALS
 from frametool.formats.rows.column_file import (
@@ -429,6 +429,46 @@ def run_columns(
         other.of_columns(0, _in_other_form(columns, rows, empty, rows.of_batch(empty)))
     if (last := other or writer) is not None:
         yield from map(Outcome, last.end())
+
+
+class MergedClouds:
+    """Several files of columns, each moved by its own pose, as one file of a form: the columns that all of them have.
+
+    Numbers of one column get the type that holds those of all files.
+    """
+
+    def __init__(self, files: Sequence[tuple[ColumnFile, Request, str]], style: Style) -> None:
+        """Plan the rows of files, each with what is done with it and its name; raises as `run_columns`."""
+        self.parts = [(file, ColumnRows(file, request, source)) for file, request, source in files]
+        every = [{column.name: column for column in rows.named_columns()} for _, rows in self.parts]
+        self.writer = ColumnsWriter(style)
+        self.kinds: dict[str, Kind | None] = {}
+        for name in every[0]:
+            if all(name in columns for columns in every):
+                kinds = [columns[name].kind for columns in every]
+                self.kinds[name] = None if None in kinds else np.result_type(*kinds)
+        others = dict.fromkeys(name for columns in every for name in columns if name not in self.kinds)
+        if others:
+            warn(f"{listing(others)} left out: not all of the clouds have it")
+        if narrow := {kind.name for _, rows in self.parts for kind in rows.narrow.values()}:
+            warn(f"{', '.join(sorted(narrow))} columns are computed as float64 and rounded once")
+        for file, request, _ in files:
+            move_along(file, request)
+
+    def outcomes(self, at: int) -> Iterator[Outcome]:
+        """Yield what becomes of the batches of one file."""
+        file, rows = self.parts[at]
+        columns = rows.named_columns()
+        for batch in file.batches():
+            results = rows.of_batch(batch)
+            made = _in_other_form(columns, rows, batch, results)
+            typed = {
+                name: made[name] if kind is None else made[name]._replace(values=made[name].values.astype(kind))
+                for name, kind in self.kinds.items()
+            }
+            text = self.writer.of_columns(len(results.numbers), typed)
+            yield Outcome(text, rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read)
+            rows.mended = 0
 
 
 def _in_other_form(

@@ -81,12 +81,11 @@ def read_trajectory(
     if os.path.isdir(name) or inside or topics:
         return _of_tree(name, form, topics, answers, inside, normalize=normalize)
     file = InputFile(name)
-    if not form:
-        form = detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
-    is_record = "records" in FORMATS[form].reads and not re.search(TREE, file.head())
-    if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
-        return _of_tree(name, form, topics, answers, inside, file, normalize=normalize)
     try:
+        form = form or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
+        is_record = "records" in FORMATS[form].reads and not re.search(TREE, file.head())
+        if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
+            return _of_tree(name, form, topics, answers, inside, file, normalize=normalize)
         bad = policy(file.name)
         asked = Request(normalize=normalize, on_error=bad.on_error)
         return _of_records(file, form, bad, asked) if is_record else _of_rows(file, form, answers, bad, asked)

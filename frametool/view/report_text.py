@@ -179,7 +179,8 @@ def form_entry(name: str) -> dict[str, Any]:
 def option_of(ask: str) -> str:
     """Return how an option that answers a question is written: `--dh standard|modified`."""
     choices = "|".join(CHOICES.get(ask, ()))
-    return f"--{ask.replace('_', '-')}{' ' * bool(choices)}{choices}"
+    name = "from" if ask == "order" else ask.replace("_", "-")
+    return f"--{name}{' ' * bool(choices)}{choices}"
 
 
 def write_forms(entries: Iterable[dict[str, Any]]) -> str:

@@ -121,7 +121,8 @@ def _lines(tree: Frames, style: Style) -> Iterator[DrawnFrame]:
     """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
     children: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
     for track in tree.tracks():
-        label = _label(track, style, tree.covariances.get(track.child))
+        drawn = tree.drawn.get(track.child)
+        label = (drawn,) if drawn is not None else _label(track, style, tree.covariances.get(track.child))
         children.setdefault(track.parent, []).append((track.child, label))
     pending: list[tuple[str, tuple[str, ...], str, str]] = [(root, (), "", "") for root in reversed(tree.roots)]
     while pending:

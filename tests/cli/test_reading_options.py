@@ -192,7 +192,7 @@ def test_only_forms_that_are_read_are_offered_for_the_input(run: Run, monkeypatc
     monkeypatch.setenv("COMP_WORDS", "frametool tree --in ")
     monkeypatch.setenv("COMP_CWORD", "3")
     offered = {line.partition(",")[2] for line in run().out.splitlines()}
-    assert offered == set(readers("tree", "records", "rows", "arrays", "joints"))
+    assert offered == set(readers("tree", "records", "rows", "arrays", "joints", "drawing"))
 
 
 # --- names of frames, what forms leave open ---

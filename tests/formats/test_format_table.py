@@ -160,7 +160,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "documents behind dashes": (b"---\nx: 1\n", "rows records", "yaml"),
     "Autoware's poses": (b"# kit\nbase/x:\n  kit:\n    x: 0\n    y: -.5\n    roll: 1e-3\n    yaw: 0.0\n", "tree", "autoware"),
     "Autoware's poses in braces": (b"base: {kit: {x: 0, y: 1, z: 2, roll: 0, pitch: 0, yaw: 0}}\n", "tree", "autoware"),
-    "one level of numbers, as robot_calibration has it": (b"a_initial_values:\n  x: 0\n  roll: 0\n", "tree", "yaml"),
+    "one level of numbers, as robot_calibration has it": (b"a_initial_values:\n  x: 0\n  roll: 0\n", "tree", "named"),
     "three levels of numbers": (b"a:\n  b:\n    c:\n      x: 0\n      roll: 0\n", "tree", "yaml"),
     "a tree of ours with two levels": (b"frames:\n  a:\n    b:\n      x: 0\n", "tree", "yaml"),
     "a chain of Kalibr": (b"cam0:\n  T_cam_imu:\n  - [1, 0]\n  distortion_model: radtan\n", "tree", "camchain"),
@@ -346,7 +346,7 @@ def test_a_form_that_is_not_read_is_named_in_one_short_line_with_what_to_do(run:
 @pytest.mark.parametrize("suffix", [suffix for row in FORMATS.values() if row.instead for suffix in row.suffixes])
 def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Callable[..., Any], suffix: str) -> None:
     form = next(name for name, row in FORMATS.items() if suffix in row.suffixes)
-    assert FORMATS[form].instead in run("tree", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
+    assert FORMATS[form].instead in run("check", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
     assert run("tree", f"b{suffix}", files={f"b{suffix}": "frames: {a: {b: {xyz: [1, 2, 3]}}}"}).status == 0
 
 

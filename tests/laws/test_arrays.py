@@ -41,7 +41,8 @@ POINTS = {
     "points.jsonl": '{"point": [1, 2, 3], "id": 4, "label": "a"}\n{"point": [4, 5, 6], "id": 5, "label": null}\n',
     "points.yaml": "x: 1.0\ny: 2.0\nz: 3.0\n---\nx: 4.0\ny: 5.0\nz: 6.0\n",
 }
-ARRAYS = [name for name, row in FORMATS.items() if "arrays" in row.writes]
+# forms whose points have the same numbers always refuse what lacks one: tests/formats/test_bin_clouds.py
+ARRAYS = [name for name, row in FORMATS.items() if "arrays" in row.writes and not row.columns]
 OTHERS = [form for form in ARRAYS if form != "npy"]
 MOVES = (("convert",), ("invert",), ("apply", "--transform", "{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}"), ("convert", "--to", "rpy"))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.cloud_files import clouds_of
+from frametool.cli.cloud_files import SeveralClouds, clouds_of
 from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options
 from frametool.cli.options import (
     FILE,
@@ -25,7 +25,7 @@ from frametool.cli.options import (
     scale_option,
 )
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
-from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.streaming import SEVERAL, Stream, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
@@ -38,7 +38,7 @@ from frametool.text.numbers import NotFinite, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.explain.derive import ByTree
+    from frametool.explain.derive import ByTree, DerivationStyle
     from frametool.explain.given import Given
     from frametool.formats.load import Rules
     from frametool.geometry.types import Components
@@ -69,7 +69,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @rules_options
 @reading_options(streams=True)
 @array_option
-@stream_options
+@partial(stream_options, first=SEVERAL)
 def command(
     arguments: tuple[str, ...],
     pose: str | None,
@@ -99,7 +99,8 @@ def command(
     task = PoseTask(options, "points", "trajectory")
     stream, output = task.stream, task.output
     plan = task.plan() if task.derives else None
-    clouds = clouds_of(stream, output) if stream.path else None
+    several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
+    clouds = clouds_of(stream, output) if stream.path and several is None else None
     if pose is None:
         chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
         if scale:
@@ -118,6 +119,9 @@ def command(
         if rest not in ((), ("-",)) or time_column or frame_column or kinds or plan is not None:
             raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
         return clouds.run(way.from_frame, way.target)
+    if several is not None:
+        several.refuse_beside(is_more=covariance or plan is not None or rest not in ((), ("-",)))
+        return several.run(way.from_frame, way.target, has_source=way.has_source)
     kind = _kind(kinds, stream)
     if plan is not None:
         if covariance or scale:
@@ -125,17 +129,7 @@ def command(
         records = list(_sources(rest, kind))
         if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
-        try:
-            from frametool.explain import derive
-            from frametool.stream.request import Operation
-
-            asked = task.request(operation=Operation(moves=True))
-            source = pose_source(records[0], asked)
-            made = derive.apply(plan, way.explained(), source, kind=kind or "", degrees=asked.degrees,
-                                normalize=task.normalize, counters=way.counters, timeless=at is not None)  # fmt: skip
-        except FormatError as error:
-            raise usage_if_inline(error) from None
-        return task.write(made)
+        return _derived(task, plan, way, records[0], kind or "", timeless=at is not None)
     request = way.request(frame_column, time_column)
     request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
     request = task.at_places(request)
@@ -149,6 +143,23 @@ def command(
         output.values(values_of(list(_sources(rest, kind, stream.given_place)), request, output))
     way.tell()
     return status
+
+
+def _derived(
+    task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str, *, timeless: bool
+) -> int:
+    """Write the derivation of one record; timeless: a time was chosen for all."""
+    from frametool.explain import derive
+    from frametool.stream.request import Operation
+
+    asked = task.request(operation=Operation(moves=True))
+    try:
+        source = pose_source(record, asked)
+        made = derive.apply(plan, way.explained(), source, kind=kind, degrees=asked.degrees,
+                            normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
+    except FormatError as error:
+        raise usage_if_inline(error) from None
+    return task.write(made)
 
 
 def _kind(kinds: tuple[str, ...], stream: Stream) -> str | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options
-from frametool.cli.group import refuse_unused
+from frametool.cli.group import refuse_unused, settings
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
     FILE,
@@ -86,14 +86,16 @@ def command(
     if covariance:
         _check_covariance(output, derives=task.derives, fixed=fixed, by_row=bool(by_row))
     if by_row:
-        refuse_unused("is for one lookup; the rows of a table name theirs", "times", "source_at", "fixed", "given")
+        refuse_unused("is for one lookup; the rows of a table name theirs", "times", "source_at", "fixed")
     else:
-        rows = {*OPTIONS} - {"quiet", *(["on_error"] if times is not None else [])}
+        rows = {*OPTIONS} - {"quiet", "given", *(["on_error"] if times is not None else [])}
         refuse_unused("is about rows that name frames: give --target-column or --source-column", *rows)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
     frames = load_tree(tree, more, chosen, streams=bool(by_row))
+    if not any("order" in asks for _, asks in settings().inputs):
+        refuse_unused("changes nothing: that is not left open here", "given")
     sigmas = CarriedSigmas(frames) if covariance else None
     if sigmas is None:
         tell_unused_sigmas(frames)

@@ -34,10 +34,10 @@ def command(tree: str, more: Sequence[str], at: int | str | None, color: str, **
     TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. yaml and json are trees again
     and read back, frames that move with all their samples; csv is a table, a row an edge. dot draws what
     moves as ROS's view_frames does, tf2 is the listing of tf2's all_frames_as_yaml. --at draws the tree as it stood
-    at one time.
+    at one time. Of frames.gv and that listing names and rates are shown: they hold no poses.
     """
     taken = rules_of(options)
     output = Output("tree", "trajectory", **options)
-    frames = load_tree(tree, more, taken)
+    frames = load_tree(tree, more, taken, drawings=True)
     stamp = at_ns(at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), color)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.yaml_writer import flow, quoted
-from frametool.errors import listing, shown, warn
+from frametool.errors import bare, listing, shown, warn
 from frametool.formats.trees.tree_reader import XYZ, document_edges, read_flat_pose
 from frametool.formats.trees.written_poses import Precision, angles_of, standing_edges, tell_lonely_roots
 from frametool.geometry.representations import notation
@@ -50,7 +50,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
     """Read one pose; raises Misfit."""
-    for key in as_mapping(pose, f"the pose of {shown(child)} as {{{', '.join(KEYS)}}}"):
+    if not set(_RPY.columns).intersection(as_mapping(pose, f"the pose of {shown(child)} as {{{', '.join(KEYS)}}}")):
+        tree = f"frames: {{{bare(parent)}: {{{bare(child)}: {{xyz: [..]}}}}}}"
+        raise Misfit(f"taken for Autoware by its keys, whose poses have roll, pitch, yaw too; positions alone: {tree}")
+    for key in pose:
         if key not in KEYS:
             raise Misfit(f"unknown key {shown(key)}; a pose has {', '.join(KEYS)}", (key,), key=True)
     return Edge(parent, child, read_flat_pose(pose, _RPY, reading), path=(parent, child))

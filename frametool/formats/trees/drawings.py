@@ -3,19 +3,59 @@ r"""Drawings of trees for graphviz and mermaid: a node a frame, an arrow from pa
     "base" -> "camera" [label="xyz 0.1 0.0 1.2\nrpy 0.0 15.0 0.0 deg"];               dot
     n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]             mermaid
 
-Metres and degrees; read by those programs, not by frametool.  In graphviz, frames that move are drawn as ROS's
-view_frames does: who is whose parent, how often, and over which time.
+Metres and degrees.  In graphviz, frames that move are drawn as ROS's view_frames does: who is whose parent, how often,
+and over which time.  That is also read of graphviz: an arrow goes from parent to child, and poses there are none.
 """
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
-from frametool.frames.edge_log import CacheEntry, cache_entries
+from frametool.errors import FormatError
+from frametool.frames.edge_log import CacheEntry, cache_entries, listed_motion
+from frametool.geometry.rigid import IDENTITY
+from frametool.grammar.edges import Edge
 from frametool.grammar.result import Style, edge_label, graphviz
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
+    from frametool.grammar.edges import Options
+
+_WORD = r"""("(?:[^"\\]|\\.)*+"|[A-Za-z_\d./]++)"""
+_ARROW = rf"""{_WORD}\s*->\s*(?={_WORD}\s*(\[(?:[^\]"]|"(?:[^"\\]|\\.)*+")*+\])?)"""
+_SETTING = ("graph", "node", "edge")  # words of graphviz that are no names
+_FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most recent transform:\s*([\d.]+)")
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the frames and edges of a digraph; what it says of each goes to the tally, the poses are none."""
+    text = re.sub(r"(?m)^\s*//.*$", "", file.text)
+    if not text.rstrip().endswith("}"):
+        raise FormatError("the drawing ends before its last }; is the file whole?", source=file.name)
+    for node in re.finditer(rf"(?m)^\s*{_WORD}\s*;\s*$", text):
+        if (name := _unquoted(node[1])) not in _SETTING:
+            yield Edge(None, options.tally.names.bare(name), IDENTITY, line=1 + text.count("\n", 0, node.start(1)))
+    for arrow in re.finditer(_ARROW, text):
+        parent, child = (options.tally.names.bare(_unquoted(word)) for word in arrow.groups()[:2])
+        options.tally.drawn[child] = _about(arrow[3] or "")
+        yield Edge(parent, child, IDENTITY, line=1 + text.count("\n", 0, arrow.start()))
+
+
+def _unquoted(word: str) -> str:
+    return re.sub(r"\\(.)", r"\1", word[1:-1]) if word[0] == '"' else word
+
+
+def _about(attributes: str) -> str:
+    """Return what the label of an arrow says: how often its edge comes, of view_frames; else its words."""
+    numbers = [float(found[1]) for pattern in _FACTS if (found := re.search(pattern, attributes))]
+    if len(numbers) == len(_FACTS):
+        return listed_motion(*numbers)
+    label = re.search(r"""label\s*=\s*("(?:[^"\\]|\\.)*+")""", attributes)
+    return " ".join(re.sub(r"\\[nlr]", " ", label[1][1:-1]).split()) if label else ""
 
 
 def write_tree(tree: Frames, style: Style) -> str:

@@ -414,6 +414,17 @@ class FrameNames(NamedTuple):
     blocks: tuple[str, ...] = ()
 
 
+def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -> Meaning:
+    """Return the direction that was told for two frames; raises Unclear if none was."""
+    if not answers.direction:
+        one, other = DIRECTIONS
+        a, b = bare(parent), bare(child)
+        ways = f"--direction {one} (takes points of {b} to {a}) or {other} (of {a} to {b})"
+        raise Unclear(f"{shown(what)}: the key does not say its direction: give {ways}", path, key=True)
+    ends = (parent, child) if answers.direction == DIRECTIONS[0] else (child, parent)
+    return Meaning(*ends, child)
+
+
 class Matrices:
     """The poses of one document, and which of its matrices are none."""
 
@@ -499,7 +510,7 @@ class Matrices:
                 parent, child = (within(block.path, named, block.entries, key) for key in (target, source))
                 what = f"{target} and {source} beside {path[-1]}"
                 is_said = source != "source_frame"
-                return Meaning(parent, child, child) if is_said else self._told(what, path, parent, child)
+                return Meaning(parent, child, child) if is_said else directed(what, path, parent, child, self.answers)
         ways = ((key, other) for one, two in FRAME_KEYS for key, other in ((one, two), (two, one)))
         for key, other in ((key, other) for key, other in ways if key in block.entries):
             raise Misfit(f"{key} without {other}, so nothing says what the matrix is between", (*block.path, key))
@@ -514,17 +525,7 @@ class Matrices:
             parent = self.naming.base or ("imu" if block.name else "body")
             child = block.name or (told[self.asked] if self.asked < len(told) else key.rpartition(".")[2])
             self.asked += 1
-        return self._told(dotted(path), path, parent, child)
-
-    def _told(self, what: str, path: Path, parent: str, child: str) -> Meaning:
-        """Return the direction that was told for two frames; raises Unclear if none was."""
-        if not self.answers.direction:
-            one, other = DIRECTIONS
-            a, b = bare(parent), bare(child)
-            ways = f"--direction {one} (takes points of {b} to {a}) or {other} (of {a} to {b})"
-            raise Unclear(f"{shown(what)}: the key does not say its direction: give {ways}", path, key=True)
-        ends = (parent, child) if self.answers.direction == DIRECTIONS[0] else (child, parent)
-        return Meaning(*ends, child)
+        return directed(dotted(path), path, parent, child, self.answers)
 
     def _pair(self, block: MatrixBlock, key: str, turn: Grid, pair: Pair) -> Stated:
         """Read a rotation and the translation beside it."""
@@ -543,7 +544,7 @@ class Matrices:
             meaning = Meaning(target, source, source)
         else:
             parent, child = self.answers.names(self.naming.base or "body", block.name or key)
-            meaning = self._told(f"{key} and {pair.translation}", path, parent, child)
+            meaning = directed(f"{key} and {pair.translation}", path, parent, child, self.answers)
         rotation = within(path, read_turn, turn, self.reading)
         return Stated(*meaning[:3], (*within(place, read_shift, shift), *rotation), path)
 

@@ -1,0 +1,106 @@
+r"""What Kalibr prints and keeps as results-cam-*.txt and results-imucam-*.txt: poses between cameras and IMUs.
+
+    baseline T_1_0:
+        q: [-0.00087935 -0.00270995 -0.0008824 0.99999555] +- [..]    x y z w, of the inverse rotation
+        t: [-0.02997144 -0.00027389 0.00036353] +- [..]               cam0 as seen from cam1, metres
+    T_ci:  (imu0 to cam0):                                            takes points of imu0 to cam0
+    [[ 0.00852045 .. ]]                                               four rows of four
+
+The q of a baseline turns the other way than the matrix T_cn_cnm1 of the same camchain does: Kalibr's quaternions are
+those of JPL.  Read is what the matrix says; t is the same in both.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from frametool.errors import BadAnswer, FormatError, ValueInvalid
+from frametool.formats.trees.matrices import MATRIX, Stated, edges_of
+from frametool.geometry import quaternion
+from frametool.geometry.representations import notation
+from frametool.grammar.readers import INDICES, Misfit, Reading, read_numbers
+from frametool.grammar.rotation_spelling import read_spelled, rotation_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Edge, Options
+
+# a baseline by its two numbers; a matrix between two frames; one below the number of its IMU
+_HEAD = re.compile(
+    r"(?im)^[ \t]*(?:(?P<name>baseline T_(?P<to>\d+)_(?P<of>\d+)):|(?P<key>T_\w+|Baseline):?[ \t]*"
+    r"\((?P<source>\w+) to (?P<target>\w+)\)|(?P<imu>IMU\d+):[ \t\r]*$|(?P<own>T_i_b)[ \t\r]*$)"
+)
+_ROWS = re.compile(r"[^\n]*\n\s*\[\[([^\[\]]*(?:\]\s*\[[^\[\]]*)*)\]\]")
+_VECTOR = r"[^\n]*\n(?:[^\n]*\n)??[ \t]*{}:\s*\[([^\[\]]*)\]"
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield an edge a camera and IMU; what is stated twice is a check."""
+    reading = Reading(file.source, normalize=options.normalize)
+    text, lines, stated, imu = file.text, dict[str, int](), list[Stated](), ""
+    for head in _HEAD.finditer(text):
+        if head["imu"]:
+            imu = head["imu"].lower()
+            continue
+        target, source = (
+            (f"cam{head['to']}", f"cam{head['of']}") if head["name"]
+            else (imu, "imu0") if head["own"] else (head["target"], head["source"])
+        )  # fmt: skip
+        label = head["name"] or f"{head['own'] or head['key']} ({source} to {target})"
+        lines[label] = 1 + text.count("\n", 0, head.end())
+        reading.here = (label,)
+        try:
+            pose = _baseline(text, head, reading) if head["name"] else _matrix(text, head, reading)
+        except ValueInvalid as error:
+            raise FormatError(f"{label}: {error}", source=file.name, line=lines[label]) from None
+        if target != source:  # as the first IMU says of itself
+            child = max(target, source, key=lambda name: (name[:3] == "cam", name[:3], len(name), name))
+            both = target[:3] == source[:3] == "cam"
+            stated.append(Stated(target, source, child, pose, (label,), chained=both))
+    if not stated:
+        raise FormatError("no pose in it: one would stand under baseline T_1_0 or T_ci", source=file.name)
+    try:
+        edges = edges_of(stated, reading)
+    except Misfit as misfit:
+        raise FormatError(str(misfit), source=file.name, line=lines.get(str(misfit.path[0]), 0)) from None
+    for note in reading.notes:
+        options.tally.note_each(f"{note.path[0]}: {note.message}", lines[str(note.path[0])], note.rule)
+    yield from _named(edges, options, lines)
+
+
+def _baseline(text: str, head: re.Match[str], reading: Reading) -> Rigid:
+    """Read the q and t below a baseline; raises Misfit."""
+    turn, shift = (re.compile(_VECTOR.format(name)).match(text, head.end()) for name in "qt")
+    if turn is None or shift is None:
+        raise Misfit("expected q: [x y z w] and t: [x y z] below it")
+    if len(words := turn[1].split()) != 4:
+        raise Misfit(f"q: expected 4 numbers, found {len(words)}")
+    x, y, z = read_numbers(shift[1].split(), ("x", "y", "z"))
+    return x, y, z, *quaternion.conjugate(*rotation_of(notation("xyzw"), words, INDICES, reading))
+
+
+def _matrix(text: str, head: re.Match[str], reading: Reading) -> Rigid:
+    """Read the four rows below a line; raises Misfit."""
+    rows = _ROWS.match(text, head.end())
+    words = re.findall(r"[^\s\[\],]+", rows[1]) if rows else []
+    if len(words) != 16:
+        raise Misfit(f"expected a 4 x 4 matrix below it, found {f'{len(words)} numbers' if words else 'none'}")
+    position, rotation = read_spelled(MATRIX, words, INDICES, reading)
+    return *(position or (0.0, 0.0, 0.0)), *rotation
+
+
+def _named(edges: list[Edge], options: Options, lines: dict[str, int]) -> Iterator[Edge]:
+    """Yield edges under the names that were told: of the IMUs, then of the cameras, by their numbers."""
+    found = {name: None for each in edges for name in (each.parent or "", each.child)}
+    frames = sorted(found, key=lambda name: (name[:3] == "cam", len(name), name))
+    if len(told := options.answers.frames) > len(frames):
+        raise BadAnswer(f"--frames names {len(told)} frames, there are {len(frames)}: {', '.join(frames)}")
+    names = dict(zip(frames, options.answers.names(*frames), strict=True))
+    options.tally.about = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
+    for each in edges:
+        line = lines[str(each.path[0])]
+        yield each._replace(parent=names[each.parent or ""], child=names[each.child], line=line, path=())

@@ -1,0 +1,230 @@
+"""Extrinsics as people write them by hand: a map of names, or a list under `transforms:`, each with one pose.
+
+    lidar: {x: 0.9, y: 0.0, z: 2.0, roll: 0.0, pitch: 0.0, yaw: 1.57}
+    camera: {parent: lidar, translation: [0.1, 0, -0.2], quaternion: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
+    imu: {trans_x: 0.1, trans_y: 0.0, trans_z: 0.0, rot_x: 0.0, rot_y: 0.0, rot_z: 0.0, rot_w: 1.0}
+    base_to_left: {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}         asks for --direction
+    gps: {value: [0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0]}                                     asks for --from
+
+Metres, radians unless a key says degrees.  The pose is that of the name, or of `child`, in `parent`; where none is
+said, in `base` (--frames).  A list of four or seven does not say where w stands: --from xyzw|wxyz does, for all.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.yaml_writer import flow, quoted
+from frametool.errors import bare
+from frametool.formats.trees.matrices import FRAME_KEYS, Ambiguous, Meaning, directed, meaning_of
+from frametool.formats.trees.tree_reader import Unclear, document_edges, named
+from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
+from frametool.geometry import floats, quaternion, rigid
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.pose import POSE_KEYS, read_angle_unit, read_pose
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Path
+    from frametool.grammar.result import Style
+
+NAME = "named"
+WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is none of the names
+PARENTS, CHILDREN = (tuple(dict.fromkeys(keys[at] for keys in FRAME_KEYS[:4])) for at in (0, 1))
+_POSITIONS = ("trans", "pos", "t", "tvec", "translation", "position", "location")
+_TURNS = ("rot", "quat", "q", "rotation", "orientation", "quaternion")
+_WHOLE = ("value", "pose")  # seven numbers
+# the names of single numbers -> the key of the grammar under which they stand together
+_FLAT = {
+    **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t", "trans_", "translation_", "pos_")},
+    **{f"{word}{axis}": ("quaternion", axis) for axis in "xyzw" for word in ("q", "q_", "rot_", "quat_")},
+    **{f"{axis}_{unit}": (f"xyz_{unit}", axis) for axis in "xyz" for unit in ("mm", "cm")},
+    **{f"{name}{unit}": (f"rpy{unit}", name) for name in ("roll", "pitch", "yaw") for unit in ("", "_deg", "_rad")},
+    **{f"a{axis}": ("axis", axis) for axis in "xyz"},
+    **{f"{name}{unit}": (f"axis_angle{unit}", "angle") for name in ("theta", "angle") for unit in ("", "_deg", "_rad")},
+}
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield an edge a name."""
+    frames = options.answers.frames
+    base = options.answers.names("base")[0]
+    count, told, left = 0, False, dict[str, None]()
+
+    def take(value: Any, reading: Reading) -> Iterator[Edge]:
+        nonlocal count, told
+        reading.bare_numbers = False
+        top: dict[Any, Any] = as_mapping(value, "poses by the names of frames")
+        path: Path = ()
+        if "angles" in top:
+            reading.degrees = read_angle_unit(top.pop("angles"))
+        if len(top) == 1 and (wrapper := next(iter(top))) in WRAPPERS:
+            value, path = top[wrapper], (wrapper,)
+            top = dict(enumerate(value)) if type(value) is list else as_mapping(value, "poses by the names of frames")
+        for name, entry in top.items():
+            here: Path = (*path, name)
+            reading.here = here
+            try:
+                pose, ends = _entry(name, entry, reading, options, left)
+                told |= ends is None
+                target, source, child = ends or (base, str(name), str(name))
+                if child != source:
+                    pose = rigid.inverse(*pose)
+                yield Edge(source if child == target else target, child, pose, path=here)
+                count += 1
+            except Misfit as misfit:
+                reading.refuse(misfit.below(*here))
+
+    yield from document_edges(file, options, take)
+    default = f" in {bare(base)}{'' if frames else ' (--frames says another)'}" if told else ""
+    others = f"; {', '.join(map(bare, left))} left out" if left else ""
+    options.tally.about = f"{count} {'pose' if count == 1 else 'poses'}{default}{others}"
+
+
+def _entry(
+    name: str | int, entry: Any, reading: Reading, options: Options, left: dict[str, None]
+) -> tuple[Rigid, tuple[str, str, str] | None]:
+    """Read one pose, and the frames that it is between: target, source and the child; None where only its own name is.
+
+    Raises Misfit.
+    """
+    if type(entry) is list:
+        entry = {"value": entry}
+    fields = dict(as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}"))
+    parent, child = (_frame(fields, keys) for keys in (PARENTS, CHILDREN))
+    child = child or (None if type(name) is int else str(name))
+    if child is None:
+        raise Misfit("missing child; in a list an entry names its frame")
+    for key in [key for key, value in fields.items() if _is_remark(key, value)]:
+        left[key] = fields.pop(key)
+    places: dict[Path, str] = {}
+    mapping = _in_grammar(fields, options.answers.order, places)
+    try:
+        read = read_pose(mapping, reading)
+    except Misfit as misfit:  # at the key as it is written
+        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
+        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
+        raise
+    if read.position is None and read.rotation is None:
+        raise Misfit("neither position nor rotation; a pose has x, y, z, or a key like translation, and a rotation")
+    if parent is not None:
+        return read.components, (parent, child, child)
+    meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
+    if isinstance(meaning, Ambiguous):
+        ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
+        raise Unclear(f"{bare(child)} may name its two frames in several ways; give --frames {ways}", key=True)
+    if isinstance(meaning, Meaning) and not meaning.said:
+        meaning = directed(child, (), meaning.target, meaning.source, options.answers)
+    if meaning is None or not (meaning.target and meaning.source):
+        return read.components, None
+    return read.components, (meaning.target, meaning.source, meaning.child)
+
+
+_SELF = {"me": "cam", "imu": "imu", "body": "body"}
+
+
+def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
+    """Take the name of a frame out of an entry; raises Misfit for two of them."""
+    there = [key for key in keys if key in fields]
+    if len(there) > 1:
+        raise Misfit(f"{' and '.join(there)} in one entry; keep one", (there[1],), key=True)
+    found = named(fields, there[0]) if there else None
+    for key in there:
+        del fields[key]
+    return found
+
+
+def _is_remark(key: str, value: Any) -> bool:
+    """Tell a text beside a pose, a topic or a model, from what may be a misspelt number."""
+    known = key in POSE_KEYS or key in _FLAT or key in (*_POSITIONS, *_TURNS, *_WHOLE)
+    return not known and type(value) is str and re.match(r"[-+.]*\d", value) is None
+
+
+def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> dict[str, Any]:
+    """Return an entry with the keys of the grammar of poses; raises Misfit.
+
+    places: is filled with the keys under which these stand in the text
+    """
+    found: dict[str, Any] = {}
+    for key, value in fields.items():
+        if type(value) is not list and type(value) is not dict and key in _FLAT:
+            together, part = _FLAT[key]
+            parts = found.setdefault(together, {})
+            if type(parts) is not dict or part in parts:
+                raise Misfit(f"{bare(key)} says again what stands beside it; keep one", (key,), key=True)
+            parts[part], places[together, part] = value, key
+        elif key in _WHOLE:
+            if type(value) is not list or len(value) != 7:
+                found_here = f"{len(value)} numbers" if type(value) is list else kind(value)
+                raise Misfit(f"expected 7 numbers, found {found_here}", (key,))
+            _put(found, "xyz", value[:3], key)
+            _put(found, _ordered(value[3:], order, key), value[3:], key)
+        elif key in _POSITIONS:
+            _put(found, "xyz", value, key)
+        elif key in _TURNS:
+            _put(found, *_turn(value, order, key), key)
+        else:
+            _put(found, key, value, key)
+        places |= {(new,): key for new in found if (new,) not in places and type(value) in (list, dict)}
+    angle = next((key for key in found if key.startswith("axis_angle") and type(found[key]) is dict), "")
+    if axis := found.pop("axis", None):
+        if not angle or axis.keys() != {"x", "y", "z"}:
+            raise Misfit("ax, ay, az and theta belong together: an axis and the angle about it")
+        found[angle] = {"axis": [axis[each] for each in "xyz"], **found[angle]}
+    elif angle and found[angle].keys() == {"angle"}:  # about z, as yaw alone
+        _put(found, angle.replace("axis_angle", "rpy"), {"yaw": found.pop(angle)["angle"]}, "theta")
+    for key, parts, least in (("rpy", ("roll", "pitch", "yaw"), {"yaw"}), ("quaternion", "xyzw", set())):
+        for spelled in (key, f"{key}_deg", f"{key}_rad"):
+            given = found.get(spelled)
+            if type(given) is dict and given.keys() != {*parts} and given.keys() != least:
+                missing = ", ".join(part for part in parts if part not in given)
+                raise Misfit(f"half a rotation: missing {missing} beside {', '.join(given)}")
+    return found
+
+
+def _put(found: dict[str, Any], key: str, value: Any, given: str) -> None:
+    """Keep a value; raises Misfit for the second position, or for what stands there twice."""
+    if key in found:
+        raise Misfit(f"{bare(given)} says again what stands beside it; keep one", (given,), key=True)
+    found[key] = value
+
+
+def _turn(value: Any, order: str, key: str) -> tuple[str, Any]:
+    """Return the key of the grammar for a rotation, by its shape, and its value; raises Misfit."""
+    if type(value) is list and len(value) == 4 and not any(type(each) is list for each in value):
+        return _ordered(value, order, key), value
+    if type(value) is list and (len(value) == 9 or any(type(each) is list for each in value)):
+        return "matrix", value
+    if type(value) is dict and not {"roll", "pitch", "yaw"}.isdisjoint(value):
+        return "rpy", value
+    if type(value) is dict and value.keys() == {"qx", "qy", "qz", "qw"}:
+        return "quaternion", {name[1]: each for name, each in value.items()}
+    if type(value) is list and len(value) == 3:
+        what = f"{bare(key)} of 3 numbers does not say what they are"
+        raise Misfit(f"{what}; write rpy, rpy_deg or rotvec", (key,), key=True)
+    return "quaternion", value
+
+
+def _ordered(value: list[Any], order: str, key: str) -> str:
+    if not order:
+        numbers = ", ".join(str(each) for each in value)
+        what = f"{bare(key)} [{bare(numbers)}] does not say where w stands"
+        raise Unclear(f"{what}: give --from xyzw or --from wxyz, for all of the file", (key,), key=True)
+    return order
+
+
+def write_tree(tree: Frames, style: Style) -> str:
+    """Return a map of names; raises ValueInvalid for frames that move."""
+    texts = []
+    for parent, child, pose in standing_edges(tree, NAME):
+        x, y, z, w = quaternion.from_quaternion(*pose[3:], floats)
+        entry = {"parent": parent, "xyz": [*pose[:3]], "quaternion": {"x": x, "y": y, "z": z, "w": w}}
+        texts.append(f"{quoted(child)}: {flow(entry, style.number)}\n")
+    tell_lonely_roots(tree, NAME)
+    return "".join(texts)
