@@ -234,10 +234,10 @@ class AxesName(Text):
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the conventions; behind `_from_` those it may come from."""
-        from frametool.geometry.conventions import AXES, MIRRORED
+        from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
 
         begun, joint, _ = incomplete.partition("_from_")
-        known = {name: about for name, (_, about) in AXES.items()} | dict.fromkeys(MIRRORED, "mirrored")
+        known = {name: about for name, (_, about) in (AXES | MIRRORED).items()} | dict.fromkeys(SYSTEMS, "")
         return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 

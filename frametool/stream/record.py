@@ -479,7 +479,7 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record
 OTHER_WORDS = dict.fromkeys(("q", "quat", "quats", "quaternions", "orient", "rot", "so3"), "quaternion") | {
-    "pos": "xyz", "trans": "xyz", "tvec": "xyz", "loc": "xyz", "location": "xyz", "xzy": "xyz", "xyz_cm": "xyz_mm",
+    "pos": "xyz", "trans": "xyz", "tvec": "xyz", "loc": "xyz", "location": "xyz", "xzy": "xyz",
     "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "rvec": "rotvec", "angle_axis": "axis_angle",
 }  # fmt: skip
 

@@ -13,7 +13,7 @@ from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import REPRESENTATIONS, ROWS, notation
 from frametool.grammar.pose import TIMES
-from frametool.grammar.result import is_locked, rotation_entry, rotation_numbers
+from frametool.grammar.result import is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -66,7 +66,8 @@ def _describe(result: Result, style: Style) -> str:
     pose = result.pose
     lines: list[NumberLine] = []
     if pose.position is not None:
-        lines.append(NumberLine("translation", list(zip("xyz", pose.position, strict=True)), "m"))
+        (position,), unit = placed(pose.position, style).values(), "cm" if style.in_cm else "m"
+        lines.append(NumberLine("translation", list(zip("xyz", position, strict=True)), unit))
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)

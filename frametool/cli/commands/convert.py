@@ -22,6 +22,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
@@ -49,6 +50,7 @@ class ConvertCommand(Command):
 @click.option(
     "--world-axes", "world", type=AxesName(), metavar="A_from_B", help="axes of the frame it is seen from (help axes)"
 )
+@click.option("--all-axes", type=AxesName(), metavar="A_from_B", help="axes of both: unity_from_ros, or x,-y,-z")
 @click.option(
     "--find",
     type=TEXT,
@@ -66,6 +68,7 @@ def command(
     values: tuple[str, ...],
     axes: str | None,
     world: str | None,
+    all_axes: str | None,
     find: str | None,
     tolerance: float,
     unwrap: bool,
@@ -77,8 +80,7 @@ def command(
       frametool convert --from rpy_deg 0 0 90
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
       frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle -f json
-      frametool convert --axes optical --to rpy_deg
-      frametool convert --from rpy_deg 10 20 30 --to euler:all
+      frametool convert --all-axes unity_from_ros '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
       frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
@@ -89,6 +91,9 @@ def command(
     values = rejoined(values)
     task = PoseTask(options, "poses", "points")
     stream, output = task.stream, task.output
+    if all_axes is not None:
+        refuse_unused("is one side of what --all-axes changes; leave one of the two out", "axes", "world")
+        world, axes = _both_sides_of(all_axes)
     if task.derives:
         task.plan()
         one_argument(values[0] if values else axes or world)
@@ -99,6 +104,7 @@ def command(
     request = task.request(operation=operation, notations=forms, unwrap=unwrap)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
+        _say_centimetres(world, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.given is not None)
     if len(values) == 1 and not (is_numbers or stream.path) and task.has_table(values[0]):
         if task.derives:
@@ -174,6 +180,16 @@ def _changed(pose: Pose, operation: Operation) -> Pose:
     return Pose(position, components[3:7], pose.name, pose.parent)
 
 
+def _both_sides_of(text: str) -> tuple[str, str]:
+    """Return --world-axes and --axes that --all-axes means."""
+    from frametool.geometry.conventions import sides_of
+
+    try:
+        return sides_of(text)
+    except ValueInvalid as error:
+        raise click.UsageError(f"--all-axes: {error}") from None
+
+
 def _change_of_axes(axes: str | None, world: str | None) -> Operation:
     """Return the operation that --axes and --world-axes name."""
     from frametool.geometry.conventions import both_sides
@@ -195,6 +211,20 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
     left = (world, operation.left[3:]) if world and operation.left else None
     right = (axes, operation.right[0][3:]) if axes and operation.right else None
     return OtherAxes(left, right, operation.mirrors) if left or right else None
+
+
+def _say_centimetres(world: str | None, output: Output, *, is_anew: bool) -> None:
+    """Tell of the unit of axes whose users count in centimetres, and write what is written anew in it."""
+    from frametool.geometry.conventions import IN_CENTIMETRES
+
+    into, _, out_of = (world or "").partition("_from_")
+    if into == IN_CENTIMETRES:
+        separate = not any(each.representation.whole for each in output.notations)
+        output.style.in_cm = is_anew and separate and output.style.form in ("text", "yaml", "json")
+        here = "is written as xyz_cm" if output.style.in_cm else "stays in metres, or in the unit its name says"
+        say(f"note: Unreal counts in centimetres: xyz {here}")
+    if out_of == IN_CENTIMETRES:
+        say("note: Unreal counts in centimetres: xyz is read as metres, xyz_cm and x_cm say them")
 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:
