@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -522,7 +523,12 @@ rules_options = together(
     click.option("--tf2", type=click.Choice(POLICIES), help="take, refuse and complain as tf2 does"),
 )
 times_option = click.option(
-    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or FILE, one a line"
+    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or the stamps of FILE"
+)
+LIMIT = Time(latest=False)
+limit_options = together(
+    click.option("--start", type=LIMIT, metavar="TIME", help="leave out what is before"),
+    click.option("--stop", type=LIMIT, metavar="TIME", help="leave out what is after"),
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
@@ -551,30 +557,19 @@ def rules_of(options: dict[str, Any]) -> Rules:
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:
-    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the lines of a file or `-`, in order.
+    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the stamps of a file or `-`, in order.
 
-    Empty lines and those that begin with `#` are passed over.
     report: takes the errors of lines that are no time.
     """
-    from frametool.cli.poses import source_of
-
     if text.count(":") == 2:
         return _range(text)
     if re.match(r"[-+]?\.?\d", text) and not os.path.exists(text):
         return _listed(text)
-    source = source_of(text)
-    times: list[int] = []
-    bad = 0
-    for number, line in enumerate(source.text.splitlines(), 1):
-        if (stripped := line.strip()) and not stripped.startswith("#"):
-            try:
-                times.append(_stamp_ns(stripped))
-            except ValueInvalid as error:
-                bad += 1
-                report(FormatError(str(error), source=source.name, line=number))
-    if not times and not bad:
-        raise FormatError("no times in it; write one a line", source=source.name)
-    return times
+    from frametool.stream.trajectories import read_stamps
+
+    if text == "-" and sys.stdin is not None and sys.stdin.isatty():
+        raise click.UsageError("standard input is a terminal; pipe something in")
+    return read_stamps(text, report, say)
 
 
 def _listed(text: str) -> list[int]:

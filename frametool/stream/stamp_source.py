@@ -74,13 +74,13 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
     from frametool.frames.stamps import parse_stamp
 
     bare = text.strip(" \t\"'")
-    if in_ns and not bare.endswith("ns"):
+    if in_ns and not bare.endswith("s"):
         if not bare.lstrip("+-").isdecimal():
             raise ValueInvalid(f"{shown(bare)} is not a time in integer nanoseconds")
         bare += "ns"
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) > LARGEST:
-        remedy = "; are these some? then call them stamp_ns"
+        remedy = "; are these some? then write ns behind them, or call them stamp_ns"
         raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
     return stamp_ns
 
