@@ -51,6 +51,7 @@ class CommandSettings:
     stamps: str | None = None
     edges = False
     array: str | None = None
+    time_offset: int | None = None
     reads_trees = False
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
 
@@ -120,14 +121,17 @@ HELP_OPTION = click.Option(
 # heading -> names of the parameters under it; all others stand first, they are what the command is about
 GROUPS = {
     "Files": ("more", "with_a", "with_b", "input_forms", "topics", "quiet", "verbose"),
-    "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
+    "Time (help time)": (
+        "at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2",
+    ),
     "Rotations (help rotations)": ("given", "notations", "deg", "keep_sign", "normalize"),
     "Rows (help streams)": (
         "input_path", "columns", "frame_column", "target_column", "source_column", "keep", "prefix", "header", "unwrap",
         "on_error", "max_errors", "jobs",
     ),
     "Result": ("format_name", "precision", "covariance", "output", "force", "explain", "explain_full", "explain_step"),
-    "What a form of file leaves open (help formats)": (
+    "What a form of file leaves open (help formats), and stamps (help time)": (
+        "time_offset", "start", "stop",
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array",
     ),
 }  # fmt: skip

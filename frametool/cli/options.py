@@ -526,18 +526,34 @@ times_option = click.option(
     "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or the stamps of FILE"
 )
 LIMIT = Time(latest=False)
+offset_option = _setting(
+    "--time-offset", "time_offset", type=LIMIT, metavar="SECONDS", help="add this to all stamps read"
+)
 limit_options = together(
+    offset_option,
     click.option("--start", type=LIMIT, metavar="TIME", help="leave out what is before"),
     click.option("--stop", type=LIMIT, metavar="TIME", help="leave out what is after"),
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
-moving_options = together(rules_options, reading_options(), verbose_option)
+moving_options = together(rules_options, offset_option, reading_options(), verbose_option)
 tree_options = together(moving_options, pose_options, rotation_options)
 color_option = click.option(
     "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
     help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
 )  # fmt: skip
+
+
+def window_of(start: int | None, stop: int | None, column: str | None = None) -> tuple[int, int] | None:
+    """Return the first and the last nanosecond that --start and --stop leave, None without either."""
+    if column is not None and start is stop is None and not settings().time_offset:
+        raise click.UsageError("--time-column is for --time-offset, --start and --stop")
+    if start is not None and stop is not None and start > stop:
+        raise click.UsageError("--start is after --stop")
+    from frametool.frames.stamps import FURTHEST_NS
+
+    ends = -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
+    return None if start is stop is None else ends
 
 
 def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:

@@ -10,6 +10,7 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats, uncertainty
 from frametool.geometry.batch_validation import read_rotations
+from frametool.grammar.names import in_nanoseconds
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import (
@@ -64,6 +65,7 @@ class Plan(NamedTuple):
     beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
     timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
     remedies: for each shape, what to do where its angles are degrees
+    offset_ns: what is added to the stamps of rows; window: the first and the last that are left
     yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
     """
 
@@ -86,6 +88,8 @@ class Plan(NamedTuple):
     beside: str = ""
     gathered: Gathered | None = None
     remedies: tuple[str, ...] = ()
+    offset_ns: int = 0
+    window: tuple[int, int] | None = None
 
 
 class State:
@@ -121,6 +125,7 @@ class Run:
         self.count = len(block.places)
         numbers = self._read()
         self._check_covariances(numbers)
+        self.outside = self._outside() if plan.window and self.count else set[int]()
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -130,8 +135,11 @@ class Run:
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
-        if self.reasons or self.lone is not None:
-            gone = {*self.reasons, self.lone}
+        if self.outside:
+            self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
+            self.mended = [row for row in self.mended if row not in self.outside]
+        if self.reasons or self.outside or self.lone is not None:
+            gone = {*self.reasons, *self.outside, self.lone}
             self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
         if plan.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
@@ -249,8 +257,9 @@ class Run:
         """Read the stamps of the rows."""
         if self.block.times is not None:
             return self.block.times
-        stamps, column = self.block.stamps[at], self.plan.timed.column if self.plan.timed else ""
-        in_ns = self.plan.timed is not None and self.plan.timed.in_ns
+        timed, beside = self.plan.timed, self.plan.beside
+        stamps, column = self.block.stamps[at], timed.column if timed else beside
+        in_ns = timed.in_ns if timed else len(stamps) == 1 and in_nanoseconds(beside)
         times, reasons = read_stamps(stamps, in_ns=in_ns)
         for row, reason in reasons.items():
             self._blame(row, column, reason)
@@ -273,7 +282,12 @@ class Run:
         return "the result is not finite: the numbers are too large"
 
     def _good(self) -> list[int]:
-        return [row for row in range(self.count) if row not in self.reasons]
+        return [row for row in range(self.count) if row not in self.reasons and row not in self.outside]
+
+    def _outside(self) -> set[int]:
+        """Return the rows before the first or after the last of the times that are wanted."""
+        times, (first, last) = self._times(0), self.plan.window or (0, 0)
+        return {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
 
     def _with_before(self, pose: Rigid, state: State) -> list[Rigid]:
         if not self.plan.operation.looks_back:

@@ -302,6 +302,7 @@ class Request(NamedTuple):
     gathered: takes the poses, nothing is written then
     all_numbers: all numbers of a result are wanted, also those that do not change
     canonical: results are written anew rather than in the text of their records
+    offset_ns: what is added to the stamps of rows and records; window: the first and the last that are left
     """
 
     operation: Operation = Operation()
@@ -331,6 +332,8 @@ class Request(NamedTuple):
     on_error: str = STOP
     all_numbers: bool = False
     canonical: bool = False
+    offset_ns: int = 0
+    window: tuple[int, int] | None = None
 
     @property
     def in_order(self) -> bool:

@@ -84,7 +84,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
         timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
-        frame_column=table.name(frames[0]) if len(frames) == 1 else "",
+        frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
+        window=request.window,
     ), layout  # fmt: skip
 
 

@@ -9,7 +9,16 @@ import click
 
 from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options, one_argument, pose_stream_options
 from frametool.cli.group import refuse_unused
-from frametool.cli.options import TEXT, AxesName, Command, Number, pose_result_options
+from frametool.cli.options import (
+    TEXT,
+    AxesName,
+    ColumnNames,
+    Command,
+    Number,
+    limit_options,
+    pose_result_options,
+    window_of,
+)
 from frametool.cli.poses import is_inline, pose_from_numbers, pose_source, rejoined, source_from_numbers, values_of
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
@@ -25,7 +34,7 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
-    from frametool.geometry.representations import Notation
+    from frametool.grammar.result import Style
     from frametool.stream.request import Operation
 
 
@@ -63,6 +72,8 @@ class ConvertCommand(Command):
 @pose_result_options("poses", "points")
 @explain_options
 @click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
+@click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of stamps, for the next three")
+@limit_options
 @pose_stream_options
 def command(
     values: tuple[str, ...],
@@ -72,6 +83,7 @@ def command(
     find: str | None,
     tolerance: float,
     unwrap: bool,
+    time_column: str | None,
     **options: Any,
 ) -> int:
     """Write one rotation or pose in other representations.
@@ -79,16 +91,15 @@ def command(
     \b
       frametool convert --from rpy_deg 0 0 90
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
-      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle -f json
       frametool convert --all-axes unity_from_ros '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
-      frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
     standard input, which is read without any argument too.
     """
     values = rejoined(values)
+    window = window_of(options.pop("start"), options.pop("stop"), time_column)
     task = PoseTask(options, "poses", "points")
     stream, output = task.stream, task.output
     if all_axes is not None:
@@ -101,7 +112,7 @@ def command(
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
-    request = task.request(operation=operation, notations=forms, unwrap=unwrap)
+    request = task.request(operation=operation, notations=forms, unwrap=unwrap, window=window, extra_column=time_column)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
         _say_centimetres(world, output, is_anew=bool(values) and values != ("-",))
@@ -125,7 +136,7 @@ def command(
         results = list(values_of(sources, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
     if find is not None:
-        output.style = output.style.in_notations(_found(poses, find, tolerance, degrees=output.style.degrees))
+        output.style = _found(poses, find, tolerance, output.style)
     if task.derives:
         if len(poses) != 1:
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")
@@ -155,8 +166,8 @@ def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
     return has_from
 
 
-def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool) -> tuple[Notation, ...]:
-    """Return the Euler conventions in which three angles are a rotation, as notations."""
+def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
+    """Return a style that writes the Euler conventions in which three angles are a rotation."""
     from frametool.geometry.conventions import find_euler
     from frametool.geometry.rotation import Rotation
 
@@ -168,9 +179,10 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
         raise click.UsageError(f"--find: {error}") from None
     if len(read) != 3:
         raise click.UsageError(f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
+    degrees = style.degrees
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
     axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
-    return tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes)
+    return style.in_notations(tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
 
 
 def _changed(pose: Pose, operation: Operation) -> Pose:

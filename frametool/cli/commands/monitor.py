@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import FILE, TEXT, Command, file_options, result_options
+from frametool.cli.options import FILE, TEXT, Command, file_options, offset_option, result_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import opened, state
@@ -25,6 +25,7 @@ MOST_TOLD = 3  # frames that come by the topics of two robots
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@offset_option
 @file_options
 @result_options("report")
 def command(recording: str, frames: Sequence[str], more: Sequence[str], normalize: bool, **options: Any) -> int:
