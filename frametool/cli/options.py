@@ -550,10 +550,11 @@ def window_of(start: int | None, stop: int | None, column: str | None = None) ->
         raise click.UsageError("--time-column is for --time-offset, --start and --stop")
     if start is not None and stop is not None and start > stop:
         raise click.UsageError("--start is after --stop")
+    if start is stop is None:
+        return None
     from frametool.frames.stamps import FURTHEST_NS
 
-    ends = -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
-    return None if start is stop is None else ends
+    return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
 
 
 def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001, "xyz_cm": 0.01}
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
-SPREAD = ("count", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg")
+SPREAD = ("count", "used", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg",
+          "std_x", "std_y", "std_z", "std_angle", "std_angle_deg")  # fmt: skip
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset(("name", "parent"))

@@ -36,11 +36,13 @@ from frametool.stream.stamp_columns import (
 )
 from frametool.stream.text_parts import Const, In, Instead, Out
 from frametool.text.numbers import read_number_or_angle
-from frametool.text.parse import parse_floats
+from frametool.text.parse import half_units, parse_floats
+from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.gathering import Gathered
     from frametool.stream.request import Operation
@@ -48,7 +50,7 @@ if TYPE_CHECKING:
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.stream.text_parts import Piece
-    from frametool.text.spans import Flags, Floats, Ints, Spans
+    from frametool.text.spans import Flags, Floats, Ints
 
 
 
@@ -315,6 +317,10 @@ class Run:
         if shape.joined:
             self._check_tail(numbers, names, shape.joined.tail)
         found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
+        rule = shape.notation.representation.batch
+        if rule and rule.explained and self.block.values is None and (found.mended.size or found.reasons):
+            self._take_as_meant(rule, given, [first + at for at in shape.rotation_at], {*found.mended, *found.reasons})
+            found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
         if found.mended.size and not self.rounded:
@@ -327,6 +333,16 @@ class Run:
         self.off = max(self.off, found.off)
         self._doubt(shape, given, first)
         return found.quaternions
+
+    def _take_as_meant(self, rule: BatchRule, given: list[Floats], places: Sequence[int], rough: set[int]) -> None:
+        """Replace the rotations of rows that are off by no more than the digits they are written with."""
+        rows, cells = np.array(sorted(rough), np.int64), self.block.numbers
+        own = [column[rows] for column in given]
+        halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
+        meant = rule.explained is not None and rule.explained(own, halves, arrays)
+        for at, numbers in enumerate(rule.repair(*own, arrays)):
+            given[at] = given[at].copy()
+            given[at][rows] = np.where(meant, numbers, own[at])
 
     def _doubt(self, shape: Shape, given: Sequence[Floats], first: int) -> None:
         """Wonder about the first row with a bare angle beyond a full turn."""

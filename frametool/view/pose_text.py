@@ -111,10 +111,10 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
 
 def _extra_lines(extras: dict[str, Any]) -> Iterator[NumberLine]:
     """Yield the lines of what is only said about a pose."""
-    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s"}
+    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s", "std": "m", "std_angle": "rad"}
     for key, value in extras.items():
         if isinstance(value, float):
-            unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
+            unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
             yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
         elif sigmas := _sigmas(key, value):
             whole = " ".join(sigmas)
