@@ -213,7 +213,7 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
         off[axes] = quaternion.distance(*made, *rotation.components, floats)
     near = min(off, key=off.__getitem__)
     if off[near] > tolerance:
-        found = f"{near} is off by {off[near]:g}"
+        found = f"{near} is off by {off[near]:g}, which --tolerance {1.01 * off[near]:.2g} takes"
         raise ValueInvalid(f"no Euler convention gives these angles within {tolerance:g} rad; {found}")
     return [axes for axes, angle in off.items() if angle <= tolerance]
 

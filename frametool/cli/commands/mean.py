@@ -98,7 +98,9 @@ def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tup
     left_out: list[str] = []
     if robust:
         found = solve_mean(transforms, weights=weights)
-        mean, spread, covariance = found.transform, found.spread, found.covariance
+        mean, spread = found.transform, found.spread
+        heavy = None if weights is None else [weights[at] for at in found.used.nonzero()[0].tolist()]
+        covariance = covariance_of(transforms[found.used], mean, heavy)
         extras["used"] = int(found.used.sum())
         for row in found.left_out.nonzero()[0].tolist():
             metres, radians = (math.hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
