@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, AnyStr, NamedTuple
 
 from frametool.documents.document import parse_nodes
 from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.frames.stamps import format_stamp
 from frametool.geometry.rigid import EXACT
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, kind
@@ -91,6 +90,8 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
 
 def stamp_text(written: str, stamp_ns: int, *, in_ns: bool) -> str:
     """Write another stamp as one was written: nanoseconds as such, seconds with no fewer decimals."""
+    from frametool.frames.stamps import format_stamp
+
     bare = written.strip()
     if bare.endswith("ns"):
         return f"{stamp_ns}ns"
