@@ -285,6 +285,7 @@ def listing(names: Iterable[str], most: int = 20) -> str:
     from heapq import nsmallest
 
     everything = list(names)
+    most += len(everything) == most + 1  # the last one takes no more room than a word on it
     more = f" and {len(everything) - most} more" if len(everything) > most else ""
     return ", ".join(bare(name) for name in nsmallest(most, everything)) + more
 

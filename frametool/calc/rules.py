@@ -9,6 +9,7 @@ from __future__ import annotations
 import operator
 from contextlib import suppress
 from functools import partial
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from frametool.calc.parser import METRE, PLAIN, RADIAN, CalcError, frame_text
@@ -44,10 +45,18 @@ MOST = 2  # suggestions in one message
 PLACED = (POINT, VECTOR)
 
 
+def inverse_text(term: Term) -> str:
+    """Write the inverse of a term: that of an inverse is what stands in it."""
+    inner = term.text[4:-1]
+    depths = list(accumulate((each == "(") - (each == ")") for each in inner))
+    is_inverse = term.text.startswith("inv(") and term.text.endswith(")") and min(depths, default=0) >= 0
+    return inner if is_inverse and inner else f"inv({term.text})"
+
+
 def _forms(term: Term) -> tuple[tuple[str, str | None, str | None], ...]:
     """Return a pose and its inverse: text, target, source."""
     target, source = term.type.target, term.type.source
-    return (term.bracketed, target, source), (f"inv({term.text})", source, target)
+    return (term.bracketed, target, source), (f"{inverse_text(term)}", source, target)
 
 
 def rewritten_products(left: Term, right: Term) -> Iterator[str]:
@@ -72,7 +81,7 @@ def for_product(left: Term, right: Term, trees: Trees) -> str:
 def for_point(pose: Term, point: Term, trees: Trees) -> str:
     """Say how a point in another frame can be moved."""
     if point.type.target == pose.type.target:
-        return f"inv({pose.text}) takes points in {frame_text(pose.type.target)}"
+        return f"{inverse_text(pose)} takes points in {frame_text(pose.type.target)}"
     between = _looked_up(pose.type.source, point.type.target, trees)
     return f"{between or _arrow(pose.type.source, point.type.target)} stands between"
 
@@ -81,10 +90,10 @@ def for_same_frames(left: Term, right: Term) -> str:
     """Say how two poses of different frames go together; "" where nothing is found."""
     a, b = left.type, right.type
     if a.target is not None and a.target == b.source and a.source == b.target:
-        return f"; inv({right.text}) is {frame_text(b.source)}<-{frame_text(b.target)}"
+        return f"; {inverse_text(right)} is {frame_text(b.source)}<-{frame_text(b.target)}"
     if a.target is not None and a.target == b.target and a.source != b.source:
         seen = f"{frame_text(b.source)} seen from {frame_text(a.source)}"
-        return f"; for {seen}: inv({left.text}) * {right.bracketed}"
+        return f"; for {seen}: {inverse_text(left)} * {right.bracketed}"
     return ""
 
 
@@ -92,11 +101,11 @@ def for_one_target(left: Term, right: Term, trees: Trees) -> str:
     """Say how two poses come to be seen from one frame; "" where nothing is found."""
     a, b = left.type, right.type
     if b.source == a.target:
-        return f"; write inv({right.text}) for the second"
+        return f"; write {inverse_text(right)} for the second"
     if a.source == b.target:
-        return f"; write inv({left.text}) for the first"
+        return f"; write {inverse_text(left)} for the first"
     if a.source is not None and a.source == b.source:
-        return f"; write inv(..) for both: inv({left.text}), inv({right.text})"
+        return f"; write inv(..) for both: {inverse_text(left)}, {inverse_text(right)}"
     return for_other_frame(left, right, trees)
 
 
@@ -272,7 +281,7 @@ def over(left: Term, right: Term, _: Trees) -> Term:
     """Divide by a number."""
     a, b = left.type, right.type
     if b.kind != NUMBER:
-        hint = f"; for poses: inv({right.text}) * {left.bracketed}" if a.kind == b.kind == POSE else ""
+        hint = f"; for poses: {inverse_text(right)} * {left.bracketed}" if a.kind == b.kind == POSE else ""
         raise CalcError(f"cannot divide by {b.named}{hint}")
     if a.kind == NUMBER:
         type_ = Type(NUMBER, unit=_added(a.unit, raised(b.unit, -1.0)))

@@ -61,7 +61,12 @@ class PoseTask:
         from frametool.stream.request import Request
 
         degrees = self.output.style.degrees
-        made = Request(given=self.stream.given, degrees=degrees, normalize=self.normalize, **rest)
+        offset_ns = 0 if settings().reads_trees else settings().time_offset or 0
+        if rest.get("window") and rest.get("extra_column") is None:
+            rest["extra_column"] = ""
+        made = Request(
+            given=self.stream.given, degrees=degrees, normalize=self.normalize, offset_ns=offset_ns, **rest
+        )
         made = self.at_places(made)
         self.output.take_axes("", made.operation)
         return made

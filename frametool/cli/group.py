@@ -60,6 +60,7 @@ class CommandSettings:
     earth: Earth | None = None
     order: str | None = None
     row_order = ""
+    time_offset: int | None = None
     reads_trees = False
     inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
 
@@ -134,7 +135,10 @@ HELP_ALL = click.Option(
 # heading -> names of the parameters under it, those asked for most first; all others are what a command is about
 GROUPS = {
     "Files (help formats)": ("input_forms", "more", "with_a", "with_b", "topics", "quiet", "verbose"),
-    "Time (help time)": ("at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2"),
+    "Time (help time)": (
+        "at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2",
+        "start", "stop", "time_offset",
+    ),
     "Rotations (help rotations, help earth)": (
         "given", "notations", "deg", "normalize", "keep_sign", "local_axes", "origin", "zone",
     ),

@@ -1,4 +1,4 @@
-"""Look-ups for every row of a table: the frames are named in its columns."""
+"""Look-ups for every row of a table: its frames, its time or both stand in columns."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import refuse_unused
 from frametool.cli.options import ColumnNames, together
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
+from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar.pose_algebra import looked_up
 
 if TYPE_CHECKING:
@@ -27,31 +29,39 @@ def _column_option(end: str) -> Callable[..., Any]:
     return click.option(f"--{end}-column", type=ColumnNames(), metavar="NAME", help=about)
 
 
-column_options = together(_column_option("target"), _column_option("source"))  # `RowFrames` takes them
+column_options = together(  # `RowFrames` takes them
+    _column_option("target"),
+    _column_option("source"),
+    click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column of a table with each row's time"),
+)
 
 
 class RowFrames:
-    """Which columns name the frames of each row; true if one does."""
+    """Which columns name the frames and the time of each row; true if one does."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         """Take the options out of a command's."""
         self.target: str | None = options.pop("target_column")
         self.source: str | None = options.pop("source_column")
+        self.time: str | None = options.pop("time_column")
 
     def __bool__(self) -> bool:
-        """Return whether a column names a frame."""
-        return self.target is not None or self.source is not None
+        """Return whether a column names a frame or a time."""
+        return not (self.target is self.source is self.time is None)
 
     def run(
         self, task: PoseTask, tree: FrameTree | TransformBuffer, target: str | None, source: str | None, at: int | None,
-        sigmas: CarriedSigmas | None = None,
+        sigmas: CarriedSigmas | None = None, window: tuple[int, int] | None = None,
     ) -> int:  # fmt: skip
         """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's.
 
         sigmas: the covariances are wanted too
         """
         from frametool.stream.request import Operation
+        from frametool.stream.stamp_source import Timed
 
+        if self.time is not None and task.stream.options["columns"]:
+            refuse_unused("is not used: the pose is that of two frames", "columns")
         if self.target is not None and source is None:
             target, source = None, target
         for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
@@ -60,21 +70,32 @@ class RowFrames:
         fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
         frames = tuple(name for name in (self.target, self.source) if name is not None)
 
-        def edge_of(names: str) -> Components:
-            cells = names.split("\0") if len(frames) == 2 else [names]
-            if len(cells) > len(frames):
-                raise UnknownFrame(names, known=tree.frames)  # a NUL in a cell is no end of a name
-            ends = fixed_target or cells[0], fixed_source or cells[-1]
+        def ends_of(names: str | None) -> tuple[str, str]:
+            cells = (names or "").split("\0") if len(frames) == 2 else [names or ""]
+            if len(cells) > max(len(frames), 1):
+                raise UnknownFrame(names or "", known=tree.frames)  # a NUL in a cell is no end of a name
+            return fixed_target or cells[0], fixed_source or cells[-1]
+
+        def edge_of(names: str | None, own: int | None = at) -> Components:
+            ends = ends_of(names)
             if sigmas is None:
-                return tree.lookup(*ends, at).components
-            found = sigmas.noted(looked_up(tree, *ends, at, covariance=True))
+                return tree.lookup(*ends, own).components
+            found = sigmas.noted(looked_up(tree, *ends, own, covariance=True))
             return *found.pose.components, *found.extras["covariance"]
+
+        def many(names: str | None, times_ns: Any) -> Components:
+            ends = ends_of(names)
+            found = tree.lookup_many(*ends, times_ns, missing="nan").components
+            return found if sigmas is None else sigmas.beside(found, *ends, times_ns)
 
         forms = task.output.notations or (notation("quaternion"),)
         operation = Operation(uncertain=sigmas is not None)
+        width = EXACT if sigmas is None else UNCERTAIN
         request = task.request(
-            poses=0, frames=frames, pose_of_row_frame=edge_of, notations=forms, operation=operation
-        )
+            poses=0, frames=frames, pose_of_row_frame=edge_of, notations=forms, operation=operation,
+            timed=None if self.time is None else Timed(self.time, many, edge_of, width=width),
+            window=window,
+        )  # fmt: skip
         status = task.stream.run(request, task.output, tables_only=True)
         if sigmas is not None:
             sigmas.tell()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -223,10 +224,10 @@ class AxesName(Text):
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the conventions; behind `_from_` those it may come from."""
-        from frametool.geometry.conventions import AXES, MIRRORED
+        from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
 
         begun, joint, _ = incomplete.partition("_from_")
-        known = {name: about for name, (_, about) in AXES.items()} | dict.fromkeys(MIRRORED, "mirrored")
+        known = {name: about for name, (_, about) in (AXES | MIRRORED).items()} | dict.fromkeys(SYSTEMS, "")
         return {f"{begun}{joint}{name}" if joint else name: about for name, about in known.items() if name != begun}
 
 
@@ -522,16 +523,38 @@ rules_options = together(
     click.option("--tf2", type=click.Choice(POLICIES), help="take, refuse and complain as tf2 does"),
 )
 times_option = click.option(
-    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or FILE, one a line"
+    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or the stamps of FILE"
+)
+LIMIT = Time(latest=False)
+offset_option = _setting(
+    "--time-offset", "time_offset", type=LIMIT, metavar="SECONDS", help="add this to all stamps read"
+)
+limit_options = together(
+    offset_option,
+    click.option("--start", type=LIMIT, metavar="TIME", help="leave out what is before"),
+    click.option("--stop", type=LIMIT, metavar="TIME", help="leave out what is after"),
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
-moving_options = together(rules_options, reading_options(order=False), verbose_option)
+moving_options = together(rules_options, offset_option, reading_options(order=False), verbose_option)
 tree_options = together(moving_options, _ORDER, pose_options, rotation_options)
 color_option = click.option(
     "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
     help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
 )  # fmt: skip
+
+
+def window_of(start: int | None, stop: int | None, column: str | None = None) -> tuple[int, int] | None:
+    """Return the first and the last nanosecond that --start and --stop leave, None without either."""
+    if column is not None and start is stop is None and not settings().time_offset:
+        raise click.UsageError("--time-column is for --time-offset, --start and --stop")
+    if start is not None and stop is not None and start > stop:
+        raise click.UsageError("--start is after --stop")
+    if start is stop is None:
+        return None
+    from frametool.frames.stamps import FURTHEST_NS
+
+    return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
 
 
 def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
@@ -551,30 +574,19 @@ def rules_of(options: dict[str, Any]) -> Rules:
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:
-    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the lines of a file or `-`, in order.
+    """Read START:STOP:STEP (seconds; STOP counts if a step meets it), T,T,.., or the stamps of a file or `-`, in order.
 
-    Empty lines and those that begin with `#` are passed over.
     report: takes the errors of lines that are no time.
     """
-    from frametool.cli.poses import source_of
-
     if text.count(":") == 2:
         return _range(text)
     if re.match(r"[-+]?\.?\d", text) and not os.path.exists(text):
         return _listed(text)
-    source = source_of(text)
-    times: list[int] = []
-    bad = 0
-    for number, line in enumerate(source.text.splitlines(), 1):
-        if (stripped := line.strip()) and not stripped.startswith("#"):
-            try:
-                times.append(_stamp_ns(stripped))
-            except ValueInvalid as error:
-                bad += 1
-                report(FormatError(str(error), source=source.name, line=number))
-    if not times and not bad:
-        raise FormatError("no times in it; write one a line", source=source.name)
-    return times
+    from frametool.stream.trajectories import read_stamps
+
+    if text == "-" and sys.stdin is not None and sys.stdin.isatty():
+        raise click.UsageError("standard input is a terminal; pipe something in")
+    return read_stamps(text, report, say)
 
 
 def _listed(text: str) -> list[int]:

@@ -68,6 +68,7 @@ class Output:
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         self._holds_arrays = holds_arrays(form)
         self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
+        self.holds_all = self.is_trajectory or self._holds_arrays or form == "csv"  # rows, of which there may be many
         if self._holds_arrays:
             refuse_unused(f"is not used: {form} holds numbers, not their text", "precision")
         if self._holds_arrays and output is None and sys.stdout.isatty():

@@ -196,6 +196,13 @@ def pose_source(argument: str | Source, request: Request) -> Source:
     if not isinstance(argument, Source) and is_pasted(argument, request.given):
         argument = Source(INLINE, argument)
     source = source_of(argument)
+    if request.offset_ns:
+        from frametool.stream.stamp_source import at_other_times
+
+        text, count = at_other_times(source.text, request.offset_ns)
+        if not count:
+            raise FormatError("--time-offset changes nothing: no stamps in it", source=source.name)
+        source = Source(source.name, text)
     if source.name != INLINE and source.text.lstrip().startswith("<"):
         from frametool.formats.detect import refuse_robots
 

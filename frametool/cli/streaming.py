@@ -216,6 +216,12 @@ class Stream:
         if tables_only and form in RECORDS:
             raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
+        if request.offset_ns and form in RECORDS:
+            from frametool.stream.record_stream import at_other_times
+
+            stream = at_other_times(stream, form, request.offset_ns)
+        elif request.offset_ns and "arrays" in FORMATS[form].reads:
+            raise click.UsageError(f"--time-offset is for text, {form} holds numbers; convert it to csv first")
         output.take_axes(FORMATS[form].poses.axes, request.operation)
         if is_trajectory(form) and not output.notations:
             request = request._replace(notations=())  # its rows stay what they are

@@ -87,6 +87,14 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
     )
 
 
+def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = None) -> Array | None:
+    """Return the covariance of one of the poses (n,) whose mean is known, 6x6 as ROS has it; None of one alone."""
+    mass = validation.masses(weights, poses.shape)
+    count = int((mass > 0.0).sum())
+    off = PoseArrays.of(poses).errors(PoseArrays.of(mean)) * np.sqrt(mass)[:, None]
+    return off.T @ off * (count / mass.sum() / (count - 1)) if count > 1 else None
+
+
 def _middle(poses: Transform, roots: Array) -> Transform:
     """Return the pose that the others are nearest to, by the medians of metres and radians."""
     count = len(poses)

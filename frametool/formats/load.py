@@ -34,7 +34,7 @@ from frametool.formats.table import BAG, CHOICES, FORMATS, readers
 from frametool.frames.lookups import FrameTree, two_covariances
 from frametool.frames.policy import Refused
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, stop
+from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, at_other_times, stop
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
 from frametool.grammar.readers import alike, more_like_it
 
@@ -141,7 +141,10 @@ class Recording(InputFile):
         try:
             options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
             found = import_module(FORMATS[self.form].reader).read(self, options)
-            yield from self._scoped(found) if self.scopes else found
+            found = self._scoped(found) if self.scopes else found
+            if offset_ns := self.answers.time_offset:
+                found = (at_other_times(piece, offset_ns) for piece in found)
+            yield from found
         finally:
             self.close()
         if missing := self.topics.missing():

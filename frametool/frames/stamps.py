@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from typing import Any
 
 BILLION = 1_000_000_000
-_SECONDS = r"(?a)([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))?"
+_SECONDS = r"(?a)([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))? ?(s|ms|us)?"
+_BELOW = {None: 9, "s": 9, "ms": 6, "us": 3}  # decimals down to a nanosecond
 _NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
 
 
@@ -33,12 +34,14 @@ def whole_stamp(stamp_ns: Any) -> int:
     except TypeError:
         raise ValueInvalid(f"a stamp is integer nanoseconds, found {shown(stamp_ns)}") from None
     if not -FURTHEST_NS < stamp < FURTHEST_NS:
-        raise ValueInvalid(f"stamp {stamp} ns is beyond the year 2116; are these nanoseconds?")
+        whole, below = divmod(stamp, BILLION)
+        hint = "" if below or len(str(whole)) > 20 else f" then write {whole}ns"
+        raise ValueInvalid(f"stamp {shown(stamp)} ns is beyond the year 2116; are these nanoseconds?{hint}")
     return stamp
 
 
 def parse_stamp(text: str) -> int:
-    """Read `12.5` (seconds) or `12500000000ns` as nanoseconds; digits below a nanosecond must be 0.
+    """Read `12.5` (seconds), `500ms` or `12500000000ns` as nanoseconds; digits below a nanosecond must be 0.
 
     Raises ValueInvalid.
     """
@@ -48,7 +51,7 @@ def parse_stamp(text: str) -> int:
     if match is None or not (match[2] or match[3]) or len(text) > 60:
         raise NotATime(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
     sign, whole, fraction, exponent = match[1], match[2], match[3] or "", int(match[4] or 0)
-    shift = 9 - len(fraction) + exponent
+    shift = _BELOW[match[5]] - len(fraction) + exponent
     digits = int(whole + fraction)
     if shift < 0:
         digits, lost = divmod(digits, int(10**-shift))

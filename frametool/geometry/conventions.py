@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import sqrt
 
 from frametool.errors import ValueInvalid, nearest, shown
-from frametool.geometry import euler, floats, quaternion
+from frametool.geometry import euler, floats, matrix, quaternion
 from frametool.geometry.rotation import Rotation
 
 TYPE_CHECKING = False
@@ -31,9 +31,12 @@ AXES: dict[str, tuple[Rotation, str]] = {
 # flu_from_NAME behind a mirror across y: axes that are left-handed
 MIRRORED: dict[str, tuple[Rotation, str]] = {
     "unity": (AXES["optical"][0], "Unity, left-handed: x right, y up, z forward"),
+    "unreal": (AXES["flu"][0], "Unreal Engine, left-handed: x forward, y right, z up, in cm"),
 }
-BODY_OF = {"enu": "flu", "ned": "frd"}  # the body's axes that go with those of the world
-ALIASES = {"opencv": "optical", "ros": "flu"}
+SYSTEMS = {"ros": ("enu", "flu"), "aircraft": ("ned", "frd")}  # the axes of the world, and of bodies in it
+ALIASES = {"opencv": "optical", "blender": "opengl"}
+IN_CENTIMETRES = "unreal"
+OWN = "x,-y,-z"  # axes of one's own, which make (x, -y, -z) of (x, y, z)
 
 
 def axes_change(target: str, source: str) -> Rotation:
@@ -42,17 +45,20 @@ def axes_change(target: str, source: str) -> Rotation:
     Raises:
         ValueInvalid: unknown name; with the nearest and those there are.
     """
-    return (_named(target).inverse() @ _named(source)).canonical()
+    return named_rotation(f"{target}_from_{source}")
 
 
 def named_rotation(text: str) -> Rotation:
-    """Return the rotation that a text names: `optical` is flu_from_optical, `ned_from_enu` any two.
+    """Return the rotation that a text names: `optical` is flu_from_optical, `ned_from_enu` any two, or `x,-y,-z`.
 
     Raises:
-        ValueInvalid: unknown name; with the nearest and those there are.
+        ValueInvalid: unknown name; with the nearest and those there are; a mirror.
     """
-    target, joint, source = text.partition("_from_")
-    return axes_change(target, source) if joint else axes_change("flu", text)
+    change = named_change(text)
+    if change.mirrors:
+        both = f"--all-axes {text if '_from_' in text or ',' in text else f'{text}_from_ros'}"
+        raise ValueInvalid(f"{text} is left-handed (mirrored) and no rotation; convert changes both sides: {both}")
+    return change.rotation.canonical()
 
 
 class AxesChange:
@@ -86,21 +92,74 @@ def _in_mirror(rotation: Rotation) -> Rotation:
     return Rotation.of(-x, y, -z, w)
 
 
-def named_change(text: str) -> AxesChange:
+def named_change(text: str, *, of_world: bool = False) -> AxesChange:
     """Return the change of axes that a text names: as `named_rotation`, also mirrored ones such as `unity_from_ros`.
+
+    of_world: the names of systems, `ros` and `aircraft`, mean their axes of the world, not those of bodies
 
     Raises:
         ValueInvalid: unknown name; with the nearest and those there are.
     """
+    if "," in text:
+        return _own_axes(text)
     target, joint, source = text.partition("_from_")
     if not joint:
         target, source = "flu", text
-    return _flu_from(target).inverse().after(_flu_from(source))
+    back, there = (_flu_from(_system(name)[not of_world]) for name in (target, source))
+    return back.inverse().after(there)
 
 
 def _flu_from(name: str) -> AxesChange:
     """Return flu_from_NAME."""
-    return AxesChange(MIRRORED[name][0], mirrors=True) if name in MIRRORED else AxesChange(_named(name))
+    return AxesChange({**AXES, **MIRRORED}[name][0], mirrors=name in MIRRORED)
+
+
+def _own_axes(text: str) -> AxesChange:
+    """Return the change that makes (x, -y, -z) of (x, y, z) for `x,-y,-z`."""
+    rows = [[float((letter == each) - (f"-{letter}" == each)) for letter in "xyz"] for each in _letters(text)]
+    mirrors = matrix.determinant(*matrix.nine(entry for row in rows for entry in row)) < 0.0
+    sign = -1.0 if mirrors else 1.0
+    entries = matrix.nine(entry for x, y, z in rows for entry in (x, sign * y, z))
+    return AxesChange(Rotation.of(*matrix.to_quaternion(*entries, floats)), mirrors=mirrors)
+
+
+def _letters(text: str) -> list[str]:
+    """Return three signed letters, each axis once; raise ValueInvalid for anything else."""
+    found = [each.strip().removeprefix("+") for each in text.split(",")]
+    if sorted(each.removeprefix("-") for each in found) != ["x", "y", "z"]:
+        raise ValueInvalid(f"{shown(text)} is no axes of one's own: x, y and z once each, with their signs, as {OWN}")
+    return found
+
+
+def sides_of(text: str) -> tuple[str, str]:
+    """Return the changes on the left and on the right that `A_from_B` of both sides is: p becomes W p B.
+
+    Between systems: `aircraft_from_ros` is ned_from_enu and flu_from_frd; one set of axes, and axes of one's own, are
+    those of world and bodies alike, so that B is the inverse of W.
+
+    Raises:
+        ValueInvalid: unknown name; no `A_from_B`.
+    """
+    if "," in text:
+        letters = _letters(text)
+        at = {each.removeprefix("-"): ("-" * each.startswith("-")) + "xyz"[place] for place, each in enumerate(letters)}
+        return ",".join(letters), ",".join(at[letter] for letter in "xyz")
+    target, joint, source = text.partition("_from_")
+    (world, body), (from_world, from_body) = _system_with(target), _system_with(source if joint else "ros")
+    if not joint:
+        raise ValueInvalid(f"{shown(text)} is one end of a change; give A_from_B, as {text}_from_ros")
+    return f"{world}_from_{from_world}", f"{from_body}_from_{body}"
+
+
+def _system(name: str) -> tuple[str, str]:
+    """Return the axes of the world and of bodies that a name of both means."""
+    name = ALIASES.get(name, name)
+    return SYSTEMS[name] if name in SYSTEMS else (_known(name),) * 2
+
+
+def _system_with(name: str) -> tuple[str, str]:
+    """Return the axes of the system that a name means, or is one of: `ned` is of aircraft."""
+    return next((axes for axes in SYSTEMS.values() if name in axes), None) or _system(name)
 
 
 def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bool, Rotation | None]:
@@ -112,14 +171,21 @@ def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bo
         ValueInvalid: unknown name; a mirror on one side only, where the result would be no rotation.
     """
     identity = AxesChange(Rotation.identity())
-    left = identity if world is None else named_change(world)
+    left = identity if world is None else named_change(world, of_world=True)
     right = identity if axes is None else named_change(axes)
     if left.mirrors != right.mirrors:
         told = world if left.mirrors else axes
         raise ValueInvalid(
-            f"{told} is a mirror: on one side of a pose it leaves no rotation; give both sides, "
-            "e.g. --world-axes unity_from_ros --axes ros_from_unity"
+            f"{told} is a mirror, which on one side leaves no rotation; give both: --all-axes unity_from_ros is "
+            "--world-axes unity_from_ros --axes ros_from_unity"
         )
+    if world and axes and left.mirrors and "," not in world + axes:
+        body, _, new = axes.partition("_from_")
+        if (body in MIRRORED) != (world.partition("_from_")[2] in MIRRORED):
+            raise ValueInvalid(
+                f"--axes {axes} begins at axes of the other hand: it stands on the right of the pose, so beside "
+                f"--world-axes {world} it is --axes {new}_from_{body}"
+            )
     sides = left.rotation.canonical(), right.behind().canonical()
     return sides[0] if world else None, left.mirrors, sides[1] if axes else None
 
@@ -130,7 +196,7 @@ def other_side(text: str, *, of_world: bool) -> str:
     of_world: the text is that of the frame that poses are seen from
     """
     target, _, source = text.partition("_from_")
-    pairs = BODY_OF if of_world else {body: world for world, body in BODY_OF.items()}
+    pairs = {each[not of_world]: each[of_world] for each in SYSTEMS.values()}
     return f"{pairs[source]}_from_{pairs[target]}" if target in pairs and source in pairs else ""
 
 
@@ -147,20 +213,17 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
         off[axes] = quaternion.distance(*made, *rotation.components, floats)
     near = min(off, key=off.__getitem__)
     if off[near] > tolerance:
-        found = f"{near} is off by {off[near]:g}"
+        found = f"{near} is off by {off[near]:g}, which --tolerance {1.01 * off[near]:.2g} takes"
         raise ValueInvalid(f"no Euler convention gives these angles within {tolerance:g} rad; {found}")
     return [axes for axes, angle in off.items() if angle <= tolerance]
 
 
-def _named(name: str) -> Rotation:
-    """Return flu_from_NAME; a hint never offers axes that look like others with the opposite sense."""
-    name = ALIASES.get(name, name)
-    if name in AXES:
-        return AXES[name][0]
-    if name in MIRRORED:
-        both = f"--world-axes {name}_from_ros --axes ros_from_{name}"
-        raise ValueInvalid(f"{name} is left-handed (mirrored) and no rotation; convert changes both sides: {both}")
-    near = nearest(name, (*AXES, *ALIASES))
+def _known(name: str) -> str:
+    """Return a name of axes; a hint never offers axes that look like others with the opposite sense."""
+    if name in AXES or name in MIRRORED:
+        return name
+    known = (*AXES, *MIRRORED, *SYSTEMS, *ALIASES)
+    near = nearest(name, known)
     meant = {ALIASES.get(each, each) for each in near}
     hint = f"; did you mean {shown(near[0])}?" if len(meant) == 1 else ";"
-    raise ValueInvalid(f"unknown axes {shown(name)}{hint} axes: {', '.join(AXES)}")
+    raise ValueInvalid(f"unknown axes {shown(name)}{hint} axes: {', '.join(known)}, or three letters: {OWN}")

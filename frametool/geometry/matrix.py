@@ -13,7 +13,8 @@ from frametool.geometry.quaternion import EPS, SILENT, TOLERATED, largest_of, le
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
+    from typing import Any
 
     from frametool.geometry.types import Components, Condition, Four, Functions, N, Nine, Six
 
@@ -144,6 +145,20 @@ def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Function
         products = gram(a, b, c, d, e, f, g, h, i)
         right, off = right & is_near(*products), xp.where(is_multiple(*products, xp), inf, off)
     return xp.where(right, off, inf)
+
+
+def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -> Condition:
+    """Tell whether rows within so much of these may be orthonormal: only the digits they are written with are off."""
+    found: Any = True
+    for a in (0, 3, 6):
+        found = found & quaternion.explained(parts[a : a + 3], halves[a : a + 3], xp)
+        for b in range(a + 3, 9, 3):
+            dot = sum((parts[a + at] * parts[b + at] for at in range(3)), 0.0)
+            room = sum((abs(parts[a + at]) * halves[b + at] + (abs(parts[b + at]) + halves[b + at]) * halves[a + at]
+                        for at in range(3)), 0.0)  # fmt: skip
+            found = found & (abs(dot) <= room + SILENT)
+    made: Condition = found
+    return made
 
 
 def check(*values: float, normalize: bool = False) -> Nine[float]:

@@ -211,6 +211,14 @@ def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
     return xp.where((size > 0.0) & (size < inf), off, inf)
 
 
+def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -> Condition:
+    """Tell whether numbers within so much of these have norm 1: then only the digits they are written with are off."""
+    least = sum((xp.maximum(abs(part) - half, 0.0 * half) ** 2 for part, half in zip(parts, halves, strict=True)), 0.0)
+    most = sum(((abs(part) + half) ** 2 for part, half in zip(parts, halves, strict=True)), 0.0)
+    found: Condition = (least <= 1.0) & (most >= 1.0)
+    return found
+
+
 def furthest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> float:
     """Return how far the squared norm furthest from 1 is: the deviation where all are within 1e-6, more elsewhere."""
     return xp.furthest(x * x + y * y + z * z + w * w, 1.0)

@@ -58,19 +58,23 @@ class BatchRule:
         anything beyond it, or NaN
     repair: kernel (components, xp) that makes rotations of rows
     exact: the deviation up to which a row keeps its bits
+    explained: function (components, halves, xp) that tells whether what is written is a rotation but for half a unit
+        of the last digit of each number; None where nothing is to be explained
     """
 
-    __slots__ = ("deviation", "exact", "furthest", "repair", "what")
+    __slots__ = ("deviation", "exact", "explained", "furthest", "repair", "what")
 
     def __init__(
-        self, what: str, deviation: Callable[..., Any], furthest: Callable[..., float], repair: Kernel, exact: float
-    ) -> None:
+        self, what: str, deviation: Callable[..., Any], furthest: Callable[..., float], repair: Kernel, exact: float,
+        explained: Callable[..., Any] | None = None,
+    ) -> None:  # fmt: skip
         """Bind the kernels."""
         self.what = what
         self.deviation = deviation
         self.furthest = furthest
         self.repair = repair
         self.exact = exact
+        self.explained = explained
 
 
 class Representation:
@@ -239,9 +243,12 @@ HOMOGENEOUS = Whole(
     "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
 )
 QUATERNIONS = BatchRule(
-    "quaternions", quaternion.deviation, quaternion.furthest, quaternion.repaired, quaternion.UNIT
+    "quaternions", quaternion.deviation, quaternion.furthest, quaternion.repaired, quaternion.UNIT,
+    quaternion.explained,
+)  # fmt: skip
+MATRICES = BatchRule(
+    "matrices", matrix.deviation, matrix.furthest, matrix.nearest, matrix.ORTHONORMAL, matrix.explained
 )
-MATRICES = BatchRule("matrices", matrix.deviation, matrix.furthest, matrix.nearest, matrix.ORTHONORMAL)
 
 REPRESENTATIONS: dict[str, Representation] = {
     "quaternion": Representation(
@@ -259,7 +266,7 @@ REPRESENTATIONS: dict[str, Representation] = {
         forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_in_wxyz(quaternion.check), kept=_wxyz,
         batch=BatchRule(
             "quaternions", _of_wxyz(quaternion.deviation), _of_wxyz(quaternion.furthest),
-            _in_wxyz(quaternion.repaired), quaternion.UNIT,
+            _in_wxyz(quaternion.repaired), quaternion.UNIT, quaternion.explained,
         ),
     ),
     "rpy": Representation(

@@ -83,6 +83,13 @@ class EdgeColumns(NamedTuple):
         )  # fmt: skip
 
 
+def at_other_times(piece: Edge | Samples | EdgeColumns, offset_ns: int) -> Edge | Samples | EdgeColumns:
+    """Return what was read of a file with so much added to its stamps."""
+    if isinstance(piece, Edge):
+        return piece if piece.stamp_ns is None else piece._replace(stamp_ns=piece.stamp_ns + offset_ns)
+    return piece._replace(stamps_ns=[stamp + offset_ns for stamp in piece.stamps_ns])
+
+
 def stop(error: FormatError) -> None:
     """Raise an error: what a reader does with one unless it is told otherwise."""
     raise error
@@ -241,6 +248,7 @@ class Answers(NamedTuple):
     joint_files: files with values of joints, over time or for good
     array: the one of several arrays that is read
     order: of quaternions in lists, `xyzw` or `wxyz`
+    time_offset: nanoseconds that are added to all stamps
     """
 
     frames: tuple[str, ...] = ()
@@ -253,6 +261,7 @@ class Answers(NamedTuple):
     joint_files: tuple[str, ...] = ()
     array: str = ""
     order: str = ""
+    time_offset: int = 0
 
     def names(self, *defaults: str) -> tuple[str, ...]:
         """Return the names of a form's frames: as told, then its own."""

@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Quaternion, Vector
 
-POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001}
+POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001, "xyz_cm": 0.01}
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
-SPREAD = ("count", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg")
+SPREAD = ("count", "used", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg",
+          "std_x", "std_y", "std_z", "std_angle", "std_angle_deg")  # fmt: skip
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset(("name", "parent"))
@@ -207,7 +208,8 @@ def refuse_scale(value: Any) -> None:
 def read_position(value: Any, unit: float) -> Vector:
     """Read [x, y, z] or {x, y, z}, in metres or in `unit` = 0.001 of them."""
     x, y, z = read_numbers(value, ("x", "y", "z"), partial=True)
-    return (x, y, z) if unit == 1.0 else (x / 1000.0, y / 1000.0, z / 1000.0)  # dividing rounds once: 0.1 from 100
+    parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
+    return (x, y, z) if parts == 1 else (x / parts, y / parts, z / parts)
 
 
 def _only_position(given: Vector | None, moved: Vector) -> Vector:

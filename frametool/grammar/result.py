@@ -33,9 +33,12 @@ class Style:
     axes: those of the camera that the poses are of, `optical` or `opengl`; "" where that is not known
     in_camera: whether they are seen from the same camera at another time
     place: how positions on the Earth are written, None where x, y, z are
+    in_cm: whether positions are xyz_cm, for axes whose users count so
     """
 
-    __slots__ = ("axes", "degrees", "form", "full", "in_camera", "keep_sign", "notations", "place", "precision")
+    __slots__ = (
+        "axes", "degrees", "form", "full", "in_camera", "in_cm", "keep_sign", "notations", "place", "precision",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -50,7 +53,7 @@ class Style:
         """Keep what the options of a command say."""
         self.form = form
         self.axes = ""
-        self.in_camera = False
+        self.in_camera = self.in_cm = False
         self.place: Place | None = None
         self.notations = notations
         self.degrees = degrees
@@ -64,7 +67,7 @@ class Style:
             form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
             keep_sign=self.keep_sign,
         )  # fmt: skip
-        style.axes, style.in_camera = self.axes, self.in_camera
+        style.axes, style.in_camera, style.in_cm = self.axes, self.in_camera, self.in_cm
         style.put_at(self.place)
         return style
 
@@ -110,9 +113,9 @@ class Result:
             written, pose = placed_entry(pose, style.place)
             entry = without_frame(entry, style.place) | written
         elif pose.rotation is None:
-            return entry | {"xyz": list(pose.position or (0.0, 0.0, 0.0))} | extras
+            return entry | placed(pose.position or (0.0, 0.0, 0.0), style) | extras
         elif pose.position is not None and not any(carries_position(each) for each in style.notations):
-            entry["xyz"] = list(pose.position)
+            entry |= placed(pose.position, style)
         for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
             _add(entry, key, value)
@@ -124,6 +127,15 @@ class Result:
         """Return what is said beside the pose, its scale too unless the one matrix that is written holds it."""
         extras = with_entries(self.extras)
         return extras if self.pose.scale == 1.0 or holds_scale(style.notations) else {SCALE: self.pose.scale} | extras
+
+
+def placed(position: Sequence[float], style: Style) -> dict[str, list[float]]:
+    """Return a position by its key; of centimetres the decimals that read back to the same metres."""
+    if not style.in_cm:
+        return {"xyz": list(position)}
+    from decimal import Decimal
+
+    return {"xyz_cm": [float(Decimal(repr(part)).scaleb(2)) for part in position]}
 
 
 class NoResult(Result):

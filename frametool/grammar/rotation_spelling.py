@@ -10,7 +10,7 @@ from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, ROTATIONS, ROWS, Notation, axes_name
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_texts, within
-from frametool.text.numbers import NotFinite, parse_angle, parse_number
+from frametool.text.numbers import NotFinite, half_unit, parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -144,7 +144,23 @@ def read_components(
         return _read_one_by_one(notation, texts, places, angles, degrees=degrees)
     if notation.degrees is None and not degrees and notation.representation.angles:
         _note_degrees(notation, numbers, places, reading)
-    return numbers, degrees
+    return as_meant(notation, numbers, texts), degrees
+
+
+def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str]) -> list[float]:
+    """Return the rotation nearest to one that is written with few digits, if only these digits are off; else it."""
+    row, rule = notation.representation, notation.representation.batch
+    if rule is None or rule.explained is None:
+        return numbers
+    is_whole = row.whole is not None and len(numbers) == len(row.whole.columns)
+    at = list(row.whole.split(range(len(numbers)))[1]) if row.whole and is_whole else list(range(len(numbers)))
+    own = [numbers[index] for index in at]
+    if len(own) != len(row.columns) or not rule.deviation(*own, floats) > quaternion.SILENT:
+        return numbers
+    if not rule.explained(own, [half_unit(texts[index]) for index in at], floats):
+        return numbers
+    meant = dict(zip(at, rule.repair(*own, floats), strict=True))
+    return [meant.get(index, number) for index, number in enumerate(numbers)]
 
 
 def _read_one_by_one(

@@ -52,6 +52,9 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
     """Describe an edge; what is not known or does not apply is None."""
     longest = max(log.steps, key=lambda step: step.pause_ns, default=None)
     delays = log.delays_ns
+    metres = sum(step.metres for step in log.steps)
+    seconds = sum(step.pause_ns for step in log.steps) / BILLION
+    speeds = [step.metres / step.pause_ns * BILLION for step in log.steps]
     return {
         "kind": "moving" if log.moves else "static",
         "parent": log.parent,
@@ -64,6 +67,11 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
         "gap_until_ns": longest.stamp_ns if longest else None,
         "delay_mean_s": sum(delays) / len(delays) / BILLION if delays else None,
         "delay_max_s": max(delays) / BILLION if delays else None,
+        "length_m": metres if log.steps else None,
+        "duration_s": seconds if log.steps else None,
+        "speed_mean": metres / seconds if log.steps else None,
+        "speed_max": max(speeds, default=None),
+        "gaps": len(log.gaps()) if log.steps else None,
         "jumps": len(log.jumps()),
         "backward": log.backward,
         "parents": ", ".join(log.parents),
@@ -71,6 +79,14 @@ def edge_entry(log: EdgeLog) -> dict[str, Any]:
         "topics": ", ".join(f"{topic} ({count})" for topic, count in log.topics.items()),
         "overlap": None,
     }
+
+
+YEAR_S = 31_557_600
+
+
+def clocks_differ(entries: Sequence[dict[str, Any]]) -> bool:
+    """Tell whether stamps and the recorder count from other years: of simulated time a delay says nothing."""
+    return any(abs(entry["delay_max_s"] or 0.0) > YEAR_S for entry in entries)
 
 
 def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, Any]:
@@ -94,6 +110,7 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "gap_until_ns": None,
         "delay_mean_s": None,
         "delay_max_s": max(delays, default=None),
+        **dict.fromkeys(("length_m", "duration_s", "speed_mean", "speed_max", "gaps")),
         "jumps": sum(entry["jumps"] for entry in entries),
         "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join(frames_on(target, source, logs)),

@@ -30,6 +30,12 @@ if TYPE_CHECKING:
     from frametool.stream.row_layout import Target
 
 
+class Outside(FrametoolError):
+    """Report a record whose time is not wanted, which is left out without a word."""
+
+    kind = "outside"
+
+
 class Entry(NamedTuple):
     """One record of a text and what is asked of it.
 
@@ -136,7 +142,7 @@ def answer(
     """
     operation, shape, timed = request.operation, entry.record.shape, request.timed
     edge, at_ns = entry.edge, None
-    if stamp and (timed is not None or operation.velocity):
+    if stamp and (timed is not None or operation.velocity or request.window):
         try:
             at_ns = _stamp_ns(entry, stamp)
             if timed is not None and operation.formula is None:
@@ -144,6 +150,8 @@ def answer(
         except FrametoolError as error:
             error.column_name = timed.column if timed else str(entry.stamp[0][-1])  # type: ignore[attr-defined]
             raise
+    if request.window and at_ns is not None and not request.window[0] <= at_ns <= request.window[1]:
+        raise Outside("beyond --start or --stop")
     seconds = memory.step(at_ns) if operation.velocity and memory and at_ns is not None else None
     warned: list[tuple[str, str]] = []
 

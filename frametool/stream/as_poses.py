@@ -210,7 +210,7 @@ class FormatConverter:
         state = State()
         rename = rename_of(request) or (lambda parent, name: (parent, name))
         for each in blocks(self.module.poses(file, options), form, file, options, named=False):
-            block = _block(each)
+            block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
             run = Run(plan, block, state)
             good = run.rows.tolist()
             images = [each.images[row] for row in good]
@@ -221,7 +221,7 @@ class FormatConverter:
             own = each.names[0] is not None
             pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
-            stamps = None if own else each.stamps_ns[run.rows]
+            stamps = None if own or block.times is None else block.times[run.rows]
             poses = RowPoses(run.results, self._held(stamps, form), lines, parents, names, extras)
             found = sorted(faults + run.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
@@ -240,7 +240,7 @@ def _plan(request: Request) -> Plan:
     return Plan(
         (shape,), (target,), request.operation, (), ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge,
         normalize=request.normalize, on_error=request.on_error, gathered=request.gathered,
-        timed=request.timed if request.timed is not None and request.timed.name else None,
+        timed=request.timed if request.timed is not None and request.timed.name else None, window=request.window,
     )  # fmt: skip
 
 

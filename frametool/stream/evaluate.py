@@ -10,6 +10,7 @@ import numpy as np
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import arrays, floats, uncertainty
 from frametool.geometry.batch_validation import read_rotations
+from frametool.grammar.names import in_nanoseconds
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import (
@@ -35,11 +36,13 @@ from frametool.stream.stamp_columns import (
 )
 from frametool.stream.text_parts import Const, In, Instead, Out, Word
 from frametool.text.numbers import read_number_or_angle
-from frametool.text.parse import parse_floats
+from frametool.text.parse import half_units, parse_floats
+from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.gathering import Gathered
     from frametool.stream.request import Operation
@@ -47,7 +50,7 @@ if TYPE_CHECKING:
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.stream.text_parts import Piece
-    from frametool.text.spans import Flags, Floats, Ints, Spans
+    from frametool.text.spans import Flags, Floats, Ints
 
 
 
@@ -64,6 +67,7 @@ class Plan(NamedTuple):
     beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
     timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
     remedies: for each shape, what to do where its angles are degrees
+    offset_ns: what is added to the stamps of rows; window: the first and the last that are left
     yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
     """
 
@@ -86,6 +90,8 @@ class Plan(NamedTuple):
     beside: str = ""
     gathered: Gathered | None = None
     remedies: tuple[str, ...] = ()
+    offset_ns: int = 0
+    window: tuple[int, int] | None = None
 
 
 class State:
@@ -122,6 +128,7 @@ class Run:
         self.count = len(block.places)
         numbers = self._read()
         self._check_covariances(numbers)
+        self.outside = self._outside() if plan.window and self.count else set[int]()
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -131,8 +138,11 @@ class Run:
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
-        if self.reasons or self.lone is not None:
-            gone = {*self.reasons, self.lone}
+        if self.outside:
+            self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
+            self.mended = [row for row in self.mended if row not in self.outside]
+        if self.reasons or self.outside or self.lone is not None:
+            gone = {*self.reasons, *self.outside, self.lone}
             self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
         if plan.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
@@ -259,8 +269,9 @@ class Run:
         """Read the stamps of the rows."""
         if self.block.times is not None:
             return self.block.times
-        stamps, column = self.block.stamps[at], self.plan.timed.column if self.plan.timed else ""
-        in_ns = self.plan.timed is not None and self.plan.timed.in_ns
+        timed, beside = self.plan.timed, self.plan.beside
+        stamps, column = self.block.stamps[at], timed.column if timed else beside
+        in_ns = timed.in_ns if timed else len(stamps) == 1 and in_nanoseconds(beside)
         times, reasons = read_stamps(stamps, in_ns=in_ns)
         for row, reason in reasons.items():
             self._blame(row, column, reason)
@@ -283,7 +294,12 @@ class Run:
         return "the result is not finite: the numbers are too large"
 
     def _good(self) -> list[int]:
-        return [row for row in range(self.count) if row not in self.reasons]
+        return [row for row in range(self.count) if row not in self.reasons and row not in self.outside]
+
+    def _outside(self) -> set[int]:
+        """Return the rows before the first or after the last of the times that are wanted."""
+        times, (first, last) = self._times(0), self.plan.window or (0, 0)
+        return {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
 
     def _with_before(self, pose: Rigid, state: State) -> list[Rigid]:
         if not self.plan.operation.looks_back:
@@ -311,6 +327,10 @@ class Run:
         if shape.joined:
             self._check_tail(numbers, names, shape.joined.tail)
         found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
+        rule = shape.notation.representation.batch
+        if rule and rule.explained and self.block.values is None and (found.mended.size or found.reasons):
+            self._take_as_meant(rule, given, [first + at for at in shape.rotation_at], {*found.mended, *found.reasons})
+            found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
         if found.mended.size and not self.rounded:
@@ -323,6 +343,16 @@ class Run:
         self.off = max(self.off, found.off)
         self._doubt(shape, given, first)
         return found.quaternions
+
+    def _take_as_meant(self, rule: BatchRule, given: list[Floats], places: Sequence[int], rough: set[int]) -> None:
+        """Replace the rotations of rows that are off by no more than the digits they are written with."""
+        rows, cells = np.array(sorted(rough), np.int64), self.block.numbers
+        own = [column[rows] for column in given]
+        halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
+        meant = rule.explained is not None and rule.explained(own, halves, arrays)
+        for at, numbers in enumerate(rule.repair(*own, arrays)):
+            given[at] = given[at].copy()
+            given[at][rows] = np.where(meant, numbers, own[at])
 
     def _doubt(self, shape: Shape, given: Sequence[Floats], first: int) -> None:
         """Wonder about the first row with a bare angle beyond a full turn."""

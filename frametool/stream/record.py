@@ -26,7 +26,14 @@ from frametool.grammar.pose import (
     unknown_keys,
 )
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
-from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS, read_components, read_rotation, shape_of
+from frametool.grammar.rotation_spelling import (
+    AXES_KEY,
+    ROTATION_KEYS,
+    as_meant,
+    read_components,
+    read_rotation,
+    shape_of,
+)
 from frametool.stream.row_layout import ACCEL, PARTS, POINT, POSE, TURN, VECTOR, Shape, checked_rotation, doubt
 from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import NotFinite, parse_number, read_number_or_angle
@@ -529,7 +536,7 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record
 OTHER_WORDS = dict.fromkeys(("q", "quat", "quats", "quaternions", "orient", "rot", "so3"), "quaternion") | {
-    "pos": "xyz", "trans": "xyz", "tvec": "xyz", "loc": "xyz", "location": "xyz", "xzy": "xyz", "xyz_cm": "xyz_mm",
+    "pos": "xyz", "trans": "xyz", "tvec": "xyz", "loc": "xyz", "location": "xyz", "xzy": "xyz",
     "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "rvec": "rotvec", "angle_axis": "axis_angle",
 }  # fmt: skip
 
@@ -604,6 +611,8 @@ def _with_flat_rotation(
     numbers, own = [], 0 if shape.whole else len(record.values)
     for at, name in enumerate(names):
         numbers.append(_number(value, name, shape.in_degrees(own + at)))
+    if shape.notation is not None:
+        numbers = as_meant(shape.notation, numbers, [value[name] for name in names])
     values = (*(() if shape.whole else record.values), *numbers)
     _check(shape, values, names, reading)
     paths = (*(() if shape.whole else record.numbers), *((*record.path, name) for name in names))

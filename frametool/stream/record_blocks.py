@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.stream.answers import Outside
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, RowNote
 from frametool.stream.record import KEYS_REMEDY
@@ -164,6 +165,8 @@ class RecordBlocks:
                     found.odd.append((start + part.begin, row))
                     found.add(learned, line)
                     continue
+                if isinstance(learned, Fault) and learned.kind == Outside.kind:
+                    continue
                 if isinstance(learned, Fault):
                     found.faults.append((start + part.begin, learned._replace(line=learned.line + line)))
                     if self.request.on_error == NULL and not part.outside:
@@ -285,6 +288,7 @@ class RecordBlocks:
             timed=template.timed(request),
             beside=template.beside if request.extra_column is not None else "",
             gathered=request.gathered,
+            window=request.window,
             remedies=tuple(
                 KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in template.entries
             ),

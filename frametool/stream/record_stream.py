@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
+from io import BufferedReader, RawIOBase
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from frametool.errors import FrametoolError
+from frametool.stream import stamp_source
+from frametool.stream.answers import Outside
 from frametool.stream.faults import SKIP, STOP, Fault, RowNote
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.run import Outcome, mapped
@@ -64,6 +69,42 @@ def _outcomes(
     yield from mapped(process, chain(begun, following), jobs)
 
 
+class _Pieces(RawIOBase):
+    """A stream of pieces of bytes."""
+
+    def __init__(self, pieces: Iterator[bytes]) -> None:
+        """Take them."""
+        self.pieces = pieces
+        self.left = b""
+
+    def readable(self) -> bool:
+        """Tell that it can be read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Read as much as fits of the next piece."""
+        self.left = self.left or next((piece for piece in self.pieces if piece), b"")
+        size = min(len(buffer), len(self.left))
+        buffer[:size], self.left = self.left[:size], self.left[size:]
+        return size
+
+
+def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedReader:
+    """Return a stream of records with so much added to all stamps in them; a record that cannot be read stays."""
+
+    def pieces() -> Iterator[bytes]:
+        splitter = Splitter(form)
+        for block in read_blocks(stream, whole=splitter.whole, size=BLOCK_BYTES):
+            edits = []
+            for part in splitter.parts(block).parts:
+                with suppress(FrametoolError, UnicodeDecodeError):
+                    moved, _ = stamp_source.at_other_times(block[part.start : part.end].decode(), offset_ns)
+                    edits.append((part.start, part.end, moved.encode()))
+            yield stamp_source.replaced(block, edits)
+
+    return BufferedReader(_Pieces(pieces()))
+
+
 def _has_ended(stream: ByteStream) -> bool:
     """Tell whether a stream has nothing more to come, or will have within a moment."""
     import select
@@ -117,6 +158,8 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
             mended += made.mended
             notes += made.notes
             made = made.text
+        if isinstance(made, Fault) and made.kind == Outside.kind:
+            continue
         if isinstance(made, Fault):
             faults.append(made)
             if request.on_error == STOP:

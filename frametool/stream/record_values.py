@@ -21,7 +21,7 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Note, tell
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.answers import answer, read_entries, texts_of_stamp, written
+from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import PARTS, POSE, ROTATION, checked_rotation
@@ -197,6 +197,8 @@ def _answer(
     try:
         asked = request.for_kind(record.shape.kind)
         found = answer(entry, record.values, texts_of_stamp(document, entry), asked, memory)
+    except Outside:
+        return None
     except Misfit as misfit:
         raise placed(misfit, source) from misfit
     except ValueInvalid as error:

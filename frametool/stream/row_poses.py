@@ -25,7 +25,7 @@ from frametool.stream.row_layout import PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
-from frametool.stream.table import UNCLOSED, Naming, cells_of, coded, table_block, unnamed
+from frametool.stream.table import UNCLOSED, Naming, at_other_times, cells_of, coded, table_block, unnamed
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -119,6 +119,7 @@ class TablePoses:
         torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
         body = text if torn is None else text[:torn]
         nulls = self.plan.on_error == NULL
+        body = at_other_times(self.table, self.layout, body, self.plan.offset_ns)
         block = table_block(self.table, self.layout, body, self.naming, nulls=nulls)
         stamps, late = self._stamps(block.stamps)
         run = Run(self.plan, block._replace(bad={**late, **block.bad}), self.state)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, AnyStr, NamedTuple
 
+from frametool.documents.document import parse_nodes
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.rigid import EXACT
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
+    from frametool.documents.document import Node
     from frametool.geometry.types import Components
     from frametool.grammar.readers import Path
 
@@ -80,9 +83,68 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
         bare += "ns"
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) > LARGEST:
-        remedy = "; are these some? then call them stamp_ns"
+        remedy = "; are these some? then write ns behind them, or call them stamp_ns"
         raise ValueInvalid(f"{shown(text.strip())} is beyond 64 bits of nanoseconds{remedy}")
     return stamp_ns
+
+
+def stamp_text(written: str, stamp_ns: int, *, in_ns: bool) -> str:
+    """Write another stamp as one was written: nanoseconds as such, seconds with no fewer decimals."""
+    from frametool.frames.stamps import format_stamp
+
+    bare = written.strip()
+    if bare.endswith("ns"):
+        return f"{stamp_ns}ns"
+    if in_ns and not bare.endswith("s"):
+        return str(stamp_ns)
+    seconds, _, decimals = format_stamp(stamp_ns).partition(".")
+    wanted = 0 if bare.endswith("s") or "e" in bare.lower() else len(bare.partition(".")[2])
+    decimals = decimals.rstrip("0").ljust(wanted, "0")
+    return f"{seconds}.{decimals}" if decimals else seconds
+
+
+def replaced(text: AnyStr, edits: Iterable[tuple[int, int, AnyStr]]) -> AnyStr:
+    """Return text, or bytes, with others in the place of some stretches."""
+    pieces: list[AnyStr] = []
+    end = 0
+    for start, stop, new in sorted(edits):
+        pieces += [text[end:start], new]
+        end = stop
+    pieces.append(text[end:])
+    return text[:0].join(pieces)
+
+
+def at_other_times(text: str, offset_ns: int) -> tuple[str, int]:
+    """Return documents with so much added to all stamps in them, and how many these are."""
+    edits: list[tuple[int, int, str]] = []
+    for root in parse_nodes(text):
+        _shift(root, offset_ns, edits)
+    return replaced(text, edits), len(edits)
+
+
+def _shift(node: Node, offset_ns: int, edits: list[tuple[int, int, str]]) -> None:
+    """Add to `edits` those of the stamps below a node: one of a mapping by its key, or the seconds it is made of."""
+    if type(node.value) is list:
+        for each in node.value:
+            _shift(each, offset_ns, edits)
+    if type(node.value) is not dict:
+        return
+    own = next((key for key in STAMP_KEYS if key in node.value and type(node.value[key][1].value) is str), "")
+    for key, (_, value) in node.value.items():
+        if key != own:
+            _shift(value, offset_ns, edits)
+            continue
+        with suppress(ValueInvalid):
+            in_ns = in_nanoseconds(key)
+            new = stamp_text(value.value, read_stamp(value.value, in_ns=in_ns) + offset_ns, in_ns=in_ns)
+            edits.append((value.start + bool(value.quote), value.end - bool(value.quote), new))
+    for seconds, below in (("sec", "nanosec"), ("secs", "nsecs")):
+        pair = [node.value[key][1] for key in (seconds, below) if key in node.value]
+        if len(pair) == 2:
+            with suppress(ValueInvalid):
+                stamp_ns = read_header_stamp(*(each.value for each in pair)) + offset_ns
+                parts = divmod(stamp_ns, 1_000_000_000)
+                edits += [(each.start, each.end, str(part)) for each, part in zip(pair, parts, strict=True)]
 
 
 def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 12.5") -> Path:

@@ -16,18 +16,21 @@ import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, shown, warn
 from frametool.formats.table import FORMATS
+from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import UPPER_ROWS, notation
 from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.header import Columns, PoseColumns, has_pose_column
-from frametool.stream.layout import NAME, NAMED, PARENT, quoted
+from frametool.stream.layout import ADDED, NAME, NAMED, PARENT, quoted
 from frametool.stream.rows import Block, Broken
+from frametool.stream.stamp_columns import read_stamps
+from frametool.stream.stamp_source import replaced, stamp_text
 from frametool.text.cells import split_blank, split_delimited, torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from frametool.stream.layout import Layout
+    from frametool.stream.layout import ADDED, NAME, NAMED, PARENT, quoted
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.text.cells import Cells
@@ -286,7 +289,9 @@ class Table(NamedTuple):
     def opening(self, layout: Layout) -> bytes:
         """Return what stands before the first row of the output: the header as it was where no column changes."""
         if not self.header:
-            return self.head
+            names = [each.name if isinstance(each, ADDED) else self.name(each.place) for each in layout.columns]
+            grown = self.names and len(names) > self.width  # what was known by its count is not any more
+            return self.head + (b"# " + " ".join(names).encode() + self.line_end if grown else b"")
         cells = layout.header(self.header)
         title = self.title if cells == list(self.header) else (self.delimiter or b" ").join(cells)
         return self.head + title + self.line_end
@@ -422,6 +427,23 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nu
         numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), odd, broken, names.frames,
         stamps, names.bad, names.lost,
     )  # fmt: skip
+
+
+def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:
+    """Return rows with so much added to their stamps; what is no stamp stays as it is and is told where it is read."""
+    if not offset_ns or layout.time is None:
+        return text
+    cells, name = table.split(text), table.name(layout.time)
+    columns = [without_quotes(cells.column(place)) for place in (layout.time, layout.below) if place is not None]
+    in_ns = in_nanoseconds(name)
+    stamps, reasons = read_stamps(tuple(columns), in_ns=in_ns)
+    edits = []
+    for row in sorted({*range(len(stamps))} - {*reasons}):
+        stamp = int(stamps[row]) + offset_ns
+        for column, part in zip(columns, divmod(stamp, BILLION), strict=False):
+            new = str(part) if len(columns) > 1 else stamp_text(column.text(row).decode(), stamp, in_ns=in_ns)
+            edits.append((int(column.starts[row]) - MARGIN, int(column.ends[row]) - MARGIN, new.encode()))
+    return replaced(text, edits)
 
 
 def _as_slice(places: Sequence[int]) -> slice | list[int]:

@@ -98,7 +98,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
         timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
         edges=edges, sources=EARTH_FRAMES[:1] if on_earth else (),
-        frame_column=table.name(frames[0]) if len(frames) == 1 else "",
+        frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
+        window=request.window,
     ), layout  # fmt: skip
 
 

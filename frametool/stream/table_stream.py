@@ -20,6 +20,7 @@ from frametool.stream.table import (
     UNCLOSED,
     Naming,
     as_trajectory,
+    at_other_times,
     open_table,
     table_block,
 )
@@ -110,8 +111,12 @@ def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
 def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
     """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
     timed = request.timed
-    if request.extra_column == "":
-        request = request._replace(extra_column=_stamp_column(table, source, "a velocity"))
+    beside = request.extra_column
+    if (request.window or request.offset_ns) and beside is None and not (timed and timed.name):
+        beside = ""
+    if beside == "":
+        who = "a velocity" if request.operation.velocity else "--start, --stop, --time-offset"
+        request = request._replace(extra_column=_stamp_column(table, source, who))
     if timed is None:
         return request, None
     if request.operation.formula is not None:
@@ -154,6 +159,8 @@ class TableWork:
         return done._replace(faults=[*done.faults, fault])
 
     def _done(self, text: bytes) -> Outcome:
+        size = len(text)
+        text = at_other_times(self.table, self.layout, text, self.plan.offset_ns)
         block = table_block(self.table, self.layout, text, self.naming, nulls=self.plan.on_error == NULL)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
@@ -169,7 +176,7 @@ class TableWork:
             text.count(b"\n"),
             len(run.mended),
             sorted(notes),
-            len(text),
+            size,
         )
 
 

@@ -16,15 +16,21 @@ from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
 from frametool.formats.detect import detect
 from frametool.formats.load import Recording, Rules, load_sources, opened_together
 from frametool.formats.table import FORMATS
+from frametool.frames.stamps import FURTHEST_NS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
 from frametool.grammar.edges import Answers
+from frametool.grammar.names import in_nanoseconds, stamp_column, stamp_places
 from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.result import Result, Style
+from frametool.stream import stamp_columns
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
+from frametool.stream.header import listed
 from frametool.stream.record_values import stream_results
 from frametool.stream.request import Operation, Request
 from frametool.stream.run import Outcome, run
+from frametool.stream.table import open_table
+from frametool.text.cells import without_quotes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -32,6 +38,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from frametool.frames.buffer import TransformBuffer
+    from frametool.grammar.edges import Report
     from frametool.text.lines import ByteStream
 
 POSITION = 3  # numbers
@@ -107,6 +114,81 @@ def split_name(text: str) -> tuple[str, list[str]]:
     if len(names) > 2 or not all(names):
         raise ValueInvalid(f"{shown(text)}: behind the file stand a topic, or TARGET:SOURCE; quote names with a colon")
     return text[:end], names
+
+
+def read_stamps(path: str, report: Report, say: Callable[[str], None]) -> list[int]:
+    """Return the stamps of a file in its order: times one a line, a table's, a trajectory's, a recording's (sorted).
+
+    Nanoseconds are known by the name of their column, or by their size, which `say` tells.
+    report: takes the errors of lines that are no time
+    """
+    file = InputFile(path)
+    try:
+        head = file.head()
+        words = next((line.split() for line in head.splitlines() if line.strip() and line.lstrip()[:1] != b"#"), [])
+        is_list = len(words) < 2 and not re.search(rb"[,;:{\[<\0]", b"".join(words))
+        form = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)[0]
+        known = FORMATS[form]
+        if not known.is_table or form == "kitti":
+            return _stamps_of_poses(path, form, is_tree=not known.is_table and bool(re.search(TREE, head)))
+        text = file.stream.read()
+    finally:
+        file.close()
+    if not words:
+        raise FormatError(NO_TIMES, source=file.name)
+    text = _with_title(text, (known.delimiter or "").encode() or None)
+    titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
+    table, rest = open_table(text, form, header=titled, source=file.name)
+    named = table.names or (("t",) if is_list else (known.columns or ("t",))[: table.width])
+    at, below = (0, None) if form == "euroc" else stamp_places(named)
+    if at is None:
+        columns = f"; columns: {listed(named)}" if table.names else ""
+        raise FormatError(f"no column of stamps (t, stamp, time, stamp_ns ..){columns}", source=file.name, line=1)
+    cells = table.split(rest)
+    lines = cells.rows + text.count(b"\n", 0, len(text) - len(rest)) + 1
+    in_ns = form == "euroc" or in_nanoseconds(named[at])
+    parts = tuple(without_quotes(cells.column(place)) for place in (at, below) if place is not None)
+    stamps, reasons = stamp_columns.read_stamps(parts, in_ns=in_ns)
+    texts = [] if in_ns or below is not None else [parts[0].text(row).strip(b' \t"') for row in range(len(stamps))]
+    if by_size := {row: int(each) for row, each in enumerate(texts) if each.isdigit() and len(each) in (18, 19)}:
+        say(f"note: {file.name}: {next(iter(by_size.values()))} is taken for nanoseconds, by its size")
+    found, exact = [], {**dict(enumerate(stamps.tolist())), **by_size}
+    for row, stamp in exact.items():
+        reason = "" if row in by_size else reasons.get(row, "")
+        if not reason and not -FURTHEST_NS < stamp < FURTHEST_NS:
+            reason = f"stamp {stamp} ns is beyond the year 2116"
+        if reason:
+            report(FormatError(reason, source=file.name, line=int(lines[row])))
+        else:
+            found.append(stamp)
+    if not len(stamps):
+        raise FormatError(NO_TIMES, source=file.name)
+    return found
+
+
+def _with_title(text: bytes, delimiter: bytes | None) -> bytes:
+    """Make the comment above the first row its title, where it names stamps and all columns: `#timestamp [ns],file`."""
+    found = re.match(rb"((?:#.*\n)*?)#(.*\n)([^#\n].*)", text)
+    if found is None or len(found[2].split(delimiter)) != len(found[3].split(delimiter)):
+        return text
+    names = [each.decode("utf-8", "replace").strip() for each in found[2].split(delimiter)]
+    return text if stamp_column(names) is None else found[1] + found[2] + text[found.start(3) :]
+
+
+NO_TIMES = "no times in it; write one a line"
+
+
+def _stamps_of_poses(path: str, form: str, *, is_tree: bool) -> list[int]:
+    """Return the stamps of a form that lists poses or records, or of all that moves in a recording."""
+    if is_tree or ("tree" in FORMATS[form].reads and "records" not in FORMATS[form].reads):
+        found = {edge.stamp_ns for edge in Recording(path, form=form).edges() if edge.stamp_ns is not None}
+        if found:
+            return sorted(found)
+    else:
+        trajectory = read_trajectory(path, form=form)
+        if trajectory.stamps_ns is not None:
+            return [int(stamp) for stamp in trajectory.stamps_ns]
+    raise FormatError(f"no stamps in it ({FORMATS[form].summary})", source=path)
 
 
 def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:

@@ -133,6 +133,13 @@ def explain_angle(text: str) -> str:
 
 _UNKNOWN = "is not a number"
 _NO_LENGTH = "is not a length; write metres, or a unit: 2cm, 20mm, 0.02m"
+def half_unit(text: str) -> float:
+    """Return half a unit of the last digit that a number is written with; 0 without a point: such a number is exact."""
+    digits, _, exponent = text.strip(" \t\"'").lower().partition("e")
+    _, point, decimals = digits.partition(".")
+    return 0.5 * 10.0 ** min(int(exponent or 0) - len(decimals), 300) if point and decimals.isdigit() else 0.0
+
+
 _UNIT = "has a unit; lengths are in metres (or use xyz_mm)"
 _ANGLE = "is an angle with a unit where a bare number is expected"
 

@@ -29,6 +29,7 @@ from frametool.text.digits import (
     product_error,
     read_eight_digits,
 )
+from frametool.text.numbers import half_unit
 from frametool.text.spans import Spans, windows
 
 if TYPE_CHECKING:
@@ -53,6 +54,22 @@ class _Mantissa(NamedTuple):
     whole: Ints
     tail: Ints
     words: int
+
+
+LONGEST_MEANT = 32  # of longer ones no digit counts that is left out
+
+
+def half_units(cells: Spans) -> Floats:
+    """Return half a unit of the last digit that each number (n,) is written with, as `half_unit` does of one."""
+    starts, ends = trimmed(cells.data, cells.starts, cells.ends)
+    texts = windows(cells.data, LONGEST_MEANT)[starts].view(np.uint8).reshape(-1, LONGEST_MEANT)
+    inside = np.arange(LONGEST_MEANT) < (ends - starts)[:, None]
+    points = (texts == ord(".")) & inside
+    decimals = ends - starts - 1 - points.argmax(axis=1)
+    found = np.where(points.any(axis=1) & (decimals > 0), 0.5 * 10.0 ** -np.minimum(decimals, 300).astype(float), 0.0)
+    for row in np.flatnonzero((((texts | 32) == ord("e")) & inside).any(axis=1)).tolist():
+        found[row] = half_unit(cells.text(row).decode("utf-8", "replace"))
+    return found
 
 
 def parse_floats(cells: Spans) -> tuple[Floats, Ints]:

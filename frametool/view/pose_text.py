@@ -13,7 +13,7 @@ from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.grammar.pose import TIMES
-from frametool.grammar.result import Result, is_locked, rotation_entry, rotation_numbers
+from frametool.grammar.result import Result, is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -71,7 +71,8 @@ def _describe(result: Result, style: Style) -> str:
         entry, pose = placed_entry(pose, style.place)
         lines += _place_lines(entry)
     elif pose.position is not None:
-        lines.append(NumberLine("translation", list(zip("xyz", pose.position, strict=True)), "m"))
+        (position,), unit = placed(pose.position, style).values(), "cm" if style.in_cm else "m"
+        lines.append(NumberLine("translation", list(zip("xyz", position, strict=True)), unit))
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
@@ -137,10 +138,10 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
 
 def _extra_lines(extras: dict[str, Any]) -> Iterator[NumberLine]:
     """Yield the lines of what is only said about a pose."""
-    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s"}
+    units = {"distance": "m", "angle": "rad", "linear": "m/s", "angular": "rad/s", "std": "m", "std_angle": "rad"}
     for key, value in extras.items():
         if isinstance(value, float):
-            unit = "deg" if key.endswith("_deg") else units.get(key.partition("_")[0], "")
+            unit = "deg" if key.endswith("_deg") else units.get(key) or units.get(key.partition("_")[0], "")
             yield NumberLine(key.removesuffix("_deg"), [("", value)], unit)
         elif sigmas := _sigmas(key, value):
             whole = " ".join(sigmas)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
+from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,8 @@ HEADINGS = {
     "backward": "back",
     "parent_changes": "parents",
 }
-HIDDEN = ("kind", "gap_until_ns", "parents", "overlap")
+MOTION = ("length_m", "duration_s", "speed_mean", "speed_max", "gaps")  # a sentence for each edge that moves
+HIDDEN = ("kind", "gap_until_ns", "parents", "overlap", *MOTION)
 RARE = ("parent_changes",)  # left out where all are 0
 LEFT = ("parent", "child", "topics")
 
@@ -43,8 +45,28 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     pads = [str.ljust if key in LEFT else str.rjust for key in shown]
     aligned = ([pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows)
-    table = "".join("  ".join(row).rstrip() + "\n" for row in aligned)
+    lines = ["  ".join(row).rstrip() for row in aligned]
+    if max(map(cells, lines)) > get_terminal_size((WIDTH, 0)).columns:
+        lines = [line for row in rows[1:] for line in _folded_edge(dict(zip(shown, row, strict=True)), rows[0])]
+    table = "".join(f"{line}\n" for line in lines)
+    table += "".join(map(_motion, (entry for entry in edges if entry["length_m"])))
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
+
+
+def _folded_edge(row: dict[str, str], titles: Sequence[str]) -> list[str]:
+    """Return the lines of one edge where a table would be too wide: its frames, then what is said of it."""
+    parent, child = (short(row[key], WIDTH // 2 - 4) for key in ("parent", "child"))
+    said = [f"{title} {short(cell, WIDTH - 20)}" for title, (key, cell) in zip(titles, row.items(), strict=True)
+            if cell and key not in ("parent", "child")]  # fmt: skip
+    return [f"{parent} <- {child}", *wrap(", ".join(said), WIDTH - 2, initial_indent="  ", subsequent_indent="  ")]
+
+
+def _motion(entry: dict[str, Any]) -> str:
+    """Return the sentence about the way of an edge that moves: how far, how long, how fast, and its pauses."""
+    speed = f"{entry['speed_mean']:.3f} m/s (at most {entry['speed_max']:.3f})"
+    gaps = f"{entry['gaps']} gap{'s' * (entry['gaps'] != 1)}"
+    begin = f"{short(entry['parent'], WIDTH // 2 - 4)} <- {short(entry['child'], WIDTH // 2 - 4)}:"
+    return in_width(begin, f"{entry['length_m']:.3f} m in {entry['duration_s']:.3f} s, {speed}, {gaps}")
 
 
 def _cell(key: str, value: Any) -> str:

@@ -105,11 +105,16 @@ def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
 
 def _folded(line: DrawnFrame) -> Iterator[DrawnFrame]:
     """Yield a line, what comes behind its pose on one of its own where they are too long for one."""
-    if len(line.label) <= 2 or len(line.branch) + cells(line.frame) + sum(2 + cells(p) for p in line.label) <= WIDEST:
+    begin = len(line.branch) + cells(line.frame)
+    if not line.label or begin + sum(2 + cells(part) for part in line.label) <= WIDEST:
         yield line
         return
-    yield line._replace(label=line.label[:2])
-    yield DrawnFrame(re.sub("[└─]", " ", line.branch).replace("├", "│"), "", line.label[2:])
+    first = 2 if begin + sum(2 + cells(part) for part in line.label[:2]) <= WIDEST else 0
+    yield line._replace(label=line.label[:first])
+    below = re.sub("[└─]", " ", line.branch).replace("├", "│")
+    rest = line.label[first:]
+    fits = len(below) + sum(2 + cells(part) for part in rest) <= WIDEST
+    yield from (DrawnFrame(below, "", part) for part in ([rest] if fits else [rest[:2], rest[2:]]) if part)
 
 
 def _widest(lines: Sequence[DrawnFrame]) -> int:

@@ -75,7 +75,7 @@ def twists_of(text: str) -> Any:
         return [[float(json.loads(line)[name]) for name in VELOCITY] for line in text.splitlines()]
     if "," in text:
         return [[float(row[name]) for name in VELOCITY] for row in csv.DictReader(io.StringIO(text))]
-    return [[float(cell) for cell in line.split()[-6:]] for line in text.splitlines()]
+    return [[float(cell) for cell in line.split()[-6:]] for line in text.splitlines() if line[0] != "#"]
 
 
 @pytest.mark.parametrize("name", STREAMS)
@@ -121,7 +121,7 @@ def test_time_that_stands_still_or_turns_back_has_no_velocity(run: Run, second: 
 def test_first_sees_all_poses_from_the_first_one(run: Run, name: str) -> None:
     outcome = run("relative", "--first", stdin=STREAMS[name])
     assert outcome.status == 0, outcome.err
-    seen = [line for line in outcome.out.splitlines() if not line[:1].isalpha()]
+    seen = [line for line in outcome.out.splitlines() if not line[:1].isalpha() and line[0] != "#"]
     assert len(seen) == COUNT
     turned, moved = TURNS[0].inv() * TURNS, TURNS[0].inv().apply(PLACES - PLACES[0])
     for line, place, turn in zip(seen, moved, turned, strict=True):
@@ -136,7 +136,7 @@ def test_first_sees_all_poses_from_the_first_one(run: Run, name: str) -> None:
 
 
 def test_the_first_pose_becomes_the_identity(run: Run) -> None:
-    first = run("relative", "--first", stdin=STREAMS["tum"]).out.splitlines()[0].split()
+    first = run("relative", "--first", stdin=STREAMS["tum"]).out.splitlines()[1].split()
     assert list(map(float, first[1:8])) == pytest.approx([0, 0, 0, 0, 0, 0, 1], abs=1e-17)
 
 
@@ -223,3 +223,59 @@ def test_several_results_stand_beside_with_keep(run: Run) -> None:
 def test_columns_that_do_not_fit_are_refused(run: Run, chosen: list[str]) -> None:
     outcome = run("apply", "--transform", QUARTER, *chosen, stdin=IMU)
     assert (outcome.status, outcome.out) == (2, "")
+
+
+# --- times that are shifted, or left out -----------------------------------------------------------------------------
+
+SHIFTED = {
+    "tum": ("0.5 0 0 0 0 0 0 1\n1.50 1 0 0 0 0 0 1\n2.5 2 0 0 0 0 0 1\n", "1.75 1 0 0 0.0 0.0 0.0 1.0\n"),
+    "csv": ("x,y,z,yaw,stamp_ns\n0,0,0,0,500000000\n1,0,0,0,1500000000\n9,0,0,0,2500000000\n",
+            "x,y,z,qx,qy,qz,qw,stamp_ns\n1,0,0,0.0,0.0,0.0,1.0,1750000000\n"),
+    "two columns": ("sec,nanosec,yaw\n0,500000000,0\n1,500000000,0\n2,500000000,0\n",
+                    "sec,nanosec,qx,qy,qz,qw\n1,750000000,0.0,0.0,0.0,1.0\n"),
+    "lines": ('{"t":0.5,"yaw":0}\n{"t":"1500ms","yaw":0}\n{"t":2.5,"yaw":0}\n', None),
+    "messages": (messages(), None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["tum", "csv", "two columns"])
+def test_stamps_are_shifted_and_what_is_before_or_after_left_out(run: Run, name: str) -> None:
+    text, kept = SHIFTED[name]
+    outcome = run("convert", "--time-offset", "0.25", "--start", "1.7", "--stop", "1800ms", "--to", "quaternion", stdin=text)
+    assert (outcome.status, outcome.out) == (0, kept)
+
+
+def test_records_of_a_stream_are_those_of_a_document_at_other_times(run: Run) -> None:
+    options = ("--time-offset", "-0.25", "--start", "1", "--to", "rpy")
+    lines = "".join(f'{{"stamp": {at}.5, "xyz": [{at}, 0, 0]}}\n' for at in range(40))
+    streamed = [json.loads(line) for line in run("convert", *options, stdin=lines).out.splitlines()]
+    document = [json.loads(line) for line in run("convert", "a.jsonl", *options, "-f", "json", files={"a.jsonl": lines}).out.splitlines()]
+    assert [each["stamp"] for each in streamed] == [at + 0.25 for at in range(1, 40)]
+    assert [each["xyz"] for each in streamed] == [each["xyz"] for each in document]
+    assert [float(each["stamp"]) for each in document] == [each["stamp"] for each in streamed]
+
+
+def test_other_rows_than_those_wanted_may_be_bad(run: Run) -> None:
+    text = "t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,0\n1,1,2,3,0,0,0,1\n"
+    assert run("relative", "--first", "--start", "1", stdin=text).status == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "stdin", "said"),
+    [
+        (["--start", "2", "--stop", "1"], "", "--start is after --stop"),
+        (["--start", "2"], "x,y,z,yaw\n1,2,3,4\n", "--start, --stop, --time-offset: no column looks like stamps"),
+        (["--time-offset", "1", "{xyz: [1, 2, 3]}"], "", "--time-offset changes nothing: no stamps in it"),
+        (["--time-column", "t", "{xyz: [1, 2, 3]}"], "", "--time-column is for --time-offset, --start and --stop"),
+    ],
+)
+def test_times_that_cannot_be_used_are_told(run: Run, arguments: list[str], stdin: str, said: str) -> None:
+    outcome = run("convert", *arguments, stdin=stdin)
+    assert outcome.status in (1, 2)
+    assert said in outcome.err
+
+
+def test_rows_with_more_numbers_than_their_form_name_their_columns(run: Run) -> None:
+    out = run("relative", "--consecutive", stdin=STREAMS["tum"]).out
+    assert out.splitlines()[0] == "# t x y z qx qy qz qw distance angle angle_deg"
+    assert run("convert", "--to", "rpy", stdin=out).status == 0

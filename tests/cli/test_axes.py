@@ -28,8 +28,22 @@ CHANGES = {
     "unity_from_ros": [[0, -1, 0], [0, 0, 1], [1, 0, 0]],
     "ros_from_unity": [[0, 0, 1], [-1, 0, 0], [0, 1, 0]],
     "unity_from_optical": [[1, 0, 0], [0, -1, 0], [0, 0, 1]],
+    "unreal_from_ros": [[1, 0, 0], [0, -1, 0], [0, 0, 1]],
+    "unity_from_unreal": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+    "-y,z,x": [[0, -1, 0], [0, 0, 1], [1, 0, 0]],
+    "y, +z, x": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+}
+# W and B of both sides
+SYSTEMS = {
+    "aircraft_from_ros": ("ned_from_enu", "flu_from_frd"),
+    "ned_from_enu": ("ned_from_enu", "flu_from_frd"),
+    "ros_from_aircraft": ("enu_from_ned", "frd_from_flu"),
+    "unity_from_ros": ("unity_from_ros", "ros_from_unity"),
+    "opengl_from_opencv": ("opengl_from_opencv", "opengl_from_opencv"),
+    "blender_from_optical": ("opengl_from_opencv", "opengl_from_opencv"),
 }
 MIRRORS = [name for name, rows in CHANGES.items() if np.linalg.det(rows) < 0]
+LEFT_HANDED = ("unity", "unreal")
 POSE = {"xyz": [1.5, -2.25, 3.0], "xyzw": Rotation.from_euler("xyz", [0.3, -0.8, 1.9]).as_quat().tolist()}
 
 
@@ -41,8 +55,10 @@ def homogeneous(rotation: Any, xyz: Any = (0, 0, 0)) -> Any:
 
 
 def both(world: str, body: str) -> bool:
-    """Tell whether the result is a rotation."""
-    return (world in MIRRORS) == (body in MIRRORS)
+    """Tell whether the result is a rotation, and the pose between axes of one hand to begin with."""
+    hands = [name in LEFT_HANDED for name in (world.partition("_from_")[2], body.partition("_from_")[0])]
+    mirrors = world in MIRRORS, body in MIRRORS
+    return mirrors[0] == mirrors[1] and (not mirrors[0] or "," in world + body or hands[0] == hands[1])
 
 
 @pytest.mark.parametrize(("world", "body"), [(a, b) for a in CHANGES for b in CHANGES if both(a, b)])
@@ -60,6 +76,66 @@ def test_a_mirror_on_one_side_is_refused_with_what_is_none(run: Run, name: str) 
         outcome = run("convert", json.dumps(POSE), *arguments)
         assert (outcome.status, outcome.out) == (2, "")
         assert "--world-axes unity_from_ros --axes ros_from_unity" in outcome.err
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_all_axes_are_both_sides_at_once(run: Run, name: str) -> None:
+    world, body = SYSTEMS[name]
+    both = run("convert", json.dumps(POSE), "--all-axes", name, "--to", "matrix")
+    assert both == run("convert", json.dumps(POSE), "--world-axes", world, "--axes", body, "--to", "matrix")
+    line = json.dumps(POSE) + "\n"
+    rows = [run("convert", *each, "--to", "matrix", stdin=line).out
+            for each in (("--all-axes", name), ("--world-axes", world, "--axes", body))]  # fmt: skip
+    assert rows[0] == rows[1]
+
+
+@pytest.mark.parametrize("letters", ["x,-y,-z", "-y,z,x", "z,-x,-y", "y,x,z"])
+def test_axes_of_ones_own_on_both_sides_are_w_p_and_the_inverse_of_w(run: Run, letters: str) -> None:
+    got = json.loads(run("convert", json.dumps(POSE), "--all-axes", letters, "--to", "matrix", "-f", "json").out)
+    w = homogeneous([[(each[-1] == axis) * (-1 if "-" in each else 1) for axis in "xyz"] for each in letters.split(",")])
+    pose = homogeneous(Rotation.from_quat(POSE["xyzw"]).as_matrix(), POSE["xyz"])
+    np.testing.assert_allclose(got["matrix"], w @ pose @ w.T, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("there", ["unity_from_ros", "unreal_from_unity", "aircraft_from_unreal", "optical_from_aircraft"])
+def test_there_and_back_is_the_same_pose(run: Run, there: str) -> None:
+    target, _, source = there.partition("_from_")
+    out = run("convert", json.dumps(POSE), "--all-axes", there, "-f", "json").out
+    back = json.loads(run("convert", out, "--all-axes", f"{source}_from_{target}", "--to", "xyzw", "-f", "json").out)
+    (xyz,) = (np.array(back[key]) / size for key, size in (("xyz", 1.0), ("xyz_cm", 100.0)) if key in back)
+    np.testing.assert_allclose([*xyz, *back["xyzw"]], [*POSE["xyz"], *POSE["xyzw"]], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--world-axes", "unity_from_ros", "--axes", "unity_from_ros"],
+         "on the right of the pose, so beside --world-axes unity_from_ros it is --axes ros_from_unity"),
+        (["--all-axes", "unity"], "--all-axes: 'unity' is one end of a change; give A_from_B, as unity_from_ros"),
+        (["--all-axes", "x,x,-y"],
+         "--all-axes: 'x,x,-y' is no axes of one's own: x, y and z once each, with their signs, as x,-y,-z"),
+        (["--all-axes", "unity_from_ros", "--axes", "flu_from_frd"],
+         "--axes is one side of what --all-axes changes; leave one of the two out"),
+        (["--axes", "optical_from_blendr"],
+         "'blender'? axes: flu, frd, optical, opengl, enu, ned, unity, unreal, ros, aircraft, opencv, blender, or "),
+    ],
+)  # fmt: skip
+def test_what_is_no_change_of_axes_is_told_with_what_is(run: Run, arguments: list[str], said: str) -> None:
+    outcome = run("convert", json.dumps(POSE), *arguments)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert said in outcome.err
+
+
+def test_unreal_counts_in_centimetres(run: Run) -> None:
+    pose = "{xyz: [1.1, -2, 3.0e-7], rpy_deg: [0, 0, 90]}"
+    there = run("convert", pose, "--all-axes", "unreal_from_ros", "--to", "rpy_deg")
+    assert there.out == "xyz_cm: [110.0, 200.0, 3.0e-05]\nrpy_deg: {roll: 0.0, pitch: 0.0, yaw: -90.0}\n"
+    assert there.err == "frametool: note: Unreal counts in centimetres: xyz is written as xyz_cm\n"
+    back = run("convert", there.out, "--all-axes", "ros_from_unreal", "--to", "rpy_deg")
+    assert back.out == "xyz: [1.1, -2.0, 3.0e-07]\nrpy_deg: {roll: 0.0, pitch: 0.0, yaw: 90.0}\n"
+    rows = run("convert", "--all-axes", "unreal_from_ros", stdin="x_cm,y_cm,z_cm\n100,2,3\n")
+    assert rows.out == "x_cm,y_cm,z_cm\n100.0,-2.0,3.0\n"
+    assert "stays in metres, or in the unit its name says" in rows.err
 
 
 def test_a_mirror_is_no_rotation_in_a_document(run: Run) -> None:

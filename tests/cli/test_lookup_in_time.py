@@ -281,3 +281,28 @@ def test_the_listing_of_tf2_gives_static_edges_its_rate(run: Run) -> None:
         "b: \n  parent: 'a'\n  broadcaster: 'default_authority'\n  rate: 10000.000\n"
         "  most_recent_transform: 0.000\n  oldest_transform: 0.000\n  buffer_length: 0.000\n"
     )
+
+
+def test_rows_get_the_pose_at_their_own_times(run: Run) -> None:
+    files = {"drive.yaml": DRIVE, "rows.csv": 'id,t,tag\n1,0.5,a\n2,1500ms,"b,c"\n3,9,d\n'}
+    command = ("lookup", "drive.yaml", "map", "base", "-i", "rows.csv", "--time-column", "t", "--keep", "--to", "rpy_deg")
+    outcome = run(*command, "--on-error", "null", files=files)
+    assert outcome.out.splitlines() == [
+        "id,t,tag,x,y,z,roll_deg,pitch_deg,yaw_deg", "1,0.5,a,1.0,0.0,0.0,0.0,0.0,22.499999999999996",
+        '2,1500ms,"b,c",3.0,0.0,0.0,0.0,0.0,67.49999999999999', "3,9,d,,,,,,",
+    ]  # fmt: skip
+    assert "rows.csv:4:t: no data for map -> base at 9.000000000" in outcome.err
+    assert len(run(*command, "--stop", "1", files=files).out.splitlines()) == 2
+    assert "--at is one time for all rows" in run(*command, "--at", "1", files=files).err
+    assert "no column 'nix'" in run(*command[:6], "--time-column", "nix", files=files).err
+
+
+@pytest.mark.parametrize(("more", "stamps"), [((), [0, 2]), (("--start", "1"), [2]), (("--time-offset", "-2"), [-2, 0])])
+def test_a_table_has_all_samples_as_a_trajectory_has(run: Run, more: tuple[str, ...], stamps: list[int]) -> None:
+    command = ("lookup", "drive.yaml", "map", "base", *more)
+    files = {"drive.yaml": DRIVE}
+    rows = list(csv.DictReader(io.StringIO(run(*command, "-f", "csv", files=files).out)))
+    assert [int(row["stamp_ns"]) for row in rows] == [at * 1_000_000_000 for at in stamps]
+    assert [line.split()[0] for line in run(*command, "-f", "tum", files=files).out.splitlines()] == [
+        f"{at}.000000000" for at in stamps
+    ]

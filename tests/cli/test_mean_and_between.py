@@ -85,7 +85,22 @@ def test_what_is_pasted_has_a_mean(run: Run) -> None:
 @pytest.mark.parametrize("text", ["x,y,z\n1,2,3\n3,4,5\n", '{"xyz":[1,2,3]}\n{"xyz":[3,4,5]}\n'])
 def test_points_have_a_mean_position_and_no_rotation(run: Run, text: str) -> None:
     found = mean_of(run("mean", "-f", "json", stdin=text))
-    assert found == {"xyz": [2.0, 3.0, 4.0], "count": 2, "distance_rms": 3**0.5, "distance_max": 3**0.5}
+    root = dict.fromkeys(("std_x", "std_y", "std_z"), 2**0.5)
+    far = {"count": 2, "distance_rms": 3**0.5, "distance_max": 3**0.5}
+    assert found == {"xyz": [2.0, 3.0, 4.0], **far, **root, "covariance": [2.0] * 9}
+
+
+@pytest.mark.parametrize("weights", [None, WEIGHTS])
+def test_the_covariance_is_that_of_the_rows_in_the_axes_of_the_parent(run: Run, weights: Any) -> None:
+    told = () if weights is None else ("--weights", "weight")
+    found = mean_of(run("mean", *told, "-f", "json", stdin=TABLE))
+    mass = np.ones(COUNT) if weights is None else weights
+    middle = Rotation.from_quat([found["quaternion"][name] for name in "xyzw"])
+    off = np.hstack([PLACES - found["xyz"], (TURNS * middle.inv()).as_rotvec()])
+    want = (off * mass[:, None]).T @ off / mass.mean() / (COUNT - 1)
+    np.testing.assert_allclose(np.reshape(found["covariance"], (6, 6)), want, rtol=1e-9, atol=1e-12)
+    assert found["std_y"] == pytest.approx(want[1, 1] ** 0.5)
+    assert found["std_angle_deg"] == pytest.approx(np.degrees(np.trace(want[3:, 3:]) ** 0.5))
 
 
 def test_rotations_have_a_mean_rotation_and_no_position(run: Run) -> None:

@@ -122,7 +122,7 @@ def test_lines_that_are_no_time_are_skipped_with_their_place(run: Run) -> None:
     assert [row.rpartition(",")[2] for row in outcome.out.splitlines()[1:]] == ["500000000", "1500000000"]
     lines = outcome.err.splitlines()
     assert lines[0].startswith("frametool: bad.txt:2: 'soon' is not a time")
-    assert lines[1].startswith("frametool: bad.txt:3: stamp ")
+    assert lines[1].startswith("frametool: bad.txt:3: '1e400' is beyond 64 bits of nanoseconds")
     assert lines[2].startswith("frametool: no data for map -> base at 7.000000000")
     assert lines[3:] == ["frametool: 3 of 5 times skipped"]
 
@@ -276,3 +276,65 @@ def test_random_options_never_end_in_a_traceback(run: Run) -> None:
         outcome = run(*arguments, files=FILES)
         assert outcome.status in (0, 1, 2, 3, 4, 5), arguments
         assert "Traceback" not in outcome.err, arguments
+
+
+# --- the stamps of files -------------------------------------------------------------------------------------------
+
+STAMPS = {
+    "lines.txt": "0.5\n# between\n\n1.5\n",
+    "titled.txt": "stamp_ns\n500000000\n1500000000\n",
+    "rows.csv": "name,t\na,0.5\nb,1500ms\n",
+    "images.csv": "#timestamp [ns],filename\n500000000,a.png\n1500000000,b.png\n",
+    "seconds.csv": "sec,nanosec\n0,500000000\n1,500000000\n",
+    "walk.tum": "# timestamp tx ty tz qx qy qz qw\n0.5 0 0 0 0 0 0 1\n1.5 1 0 0 0 0 0 1\n",
+    "records.jsonl": '{"stamp": 0.5, "xyz": [0, 0, 0]}\n{"stamp": 1.5, "xyz": [0, 0, 0]}\n',
+    "moving.yaml": "frames: [{name: a, parent: b, samples: [{stamp: 1.5, xyz: [0, 0, 0]}, {stamp: 0.5, xyz: [0, 0, 0]}]}]",
+}
+BY_SIZE = "1700000000500000000\n1700000001500000000\n"
+
+
+@pytest.mark.parametrize("name", STAMPS)
+def test_times_are_the_stamps_of_any_file_that_has_some(run: Run, name: str) -> None:
+    outcome = run("lookup", "drive.yaml", "map", "base", "--times", name, "-f", "csv", files=FILES | STAMPS)
+    assert outcome.status == 0, outcome.err
+    assert [row.rpartition(",")[2] for row in outcome.out.splitlines()[1:]] == ["500000000", "1500000000"]
+
+
+def test_what_is_nanoseconds_by_its_size_alone_is_told(run: Run) -> None:
+    files = FILES | {"ns.txt": BY_SIZE}
+    outcome = run("lookup", "drive.yaml", "map", "base", "--times", "ns.txt", files=files)
+    assert "note: ns.txt: 1700000000500000000 is taken for nanoseconds, by its size" in outcome.err
+    assert "no data for map -> base at 1700000000.500000000" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "x,y\n1,2\n", "a.csv:1: no column of stamps (t, stamp, time, stamp_ns ..); columns: x, y"),
+        ("a.txt", "# nothing\n", "a.txt: no times in it; write one a line"),
+        ("a.txt", "", "a.txt: no times in it; write one a line"),
+        ("a.yaml", "frames: {a: {b: {xyz: [1, 2, 3]}}}", "a.yaml: no stamps in it (YAML: "),
+    ],
+)
+def test_a_file_without_stamps_is_told_so(run: Run, name: str, text: str, said: str) -> None:
+    outcome = run("lookup", "drive.yaml", "map", "base", "--times", name, files=FILES | {name: text})
+    assert (outcome.status, outcome.out) == (1, "")
+    assert outcome.err.startswith(f"frametool: {said}")
+
+
+@pytest.mark.parametrize("text", ["0.5s", "500ms", "500 ms", "500000us", "5e2ms", "500000000ns"])
+def test_a_time_may_carry_its_unit(run: Run, text: str) -> None:
+    at = run("lookup", "drive.yaml", "map", "base", "--at", text, files=FILES)
+    assert at == run("lookup", "drive.yaml", "map", "base", "--at", "0.5", files=FILES)
+
+
+def test_nanoseconds_taken_for_seconds_are_shown_as_they_are_written(run: Run) -> None:
+    said = run("lookup", "drive.yaml", "map", "base", "--at", "1700000000123456789", files=FILES).err
+    assert "are these nanoseconds? then write 1700000000123456789ns" in said
+
+
+def test_fractions_are_a_range_as_times_are(run: Run) -> None:
+    poses = ("interpolate", "{xyz: [0, 0, 0]}", "{xyz: [1, 0, 0]}")
+    assert run(*poses, "0:1:0.1", "-f", "csv") == run(*poses, *[str(at / 10) for at in range(11)], "-f", "csv")
+    assert "'0:1' is no range; a range is START:STOP:STEP, as 0:1:0.25" in run(*poses, "0:1").err
+    assert "STEP must be positive" in run(*poses, "0:1:-1").err

@@ -18,6 +18,7 @@ from frametool.cli.options import (
     Command,
     array_option,
     at_ns,
+    offset_option,
     pose_result_options,
     reading_options,
     rules,
@@ -67,6 +68,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
+@offset_option
 @reading_options(streams=True)
 @array_option
 @partial(stream_options, first=SEVERAL)

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
-from frametool.cli.options import TEXT, Command, pose_result_options, scale_option
+from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
 from frametool.cli.poses import factors_of, rows_among
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
@@ -19,6 +19,7 @@ from frametool.grammar.pose_algebra import product
 @pose_result_options("poses")
 @scale_option
 @explain_options
+@offset_option
 @pose_stream_options
 def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.

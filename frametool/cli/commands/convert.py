@@ -9,7 +9,16 @@ import click
 
 from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options, one_argument, pose_stream_options
 from frametool.cli.group import refuse_unused
-from frametool.cli.options import TEXT, AxesName, Command, Number, pose_result_options
+from frametool.cli.options import (
+    TEXT,
+    AxesName,
+    ColumnNames,
+    Command,
+    Number,
+    limit_options,
+    pose_result_options,
+    window_of,
+)
 from frametool.cli.poses import is_inline, pose_from_numbers, pose_source, rejoined, source_from_numbers, values_of
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
@@ -22,9 +31,10 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
-    from frametool.geometry.representations import Notation
+    from frametool.grammar.result import Style
     from frametool.stream.request import Operation
 
 
@@ -49,6 +59,7 @@ class ConvertCommand(Command):
 @click.option(
     "--world-axes", "world", type=AxesName(), metavar="A_from_B", help="axes of the frame it is seen from (help axes)"
 )
+@click.option("--all-axes", type=AxesName(), metavar="A_from_B", help="axes of both: unity_from_ros, or x,-y,-z")
 @click.option(
     "--find",
     type=TEXT,
@@ -61,14 +72,18 @@ class ConvertCommand(Command):
 @pose_result_options("poses", "points")
 @explain_options
 @click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
+@click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of stamps, for the next three")
+@limit_options
 @pose_stream_options
 def command(
     values: tuple[str, ...],
     axes: str | None,
     world: str | None,
+    all_axes: str | None,
     find: str | None,
     tolerance: float,
     unwrap: bool,
+    time_column: str | None,
     **options: Any,
 ) -> int:
     """Write one rotation or pose in other representations.
@@ -76,19 +91,20 @@ def command(
     \b
       frametool convert --from rpy_deg 0 0 90
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
-      frametool convert --from quaternion 0 0 0 1 --to rpy_deg,axis_angle -f json
-      frametool convert --axes optical --to rpy_deg
-      frametool convert --from rpy_deg 10 20 30 --to euler:all
+      frametool convert --all-axes unity_from_ros '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
-      frametool convert --from rpy_deg 10 20 30 --to matrix --explain
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
     standard input, which is read without any argument too.
     """
     values = rejoined(values)
+    window = window_of(options.pop("start"), options.pop("stop"), time_column)
     task = PoseTask(options, "poses", "points")
     stream, output = task.stream, task.output
+    if all_axes is not None:
+        refuse_unused("is one side of what --all-axes changes; leave one of the two out", "axes", "world")
+        world, axes = _both_sides_of(all_axes)
     if task.derives:
         task.plan()
         one_argument(values[0] if values else axes or world)
@@ -96,9 +112,10 @@ def command(
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
-    request = task.request(operation=operation, notations=forms, unwrap=unwrap)
+    request = task.request(operation=operation, notations=forms, unwrap=unwrap, window=window, extra_column=time_column)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
+        _say_centimetres(world, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.given is not None or bool(request.given_place))
     if is_numbers and request.given_place:
         from frametool.cli.earth import mapping_of
@@ -123,21 +140,25 @@ def command(
         results = list(values_of(sources, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
     if find is not None:
-        output.style = output.style.in_notations(_found(poses, find, tolerance, degrees=output.style.degrees))
+        output.style = _found(poses, find, tolerance, output.style)
     if task.derives:
         if len(poses) != 1:
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")
-        from frametool.explain import derive
-
         if not sources:
             own = (values, request.given) if values else (list(map(repr, poses[0].components[3:])), notation("xyzw"))
             sources = [source_from_numbers(*own)]
-        written = task.written(sources[0], warned=True)
-        change = _named_change(axes, world, operation) if values else None
-        return task.write(derive.convert(task.plan(), written, own=poses[0], change=change))
+        return _derived(task, sources[0], poses[0], _named_change(axes, world, operation) if values else None)
     output.values(results)
     output.tell_of_lock(poses)
     return 0
+
+
+def _derived(task: PoseTask, source: str | Source, pose: Pose, change: OtherAxes | None) -> int:
+    """Write the derivation of one pose."""
+    from frametool.explain import derive
+
+    written = task.written(source, warned=True)
+    return task.write(derive.convert(task.plan(), written, own=pose, change=change))
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
@@ -153,8 +174,8 @@ def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
     return has_from
 
 
-def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool) -> tuple[Notation, ...]:
-    """Return the Euler conventions in which three angles are a rotation, as notations."""
+def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> Style:
+    """Return a style that writes the Euler conventions in which three angles are a rotation."""
     from frametool.geometry.conventions import find_euler
     from frametool.geometry.rotation import Rotation
 
@@ -166,9 +187,10 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, *, degrees: bool)
         raise click.UsageError(f"--find: {error}") from None
     if len(read) != 3:
         raise click.UsageError(f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
+    degrees = style.degrees
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
     axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
-    return tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes)
+    return style.in_notations(tuple(notation(f"{'euler_deg' if degrees else 'euler'}:{each}") for each in axes))
 
 
 def _changed(pose: Pose, operation: Operation) -> Pose:
@@ -176,6 +198,16 @@ def _changed(pose: Pose, operation: Operation) -> Pose:
     components = operation.pose([pose.components], None, floats)
     position = None if pose.position is None else pose.position if operation.keeps_position else components[:3]
     return Pose(position, components[3:7], pose.name, pose.parent)
+
+
+def _both_sides_of(text: str) -> tuple[str, str]:
+    """Return --world-axes and --axes that --all-axes means."""
+    from frametool.geometry.conventions import sides_of
+
+    try:
+        return sides_of(text)
+    except ValueInvalid as error:
+        raise click.UsageError(f"--all-axes: {error}") from None
 
 
 def _change_of_axes(axes: str | None, world: str | None) -> Operation:
@@ -199,6 +231,20 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
     left = (world, operation.left[3:]) if world and operation.left else None
     right = (axes, operation.right[0][3:]) if axes and operation.right else None
     return OtherAxes(left, right, operation.mirrors) if left or right else None
+
+
+def _say_centimetres(world: str | None, output: Output, *, is_anew: bool) -> None:
+    """Tell of the unit of axes whose users count in centimetres, and write what is written anew in it."""
+    from frametool.geometry.conventions import IN_CENTIMETRES
+
+    into, _, out_of = (world or "").partition("_from_")
+    if into == IN_CENTIMETRES:
+        separate = not any(each.representation.whole for each in output.notations)
+        output.style.in_cm = is_anew and separate and output.style.form in ("text", "yaml", "json")
+        here = "is written as xyz_cm" if output.style.in_cm else "stays in metres, or in the unit its name says"
+        say(f"note: Unreal counts in centimetres: xyz {here}")
+    if out_of == IN_CENTIMETRES:
+        say("note: Unreal counts in centimetres: xyz is read as metres, xyz_cm and x_cm say them")
 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:

@@ -7,41 +7,62 @@ from typing import Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options
-from frametool.cli.options import TEXT, Command, Number, pose_result_options
+from frametool.cli.options import TEXT, Command, Parsed, pose_result_options
 from frametool.cli.poses import combinations
-from frametool.errors import warn
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import interpolated, shared_stamp
 from frametool.grammar.result import Result
+from frametool.text.numbers import parse_number
+
+MOST = 1_000_000  # fractions of a range
+
+
+def fractions_of(text: str) -> list[float]:
+    """Read a fraction, several between commas, or START:STOP:STEP, whose steps are those of decimals."""
+    if ":" not in text:
+        return [parse_number(each.strip()) for each in text.split(",")]
+    from decimal import Decimal
+
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise ValueInvalid(f"{shown(text)} is no range; a range is START:STOP:STEP, as 0:1:0.25")
+    start, stop, step = (Decimal(repr(parse_number(each.strip()))) for each in parts)
+    if step <= 0 or stop < start:
+        raise ValueInvalid(f"{shown(text)}: STEP must be positive and STOP not before START")
+    count = int((stop - start) / step) + 1
+    if count > MOST:
+        raise ValueInvalid(f"{shown(text)} has more than {MOST} fractions")
+    return [float(start + at * step) for at in range(count)]
 
 
 @click.command(cls=Command, name="interpolate")
 @click.argument("a", type=TEXT)
 @click.argument("b", type=TEXT)
-@click.argument("fractions", nargs=-1, required=True, type=Number())
+@click.argument("fractions", nargs=-1, required=True, type=Parsed("number", fractions_of), metavar="FRACTION..")
 @pose_result_options("poses")
 @explain_options
-def command(a: str, b: str, fractions: tuple[float, ...], **options: Any) -> int:
+def command(a: str, b: str, fractions: tuple[list[float], ...], **options: Any) -> int:
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 
     \b
       frametool interpolate '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' 0.5
-      frametool interpolate '{rpy: [0, 0, 0]}' '{rpy: [0, 0, 1]}' 0 0.5 1 -f csv
+      frametool interpolate '{rpy: [0, 0, 0]}' '{rpy: [0, 0, 1]}' 0:1:0.25 -f csv
 
-    The rotation takes the shorter arc. Fractions outside 0 .. 1 extrapolate. Unlike a screw motion, position and
-    rotation are independent.
+    Fractions are numbers, or START:STOP:STEP; those outside 0 .. 1 extrapolate. The rotation takes the shorter arc.
+    Unlike a screw motion, position and rotation are independent.
     """
-    task = PoseTask(options)
+    task, asked = PoseTask(options), [each for some in fractions for each in some]
     if task.derives:
         plan = task.plan()
-        if len(fractions) != 1:
-            raise click.UsageError(f"--explain derives one fraction, found {len(fractions)}")
+        if len(asked) != 1:
+            raise click.UsageError(f"--explain derives one fraction, found {len(asked)}")
         from frametool.explain import derive
 
-        return task.write(derive.interpolate(plan, task.written(a), task.written(b), fractions[0]))
+        return task.write(derive.interpolate(plan, task.written(a), task.written(b), asked[0]))
     pairs = combinations((a, b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
         warn(LEFT_OUT.format("interpolate"))
-    between = [interpolated(first, last, each) for first, last in pairs for each in fractions]
+    between = [interpolated(first, last, each) for first, last in pairs for each in asked]
     task.output.poses([Result(pose, shared_stamp((pose,))) for pose in between])
     return 0

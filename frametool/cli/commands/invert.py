@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
-from frametool.cli.options import TEXT, Command, pose_result_options, scale_option
+from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
 
 
 @click.command(cls=Command, name="invert")
@@ -15,6 +15,7 @@ from frametool.cli.options import TEXT, Command, pose_result_options, scale_opti
 @pose_result_options("poses")
 @scale_option
 @explain_options
+@offset_option
 @pose_stream_options
 def command(pose: str, scale: bool, **options: Any) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.

@@ -15,6 +15,7 @@ from frametool.cli.options import (
     Command,
     Skipped,
     at_ns,
+    limit_options,
     pose_options,
     read_times,
     reading_options,
@@ -23,9 +24,11 @@ from frametool.cli.options import (
     rules,
     rules_options,
     times_option,
+    window_of,
 )
 from frametool.cli.streaming import OPTIONS, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
+from frametool.errors import NoDataAt
 from frametool.formats.table import holds_arrays
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
@@ -50,6 +53,7 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @click.option("--fixed", type=FRAME, metavar="FRAME", help="what stands still between the two times: map")
 @click.option("--covariance", is_flag=True, help="how sure it is, by the edges' sigmas (help covariance)")
 @times_option
+@limit_options
 @rules_options
 @reading_options(streams=True)
 @pose_options
@@ -67,14 +71,13 @@ def command(
 
     \b
       frametool lookup robot.yaml map camera_optical
-      frametool lookup robot.yaml base_link lidar --to rpy_deg --format json
-      frametool lookup drive.yaml map base_link --at 2.5
       frametool lookup drive.yaml map base_link --times 0:4:0.5 --format csv
       frametool lookup drive.yaml lidar lidar --at 4 --source-at 2.5 --fixed map
 
-    TREE is a file, -, or . for FRAMETOOL_TREE's. Between samples positions go along lines, rotations by slerp.
-    Trajectories (-f tum ..) hold all samples.
+    TREE is a file, -, or . for FRAMETOOL_TREE's (help time).
+    Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
+    window = window_of(options.pop("start"), options.pop("stop"))
     by_row, task = RowFrames(options), PoseTask(options)
     stream, output = task.stream, task.output
     if task.derives and (by_row or times is not None):
@@ -82,14 +85,16 @@ def command(
     plan = task.plan() if task.derives else None
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
-    _check(at, source_at, fixed, times)
+    _check(at, source_at, fixed, times, window)
     if covariance:
         _check_covariance(output, derives=task.derives, fixed=fixed, by_row=bool(by_row))
     if by_row:
         refuse_unused("is for one lookup; the rows of a table name theirs", "times", "source_at", "fixed")
+        if by_row.time is not None:
+            refuse_unused("is one time for all rows; --time-column gives each its own", "at")
     else:
         rows = {*OPTIONS} - {"quiet", "given", *(["on_error"] if times is not None else [])}
-        refuse_unused("is about rows that name frames: give --target-column or --source-column", *rows)
+        refuse_unused("is about rows: give --time-column, --target-column or --source-column", *rows)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
@@ -100,7 +105,7 @@ def command(
     if sigmas is None:
         tell_unused_sigmas(frames)
     if by_row or target is None or source is None:
-        return by_row.run(task, frames, target, source, at_ns(at), sigmas)
+        return by_row.run(task, frames, target, source, at_ns(at), sigmas, window)
     if tf2 is None:
         target, source = frame_name(target, frames), frame_name(source, frames)
         fixed = fixed and frame_name(fixed, frames)
@@ -110,10 +115,11 @@ def command(
         found = derive.lookup(plan, frames, target, source, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
         return task.write(found)
     output.take_axes_in(frames, source)
-    every = output.is_trajectory and at is None and fixed is None and frames.latest(target, source) is not None
+    every = output.holds_all or window is not None
+    every = every and at is None and fixed is None and frames.latest(target, source) is not None
     if times is not None or every:
         skip = stream.options["on_error"] == "skip"
-        return _many(output, frames, target, source, times, sigmas, skip=skip)
+        return _many(output, frames, target, source, times, sigmas, window, skip=skip)
     if fixed is not None:
         output.poses([looked_up_across(frames, target, at_ns(at), source, at_ns(source_at), fixed)])
     else:
@@ -124,8 +130,13 @@ def command(
     return 0
 
 
-def _check(at: int | str | None, source_at: int | str | None, fixed: str | None, times: str | None) -> None:
+def _check(
+    at: int | str | None, source_at: int | str | None, fixed: str | None, times: str | None,
+    window: tuple[int, int] | None,
+) -> None:  # fmt: skip
     """Refuse options that do not belong together."""
+    if window is not None and (at is not None or fixed is not None):
+        raise click.UsageError("--start and --stop are about many times; leave --at, --source-at and --fixed out")
     if (source_at is None) != (fixed is None):
         raise click.UsageError("--source-at and --fixed belong together: two times need a frame that stands still")
     if times is not None and (at is not None or fixed is not None):
@@ -146,12 +157,16 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
 
 
 def _many(
-    output: Output, frames: Frames, target: str, source: str, times: str | None, sigmas: CarriedSigmas | None, *,
-    skip: bool,
+    output: Output, frames: Frames, target: str, source: str, times: str | None, sigmas: CarriedSigmas | None,
+    window: tuple[int, int] | None, *, skip: bool,
 ) -> int:  # fmt: skip
     """Print the results at many times, or at those of all samples; with `skip` the others are left out and reported."""
     skipped = Skipped(in_json=output.told == "json")
     asked = sample_stamps(frames, target, source) if times is None else read_times(times, skipped.add if skip else stop)
+    if window is not None:
+        asked = [stamp for stamp in asked if window[0] <= stamp <= window[1]]
+        if not asked:
+            raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")
 
     def miss(at_ns: int) -> None:
         skipped.add(None if skipped.is_full else why_missing(frames, target, source, at_ns))

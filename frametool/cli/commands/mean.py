@@ -11,7 +11,6 @@ from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from
 from frametool.errors import ValueInvalid, warn
-from frametool.grammar.pose import LEFT_OUT
 from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
 
@@ -42,7 +41,8 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
 
     Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
     of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
-    _deg degrees) between the poses and the mean.
+    _deg degrees) between the poses and the mean. covariance is that of one pose, over x y z and turns about X Y Z in
+    the parent's axes as in ROS, by n - 1; std_x, std_y, std_z and std_angle are roots of its diagonal.
 
     With --robust all of that is of the poses kept, `used` of `count`: what is more than 3 sigmas off, by medians, is
     left out, told with its place, how far off it is, and u, that in sigmas; the status is then 3. Where none is, the
@@ -67,7 +67,7 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
         if given is not None and len(given) != len(gathered.transforms):
             raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
     if gathered.uncertain:
-        warn(LEFT_OUT.format("mean"))
+        warn("covariances left out: mean's is that of the rows")
     result, left_out = _mean(gathered, given, robust=robust)
     task.output.poses([result])
     for line in left_out[:MOST]:
@@ -87,19 +87,20 @@ def _numbers(weights: str) -> list[float]:
 
 def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
     """Return the mean of what was gathered, with its spread, and what to say of each pose that was left out."""
+    from frametool.fit.robust_mean import covariance_of, solve_mean
     from frametool.geometry.spread import mean_and_spread
     from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result
+    from frametool.grammar.result import Result, uncertain
 
     transforms = gathered.transforms
     weights = gathered.weights if given is None else given
     extras: dict[str, Any] = {"count": len(transforms)}
     left_out: list[str] = []
     if robust:
-        from frametool.fit.robust_mean import solve_mean
-
         found = solve_mean(transforms, weights=weights)
         mean, spread = found.transform, found.spread
+        heavy = None if weights is None else [weights[at] for at in found.used.nonzero()[0].tolist()]
+        covariance = covariance_of(transforms[found.used], mean, heavy)
         extras["used"] = int(found.used.sum())
         for row in found.left_out.nonzero()[0].tolist():
             metres, radians = (math.hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
@@ -107,11 +108,20 @@ def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tup
             left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
     else:
         mean, spread = mean_and_spread(transforms, weights)
+        covariance = covariance_of(transforms, mean, weights)
     pose = Pose.of(mean.components)
     if gathered.placed:
         extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
     if gathered.turned:
         extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": math.degrees(spread.angle_rms)}
         extras |= {"angle_max": spread.angle_max, "angle_max_deg": math.degrees(spread.angle_max)}
+    if covariance is not None:
+        if gathered.placed:
+            roots = [math.sqrt(covariance[at, at]) for at in range(3)]
+            extras |= dict(zip(("std_x", "std_y", "std_z"), roots, strict=True))
+        if gathered.turned:
+            angle = math.sqrt(covariance[3:, 3:].trace())
+            extras |= {"std_angle": angle, "std_angle_deg": math.degrees(angle)}
+        extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
     position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
     return Result(Pose(position, rotation, None, gathered.frame), extras), left_out

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.options import FILE, TEXT, Command, file_options, result_options
+from frametool.cli.options import FILE, TEXT, Command, file_options, offset_option, result_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import opened, state
-from frametool.lint.monitor_report import monitor
+from frametool.lint.monitor_report import clocks_differ, monitor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +25,7 @@ MOST_TOLD = 3  # frames that come by the topics of two robots
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
 @click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@offset_option
 @file_options
 @result_options("report")
 def command(recording: str, frames: Sequence[str], more: Sequence[str], normalize: bool, **options: Any) -> int:
@@ -39,8 +40,9 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
     between them are told, and the interval in which all of them have data.
     Rates are in stamp time: what the recorder's clock did is the delay, known from bags and `rostopic echo -p` only.
     A gap is the longest pause between two stamps, in the order of time; back counts samples that come after a later
-    stamp, reparented the changes of parent. A jump is a step 10 times the median one and longer than 0.1 m or
-    0.2 rad.
+    stamp, reparented the changes of parent; gaps are pauses 5 times the median one. length_m is that of the path,
+    speed_mean and speed_max metres a second from stamp to stamp. A jump is a step 10 times the median one and longer
+    than 0.1 m or 0.2 rad.
     """
     if len(frames) not in (0, 2):
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
@@ -53,5 +55,7 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
         say_error(error, in_json=output.told == "json")
     if len(clashes) > MOST_TOLD:
         say(f"{len(clashes) - MOST_TOLD} more frames come by two topics")
+    if clocks_differ(report):
+        say("note: stamps and the recorder's clock are years apart (simulated time?): the delays say nothing")
     output.report(report)
     return FAILED if clashes else 0

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
 from frametool.cli.group import settings
-from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
+from frametool.cli.options import TEXT, ColumnNames, Command, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among
 from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
@@ -33,6 +33,7 @@ from frametool.grammar.pose_algebra import relative_names
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
 @explain_options
+@limit_options
 @pose_stream_options
 def command(
     a: str | None,
@@ -58,6 +59,7 @@ def command(
 
     The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
+    window = window_of(options.pop("start"), options.pop("stop"))
     task = PoseTask(options)
     if task.derives:
         plan = task.plan()
@@ -69,8 +71,8 @@ def command(
         return task.write(derive.relative(plan, *map(task.written, arguments)))
     if velocity and not consecutive:
         raise click.UsageError("--velocity is that from one row to the next; give --consecutive too")
-    if time_column is not None and not velocity:
-        raise click.UsageError("--time-column is for --velocity")
+    if time_column is not None and not (velocity or window or settings().time_offset):
+        raise click.UsageError("--time-column is for --velocity, --time-offset, --start and --stop")
     from frametool.stream.request import PREVIOUS, START, Operation
 
     given = [each for each in (a, b) if each is not None]
@@ -80,8 +82,10 @@ def command(
             raise click.UsageError(f"rows are compared with one of themselves; {one}")
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
-        beside = (time_column or "") if velocity else None
-        request = task.request(operation=operation, extra_column=beside, rename=lambda _parent, name: (name, name))
+        beside = (time_column or "") if velocity or window else None
+        request = task.request(
+            operation=operation, extra_column=beside, window=window, rename=lambda _parent, name: (name, name)
+        )
         status = task.answer(a or "-", request)
         if velocity and not settings().quiet:
             say("note: the first pose has none before it, so no velocity: it is left out, results begin at the second")
@@ -89,12 +93,12 @@ def command(
     if b is None:
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
-        return task.answer("-", task.request(operation=Operation(of="pair"), poses=2))
+        return task.answer("-", task.request(operation=Operation(of="pair"), poses=2, window=window))
     if given == ["-", "-"]:
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
     if task.stream.path and "-" not in given:
         raise click.UsageError("-i FILE is read where - stands for A or B")
-    request = task.request()
+    request = task.request(window=window)
     rows = rows_among(given, request, task.has_table)
     fixed = [*rows.before, *rows.behind][0]
 

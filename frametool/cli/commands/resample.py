@@ -13,6 +13,7 @@ from frametool.cli.options import (
     Command,
     Number,
     Parsed,
+    offset_option,
     read_times,
     reading_options,
     result_options,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 @click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
               help="that is interpolated  [default: 3 median intervals]")  # fmt: skip
 @trajectory_options
+@offset_option
 @reading_options()
 @rotation_options
 @result_options("poses")
