@@ -30,7 +30,7 @@ from frametool.text.spans import MARGIN, Spans, framed
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from frametool.stream.layout import ADDED, NAME, NAMED, PARENT, quoted
+    from frametool.stream.layout import Layout
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.text.cells import Cells
