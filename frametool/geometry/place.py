@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid
 from frametool.geometry import earth, floats, quaternion, rigid
 from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.floats import RADIAN, SQRT_HALF
@@ -126,11 +126,6 @@ class Place(NamedTuple):
             first += each.size
         return found
 
-    @property
-    def readers(self) -> dict[int, Callable[[str], float]]:
-        """Return what reads its numbers that are written as words, by the number's place."""
-        return {at: READERS[field] for at, field in enumerate(self.fields) if field in READERS}
-
     def with_grid(self, *, gridded: bool) -> Place:
         """Return the same with convergence and scale beside UTM, where there is room for them, or without."""
         size = len(self.fields) - len(GRIDDED) * (GRIDDED[0] in self.fields)
@@ -222,7 +217,7 @@ class Place(NamedTuple):
             mercator.check_grid(zone, given["easting"], given["northing"])
         elif self.name == LLA:
             earth.check_lla(*self.lla(numbers))
-        if self.axes == GRID:
+        if GRID in (self.axes, AXES in given and earth.AXES[int(given[AXES])]):
             lat, lon, _ = self.lla(numbers)
             mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
 
@@ -317,13 +312,3 @@ def namespace(numbers: Sequence[Any]) -> Namespace:
 
     return arrays
 
-
-def axes_number(text: str) -> float:
-    """Read the name of axes in a cell of a table as its place among `earth.AXES`; raises ValueInvalid."""
-    name = text.strip()
-    if name not in earth.AXES:
-        raise ValueInvalid(f"{shown(name)}: axes at a place are {', '.join(earth.AXES)}")
-    return float(earth.AXES.index(name))
-
-
-READERS = {ZONE: mercator.zone_number, AXES: axes_number}  # of words

@@ -16,8 +16,8 @@ from frametool.geometry import uncertainty
 from frametool.geometry.place import ENU, LLA, Earth
 from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
-from frametool.grammar.names import EARTH_FRAMES
-from frametool.grammar.place import AT, EARTH_KEYS, SAME, read_placed
+from frametool.grammar.names import EARTH_FRAMES, FIX
+from frametool.grammar.place import AT, EARTH_KEYS, SAME, check_parent, read_placed
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 QUATERNION = notation("quaternion")
-FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
 STAYS = ("{} stay data: x, y, z are the position; to read the place, leave these out")
 WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "north")
@@ -61,6 +60,7 @@ def record_on_earth(
         return None
     if request.kind == VECTOR:
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
+    check_parent(value, value)
     plain = _plain_point(value, request)
     return _numbered(value, path, plain, request) if plain else _read(value, path, positions, reading, request)
 
