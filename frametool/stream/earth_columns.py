@@ -26,6 +26,7 @@ from frametool.grammar.place import (
     band_s,
     check_datum,
     check_in_ecef,
+    check_parent,
     coordinate,
     not_on_ellipsoid,
     zone_of_epsg,
@@ -47,16 +48,15 @@ if TYPE_CHECKING:
     Reader: TypeAlias = Callable[[str], float]
 
 ECEF_COLUMNS = REPRESENTATIONS[ECEF].columns
-STATUS, DATUM, EPSG = "status", "datum", "epsg"
+STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
 OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES,
-          STATUS, DATUM, EPSG)  # fmt: skip
+          STATUS, DATUM, EPSG, PARENT)  # fmt: skip
 FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for name in OTHERS}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
     r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
     re.IGNORECASE,
 )
-FIX_STATUS = "status.status"
 FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
 DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
 
@@ -80,8 +80,8 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
         if name and (match := PATTERN.fullmatch(name)):
             unit = (match[4] if match[4] is not None else match[3] or "").lower()
             prefix, field = match[1].lower(), FIELDS[match[2].lower()]
-            if field == STATUS and prefix.endswith("status."):  # of a NavSatFix: another may be anything
-                prefix, field = prefix.removesuffix("status."), FIX_STATUS
+            if field == STATUS:  # of a NavSatFix: another may be anything
+                prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
             groups.setdefault(prefix, {}).setdefault(field, Spot(at, name, unit))
     found = [
         (prefix, columns)
@@ -148,15 +148,14 @@ def _columns(kind: str, fields: Sequence[tuple[str, Spot]], spots: dict[str, Spo
         if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
-    fields = [*fields, *((name, spots[name]) for name in (AXES, EPSG, DATUM) if name in spots)]
-    status = spots.get(FIX_STATUS) if kind == LLA else None
-    fields = [*fields, *([(STATUS, status)] if status else [])]
+    fields = [*fields, *((name, spots[name]) for name in (AXES, EPSG) if name in spots)]
+    staying = [(name, spots[name]) for name in (DATUM, STATUS, PARENT) if name in spots]
+    fields = [*fields, *staying]
     zone = earth.zone if kind == UTM and fields[0][0] != ZONE else None
     place = Place(kind, tuple(field for field, _ in fields), earth.axes or kind * (kind in LOCAL), zone,
                   earth.origin if kind in LOCAL else None)  # fmt: skip
     places, names = zip(*((spot.place, spot.name) for _, spot in fields), strict=True)
-    staying = sum(name in (STATUS, DATUM) for name, _ in fields)
-    return Columns(places, names, unit=place, staying=staying)
+    return Columns(places, names, unit=place, staying=len(staying))
 
 
 def _in_radians(spot: Spot) -> bool:
@@ -328,8 +327,14 @@ def _status(text: str) -> float:
     return 0.0
 
 
+def _parent(text: str) -> float:
+    """Check the frame that a row names."""
+    check_parent({PARENT: text or None}, {"lat": None})
+    return 0.0
+
+
 WORDS: dict[str, Reader] = {
-    ZONE: _zone, AXES: _axes, DATUM: partial(_said, DATUM), EPSG: partial(_said, EPSG), STATUS: _status
+    ZONE: _zone, AXES: _axes, DATUM: partial(_said, DATUM), EPSG: partial(_said, EPSG), STATUS: _status, PARENT: _parent
 }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from frametool.grammar.names import (
     EARTH_FRAMES,
     NAME_KEYS,
     PARENT_COLUMNS,
+    PARENT_KEYS,
     in_nanoseconds,
     may_be_on_earth,
     may_be_uncertain,
@@ -73,11 +74,12 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
-    frames = () if on_earth else _frame_columns(table, request, source)
+    frames = _frame_columns(table, request, source)
+    frames = tuple(place for place in frames if not on_earth or table.name(place) == PARENT_KEYS[0])
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
     edge_of = None if on_earth else request.pose_of_row_frame
-    if frames and edge_of is None and request.operation.moves:
+    if frames and edge_of is None and request.operation.moves and not on_earth:
         edge_of = request.pose_from_frame
     words, marked = readers_of(shapes[0]) if on_earth else ({}, {})
     edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
