@@ -74,8 +74,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
-    frames = _frame_columns(table, request, source)
-    frames = tuple(place for place in frames if not on_earth or table.name(place) == PARENT_KEYS[0])
+    frames = () if on_earth else _frame_columns(table, request, source)
+    if on_earth and PARENT_KEYS[0] in (table.names or ()):
+        frames = ((table.names or ()).index(PARENT_KEYS[0]),)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
     edge_of = None if on_earth else request.pose_of_row_frame
