@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.errors import ValueInvalid
 from frametool.geometry import earth, floats, quaternion, rigid
 from frametool.geometry import transverse_mercator as mercator
-from frametool.geometry.floats import RADIAN, SQRT_HALF
+from frametool.geometry.floats import RADIAN, SQRT_HALF, nearest
 from frametool.geometry.representations import REPRESENTATIONS
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ LLA, UTM = "lla", "utm"
 LOCAL = (ENU, NED)
 ZONE, AXES = "zone", "axes"  # what is written as a word
 SAMPLE = 0.5  # a number that is no zone
+EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both are whole degrees
 GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
 UNSAID = (
     "a pose at lat, lon does not say what its rotation is given in; "
@@ -246,7 +247,8 @@ class Place(NamedTuple):
                     found += place
                     continue
                 zone = _held(each.zone, lat, lon, xp)
-                easting, northing, *grid = mercator.utm(zone, lat, lon, xp)
+                ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
+                easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
                 found += [zone, easting, northing, alt, *grid[: len(each.fields) - 4]]
         return found
 
@@ -269,7 +271,7 @@ class Place(NamedTuple):
                 earth.check_ecef(x, y, z)
             if each.name == UTM or each.axes == GRID:
                 lat, lon, _ = earth.lla(x, y, z, floats)
-                mercator.check_utm(_held(each.zone, lat, lon, floats), lat, lon)
+                mercator.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers as the keys that a mapping has."""
@@ -298,10 +300,16 @@ class Earth(NamedTuple):
 
 
 def _held(zone: Any, lat: Any, lon: Any, xp: Namespace) -> Any:
-    """Return the zone that is held, or that of each place."""
+    """Return the zone that is held, or that of each place; one at an edge is there though rounding moved it."""
     if zone is None:
-        return mercator.standard_zone(lat, lon, xp)
+        return mercator.standard_zone(_edged(lat, EDGE, xp), _edged(lon, EDGE, xp), xp)
     return zone + (lat - lat)
+
+
+def _edged(angle: Any, near: float, xp: Namespace) -> Any:
+    """Return whole degrees where an angle is as near to them."""
+    whole = nearest(angle)
+    return xp.where(abs(angle - whole) <= near, whole, angle)
 
 
 def namespace(numbers: Sequence[Any]) -> Namespace:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, warn
+from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.clouds import NORMALS
 from frametool.formats.rows.column_file import (
@@ -24,7 +24,7 @@ from frametool.formats.rows.column_file import (
     rows_of_batch,
 )
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import in_nanoseconds, stamp_column
+from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_column
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused, RowNote
@@ -203,7 +203,8 @@ class ColumnRows:
             if place not in used and self.table.names
         }
         rename = rename_of(self.request.for_kind(self.shape.kind))
-        unnamed = (None, None) if rename is None else rename(None, None)
+        own_frame = EARTH_FRAMES[0] if self.shape.place is not None else None
+        unnamed = (own_frame, None) if rename is None else rename(own_frame, None)
         names: list[Sequence[str | None]] = [[name] for name in unnamed]
         for role, texts in results.names.items():
             names[role] = [text or None for text in texts]
@@ -225,6 +226,9 @@ class ColumnRows:
         for shape in self.plan.shapes:
             flags: Flags | None = None
             for at in range(first, first + shape.size):
+                if at in self.plan.words:
+                    columns[at] = self._words(batch, at, bad)
+                    continue
                 columns[at], missing = batch.numbers(places[at])
                 odd = not_finite(columns[at])
                 if odd is not None and not self.file.gaps:
@@ -238,6 +242,17 @@ class ColumnRows:
             absent.append(flags)
             first += shape.size
         return columns.T, absent or [None], bad
+
+    def _words(self, batch: Batch, at: int, bad: dict[int, tuple[str, str]]) -> list[float]:
+        """Read a column of words, each of which stands for a number."""
+        read, texts = self.plan.words[at], [str(text) for text in batch.texts(self.layout.places[at])]
+        known: dict[str, float] = {}
+        for row, text in enumerate(texts):
+            try:
+                known[text] = known[text] if text in known else read(text)
+            except ValueInvalid as error:
+                bad[row] = self.plan.names[at], str(error)
+        return [known.get(text, 0.0) for text in texts]
 
     def _without_pose(self, absent: Sequence[Flags | None]) -> Flags | None:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""

@@ -202,10 +202,12 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 
     Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
     """
-    header = Header(names)
+    matches = {name: FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
+    header = Header(names if request.given_place else ["" if matches.get(name) in ECEF_COLUMNS else name for name in names])
     earth, given = request.earth or Earth(), request.given_place
     if not given and (others := find_positions(header)):
-        if not request.operation.keeps_frames and (said := [name for name in names if may_be_on_earth(name)]):
+        said = [name for name, field in matches.items() if may_be_on_earth(name) or field == "lon"]
+        if not request.operation.keeps_frames and said:
             told = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
             warn(f"{source}: {told}; --columns lat,lon,alt --from lla turns it round")
         return None

@@ -151,18 +151,16 @@ class Run:
 
     def _read(self) -> Floats:
         """Read all numbers; those that are none are nan."""
-        values, words = self.block.values, self.plan.words
-        if values is not None:
-            cells = [(row, column, f"{values[row, column]:g}") for column in words for row in range(self.count)]
-            numbers = values.copy() if words else values
-        else:
-            numbers, bad = parse_floats(self.block.numbers)
-            odd = [divmod(place, numbers.shape[1]) for place in bad.tolist()]
-            odd = [each for each in odd if each[1] not in words]
-            odd += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
-            cells = [(*each, self.block.numbers.text(*each).decode("utf-8", "replace").strip(" \t")) for each in odd]
+        if self.block.values is not None:
+            return self.block.values
+        words = self.plan.words
+        numbers, bad = parse_floats(self.block.numbers)
+        odd = [divmod(place, numbers.shape[1]) for place in bad.tolist()]
+        odd = [each for each in odd if each[1] not in words]
+        odd += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
         known: dict[tuple[int, str], float] = {}
-        for row, column, text in cells:
+        for row, column in odd:
+            text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
                 if column not in words:
                     numbers[row, column] = self._read_odd(text, column)
