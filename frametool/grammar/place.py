@@ -126,7 +126,8 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
-        found.append(_utm({key: own[key] for key in own if key in {*UTM_KEYS, "epsg"} or SAME.get(key) == "alt"}, reading))
+        flat = {key: own[key] for key in own if key in {*UTM_KEYS, "epsg"} or SAME.get(key) == "alt"}
+        found.append(_utm(flat, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
         found.append(_lla(own, reading))
     if LOCAL_KEYS.intersection(own):

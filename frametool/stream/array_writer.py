@@ -18,7 +18,6 @@ from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn, not_finite
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
-from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
 from frametool.stream.row_poses import NO_STAMP, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import target_in
@@ -248,7 +247,7 @@ class ArrayWriter(ColumnsWriter):
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
-        if (place := self.style.place) is not None:
+        if (place := self.style.place) is not None and len(block.numbers):
             from frametool.grammar.place import check_in_ecef
 
             for parent in dict.fromkeys(block.parents):
@@ -282,9 +281,10 @@ class ArrayWriter(ColumnsWriter):
         if (place := self.target.place) is not None:
             for at, words in place.words.items():
                 name = place.columns[at]
-                made[name] = Made([words[int(number)] for number in np.nan_to_num(made[name].values).tolist()])
+                numbers = np.nan_to_num(made[name].values).tolist()
+                made[name] = Made(objects([words[int(number)] for number in numbers]))
             if self.target.notations:
-                made["axes"] = Made([place.axes] * size)
+                made["axes"] = Made(objects([place.axes] * size))
         if block.stamps_ns is not None:
             none = block.stamps_ns == NO_STAMP
             made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)

@@ -11,18 +11,18 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, shown, warn
-from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place
 from frametool.geometry.earth import AXES as AXES_AT
+from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place
 from frametool.geometry.representations import HEADING, REPRESENTATIONS, Notation
-from frametool.grammar.names import FIX, PARENT_COLUMNS, may_be_on_earth
 from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 from frametool.geometry.transverse_mercator import zone_number
+from frametool.grammar.names import FIX, PARENT_COLUMNS, may_be_on_earth
 from frametool.grammar.place import (
     GEOID,
     NO_ALT,
+    NO_MGRS,
     SAME,
     SEA_LEVEL,
-    NO_MGRS,
     band_s,
     check_datum,
     check_in_ecef,
@@ -203,7 +203,8 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
     """
     matches = {name: FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
-    header = Header(names if request.given_place else ["" if matches.get(name) in ECEF_COLUMNS else name for name in names])
+    known = () if request.given_place else ECEF_COLUMNS
+    header = Header(["" if matches.get(name) in known else name for name in names])
     earth, given = request.earth or Earth(), request.given_place
     if not given and (others := find_positions(header)):
         said = [name for name, field in matches.items() if may_be_on_earth(name) or field == "lon"]

@@ -203,7 +203,7 @@ class Run:
         if (given := self.plan.shapes[0].place) is not None:
             self.rounded += doubt_band(given, self.columns, line_of)
         if (place := self.plan.targets[0].place) is not None and len(self.rows):
-            self.rounded += zone_notes(place, self.results.T, lambda row: line_of(int(self.rows[row])))
+            self.rounded += zone_notes(place, [*self.results.T], lambda row: line_of(int(self.rows[row])))
 
     def _doubt_turns(self, moved: Sequence[Components]) -> None:
         """Tell of the first row whose turn is too uncertain for the first order."""

@@ -86,7 +86,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
-    columns = (_several if several else _columns)(table, [_written(pose) for pose in poses], shapes, targets, request, named)
+    poses = [_written(pose) for pose in poses]
+    columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if beside and not request.keep:
         from frametool.stream.beside import with_entries_at
 

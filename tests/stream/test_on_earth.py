@@ -34,7 +34,7 @@ ORIGIN = "{lat: 48.1, lon: 11.5, alt: 520}"
 SITE = f"frames: [{{name: map, parent: ecef, at: {ORIGIN}, axes: enu}}]"
 
 
-def table(names: str, rows: Iterable[Sequence[Any]], delimiter: str = ",") -> str:
+def table(names: str, rows: Iterable[Iterable[Any]], delimiter: str = ",") -> str:
     """Write a table."""
     lines = [names.replace(",", delimiter), *(delimiter.join(str(each) for each in row) for row in rows)]
     return "\n".join(lines) + "\n"
@@ -47,7 +47,7 @@ def numbers(text: str) -> list[list[str]]:
 
 def ecef_of(text: str) -> list[list[float]]:
     """Read the positions of a CSV, by name."""
-    return [[float(row[f"ecef_{axis}"]) for axis in "xyz"] for row in csv.DictReader(io.StringIO(text))]
+    return [[float(row.get(f"ecef_{axis}") or row[axis]) for axis in "xyz"] for row in csv.DictReader(io.StringIO(text))]
 
 
 def flat(value: Any) -> list[float]:
@@ -257,7 +257,7 @@ def base(axes: str, lat: float = LAT, lon: float = LON) -> np.ndarray:
         return enu
     turn = math.radians(float(earth_oracles.transverse_mercator(lat, mpf(lon) - 9)[2]))
     c, s = math.cos(turn), math.sin(turn)
-    return enu @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return np.asarray(enu @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
 
 
 def matrix(xyzw: Sequence[float]) -> np.ndarray:
