@@ -91,8 +91,8 @@ class ColumnRows:
         except FormatError as error:
             error.line = 0  # the names of columns stand in no line here
             raise
-        for place in self.layout.places:
-            if file.kind(place) is None:
+        for at, place in enumerate(self.layout.places):
+            if file.kind(place) is None and at not in self.plan.words:
                 raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
         self.plan = self.plan._replace(pieces=())
         self.naming = Naming(self.table, self.layout, self.request.for_kind(self.shape.kind))

@@ -19,6 +19,7 @@ import yaml
 from mpmath import mpf
 
 import frametool
+from frametool import earth
 from frametool.geometry import quaternion
 
 if TYPE_CHECKING:
@@ -565,3 +566,15 @@ def test_arrays_and_floats_of_the_kernels_agree_with_what_streams_write(run: Cal
     for at, cells in enumerate(found):
         assert cells[0] == zone[at]
         assert [float(each) for each in cells[1:3]] == pytest.approx([easting[at], northing[at]], abs=5e-9)
+
+
+def test_the_snippets_of_the_docstrings_run() -> None:
+    lines = [line.strip() for line in (earth.__doc__ or "").splitlines() if line.startswith("    ")]
+    known: dict[str, Any] = {"frametool": frametool}
+    exec("\n".join(lines[:-1]), known)
+    assert eval(lines[-1], known) == pytest.approx([0.0, 0.0, 1.0], abs=5e-9)
+    assert "frametool.earth_pose" in (frametool.FrameTree.__doc__ or "")
+    tree = frametool.FrameTree()
+    tree.add("ecef", "map", frametool.earth_pose(48.1, 11.5, 520.0))
+    tree.add("ecef", "site", frametool.earth_pose(48.1, 11.5, 530.0, axes="ned"))
+    assert tree.lookup("map", "site").xyz == pytest.approx([0.0, 0.0, 10.0], abs=5e-9)
