@@ -47,7 +47,7 @@ COMMANDS: tuple[tuple[str, str], ...] = (
     ("compare examples/truth.tum examples/truth.tum --align none -f csv", ""),
     ("align examples/truth.tum examples/mono.tum --align none -f json", ""),
     ("resample examples/walk.tum --rate 4 -f csv", ""),
-    ("resample examples/gps.csv --every 40m --precision 3 -f json", ""),
+    ("resample examples/antenna.csv --every 40m --precision 3 -f json", ""),
     ("solve --points examples/points_a.csv examples/points_b.csv --scale --precision 6 -f json", ""),
     ("convert --from wxyz 1 0 0 0 --to matrix,rpy -f json", ""),
     ("convert --from rpy 0.1 -0.2 3 --keep-sign -f json --precision 4", ""),

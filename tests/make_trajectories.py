@@ -1,6 +1,6 @@
 """Make the trajectories of examples/: a drive round a block, and what three estimates of it look like.
 
-    python tests/make_trajectories.py          # writes examples/{truth,odometry,mono}.tum and examples/gps.csv
+    python tests/make_trajectories.py          # writes examples/{truth,odometry,mono}.tum and examples/antenna.csv
 
 truth     20 Hz, 30 s, 200 m, east-north-up
 odometry  10 Hz, from where it began, with 1 % of drift, its clock 0.3 s behind
@@ -67,7 +67,7 @@ def main() -> None:
     at = np.arange(0.3, SECONDS - 0.2, 0.5)
     places = truth(at).apply(np.broadcast_to(ARM, (len(at), 3))) + draw.normal(0, 0.02, (len(at), 3))
     rows = [f"{BEGIN + each:.3f},{x:.3f},{y:.3f},{z:.3f}\n" for each, (x, y, z) in zip(at.tolist(), places.tolist(), strict=True)]
-    (FOLDER / "gps.csv").write_text("t,x,y,z\n" + "".join(rows))
+    (FOLDER / "antenna.csv").write_text("t,x,y,z\n" + "".join(rows))
 
 
 if __name__ == "__main__":

@@ -137,6 +137,10 @@ def loaded_by(*arguments: str, stdin: str = "") -> set[str]:
         (["lookup", "-", "base", "camera", "--format", "text"], TREE, {"numpy", "rich"}),
         (["apply", "-", "base", "camera", "1", "2", "3"], TREE, {"numpy", "rich"}),
         (["tree", "-"], TREE, {"numpy", "rich"}),
+        (["convert", "--from", "lla", "48.1", "11.5", "520", "--to", "ecef,utm"], "", {"numpy", "rich", "yaml"}),
+        (["convert", '{"lat": 48.1, "lon": 11.5, "alt": 1, "axes": "enu", "rpy": [0, 0, 1]}'], "", {"numpy", "rich"}),
+        (["lookup", "examples/site.yaml", "map", "plane"], "", {"numpy", "rich"}),
+        (["apply", "examples/site.yaml", "map", "--from", "lla", "48.1", "11.5", "520"], "", {"numpy", "rich"}),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
@@ -156,6 +160,29 @@ def test_a_command_on_single_items_loads_nothing_heavy(arguments: list[str], std
 def test_a_command_on_single_items_loads_few_modules(arguments: list[str], most: int) -> None:
     """Each costs a start some tenths of a millisecond."""
     assert sum(name.partition(".")[0] == "frametool" for name in loaded_by(*arguments)) <= most
+
+
+OF_THE_EARTH = {
+    f"frametool.{name}"
+    for name in ("cli.earth", "earth", "geometry.earth", "geometry.place", "geometry.transverse_mercator", "grammar.place",
+                 "stream.earth_columns", "stream.earth_records")
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "stdin"),
+    [
+        (["convert", "--from", "rpy_deg", "0", "0", "90", "--to", "matrix"], ""),
+        (["invert", '{"xyz": [1, 2, 3], "rpy_deg": [0, 0, 90]}'], ""),
+        (["lookup", "examples/robot.yaml", "base_link", "lidar"], ""),
+        (["convert", "--to", "rpy"], "x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n"),
+        (["convert", "--to", "rpy"], '{"xyz": [1, 2, 3], "rpy_deg": [0, 0, 90]}\n'),
+        (["apply", "--transform", "{xyz: [1, 2, 3]}", "-f", "json"], "id,x,y,z\n1,2,3,4\n"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_what_is_not_on_the_earth_loads_none_of_its_modules(arguments: list[str], stdin: str) -> None:
+    assert loaded_by(*arguments, stdin=stdin) & OF_THE_EARTH == set()
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:

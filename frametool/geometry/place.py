@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid
 from frametool.geometry import earth, floats, quaternion, rigid
 from frametool.geometry import transverse_mercator as mercator
-from frametool.geometry.floats import RADIAN, SQRT_HALF
+from frametool.geometry.floats import RADIAN, SQRT_HALF, nearest
 from frametool.geometry.representations import REPRESENTATIONS
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ LLA, UTM = "lla", "utm"
 LOCAL = (ENU, NED)
 ZONE, AXES = "zone", "axes"  # what is written as a word
 SAMPLE = 0.5  # a number that is no zone
+EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both are whole degrees
 GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
 UNSAID = (
     "a pose at lat, lon does not say what its rotation is given in; "
@@ -126,11 +127,6 @@ class Place(NamedTuple):
             first += each.size
         return found
 
-    @property
-    def readers(self) -> dict[int, Callable[[str], float]]:
-        """Return what reads its numbers that are written as words, by the number's place."""
-        return {at: READERS[field] for at, field in enumerate(self.fields) if field in READERS}
-
     def with_grid(self, *, gridded: bool) -> Place:
         """Return the same with convergence and scale beside UTM, where there is room for them, or without."""
         size = len(self.fields) - len(GRIDDED) * (GRIDDED[0] in self.fields)
@@ -222,7 +218,7 @@ class Place(NamedTuple):
             mercator.check_grid(zone, given["easting"], given["northing"])
         elif self.name == LLA:
             earth.check_lla(*self.lla(numbers))
-        if self.axes == GRID:
+        if GRID in (self.axes, AXES in given and earth.AXES[int(given[AXES])]):
             lat, lon, _ = self.lla(numbers)
             mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
 
@@ -251,7 +247,8 @@ class Place(NamedTuple):
                     found += place
                     continue
                 zone = _held(each.zone, lat, lon, xp)
-                easting, northing, *grid = mercator.utm(zone, lat, lon, xp)
+                ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
+                easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
                 found += [zone, easting, northing, alt, *grid[: len(each.fields) - 4]]
         return found
 
@@ -274,7 +271,7 @@ class Place(NamedTuple):
                 earth.check_ecef(x, y, z)
             if each.name == UTM or each.axes == GRID:
                 lat, lon, _ = earth.lla(x, y, z, floats)
-                mercator.check_utm(_held(each.zone, lat, lon, floats), lat, lon)
+                mercator.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers as the keys that a mapping has."""
@@ -303,10 +300,16 @@ class Earth(NamedTuple):
 
 
 def _held(zone: Any, lat: Any, lon: Any, xp: Namespace) -> Any:
-    """Return the zone that is held, or that of each place."""
+    """Return the zone that is held, or that of each place; one at an edge is there though rounding moved it."""
     if zone is None:
-        return mercator.standard_zone(lat, lon, xp)
+        return mercator.standard_zone(_edged(lat, EDGE, xp), _edged(lon, EDGE, xp), xp)
     return zone + (lat - lat)
+
+
+def _edged(angle: Any, near: float, xp: Namespace) -> Any:
+    """Return whole degrees where an angle is as near to them."""
+    whole = nearest(angle)
+    return xp.where(abs(angle - whole) <= near, whole, angle)
 
 
 def namespace(numbers: Sequence[Any]) -> Namespace:
@@ -317,13 +320,3 @@ def namespace(numbers: Sequence[Any]) -> Namespace:
 
     return arrays
 
-
-def axes_number(text: str) -> float:
-    """Read the name of axes in a cell of a table as its place among `earth.AXES`; raises ValueInvalid."""
-    name = text.strip()
-    if name not in earth.AXES:
-        raise ValueInvalid(f"{shown(name)}: axes at a place are {', '.join(earth.AXES)}")
-    return float(earth.AXES.index(name))
-
-
-READERS = {ZONE: mercator.zone_number, AXES: axes_number}  # of words

@@ -24,11 +24,12 @@ _STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _SECONDS = ("s", "sec", "seconds", "")
-_EARTH = r"(?i)(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|ecef|utm|easting|north|at$)"
+_EARTH = r"(?i)(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|ecef|utm|easting|north|mgrs|at$)"
 PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
     "north", "up", "down",
 ))  # fmt: skip
+FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 # a place says its frame, by either name
 EARTH_FRAMES = ("ecef", "earth")
 
@@ -84,7 +85,7 @@ def may_be_on_earth(name: str) -> bool:
 
 def may_be_uncertain(name: str) -> bool:
     """Tell whether a column may be the first of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
-    return name == "c11" or name.startswith(("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p"))
+    return name == "c11" or FIX in name or name.startswith(("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p"))
 
 
 def without_mark(name: str) -> str:

@@ -17,7 +17,7 @@ from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, placed
 from frametool.geometry.place import ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
 from frametool.geometry.representations import HEADING, REPRESENTATIONS
-from frametool.geometry.transverse_mercator import zone_number
+from frametool.geometry.transverse_mercator import ZONES, zone_number
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -41,6 +41,7 @@ UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
 HEADINGS = {"heading_deg": True, "heading_rad": False}
 SAID = frozenset(("datum", "epsg", "mgrs", "convergence_deg", "grid_scale"))
 EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}
+NO_MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 DATUMS = ("WGS84", "WGS 84", "WGS-84", "wgs84")
 NEAR = 0.01  # metres: how far two positions of one entry may lie apart
@@ -79,7 +80,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     if not spots:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
     axes = _axes(mapping, reading, spots[0].place.name)
-    _check_parent(mapping, own)
+    check_parent(mapping, own)
     if "inverse" in mapping:
         raise Misfit("a place on the Earth is given in ecef; leave inverse out", ("inverse",), key=True)
     turn = _heading(own, axes)
@@ -116,7 +117,7 @@ def _base(place: Place, numbers: tuple[float, ...]) -> tuple[float, ...]:
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     """Read every position that the keys of a mapping say."""
-    _check_datum(own)
+    check_datum(own)
     found = []
     if AT in own:
         found += within((AT,), _placed_at, own[AT], reading)
@@ -125,7 +126,8 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
-        found.append(_utm({key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}, reading))
+        flat = {key: own[key] for key in own if key in {*UTM_KEYS, "epsg"} or SAME.get(key) == "alt"}
+        found.append(_utm(flat, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
         found.append(_lla(own, reading))
     if LOCAL_KEYS.intersection(own):
@@ -180,11 +182,11 @@ def _lla(own: dict[str, Any], reading: Reading) -> Spot:
         fields += ["msl", "undulation"]
     else:
         reading.note(NO_ALT, named[fields[0]], rule="no-alt")
-    numbers = [_member(named[field], _coordinate, own[named[field]], field) for field in fields]
+    numbers = [_member(named[field], coordinate, own[named[field]], field) for field in fields]
     return Spot(Place(LLA, tuple(fields)), tuple(numbers))
 
 
-def _coordinate(value: Any, field: str) -> float:
+def coordinate(value: Any, field: str) -> float:
     """Read a number, of latitude and longitude also with marks: 48°08'14.5"N, 48.1N."""
     if type(value) is not str:
         raise Misfit(f"expected a number, found {kind(value)}")
@@ -225,9 +227,9 @@ def _utm(value: Any, reading: Reading) -> Spot:
     if unknown := [key for key in value if key not in known]:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
         raise Misfit(what, (unknown[0],), key=True)
-    _check_datum(value)
+    check_datum(value)
     zones = [_member(key, _zone, value[key]) for key in (ZONE, "utm_zone") if key in value]
-    zones += [_zone_of_epsg(value["epsg"])] if "epsg" in value else []
+    zones += [zone_of_epsg(value["epsg"])] if "epsg" in value else []
     zones += [reading.earth.zone] if not zones and reading.earth and reading.earth.zone is not None else []
     if not zones or len({*zones}) > 1:
         raise Misfit("utm needs its zone: 32N, or 32S south of the equator" if not zones else "two zones; keep one")
@@ -247,9 +249,14 @@ def _utm(value: Any, reading: Reading) -> Spot:
         reading.note(NO_ALT, rule="no-alt")
         numbers.append(0.0)
     if zones[0] < 0.0 and 3.5e6 <= numbers[2] <= 4.5e6:
-        south = f"zone {value.get(ZONE, value.get('utm_zone', ''))} with northing {numbers[2]:g}"
-        reading.note(f"{south}: S is south of the equator; the band S lies north, write N", rule="band-s")
+        reading.note(band_s(zones[0], numbers[2]), rule="band-s")
     return Spot(Place(UTM, REPRESENTATIONS[UTM].names), tuple(numbers))
+
+
+def band_s(zone: float, northing: float) -> str:
+    """Wonder whether a zone's S is the band that lies north."""
+    name = f"zone {ZONES[int(zone)]} with northing {northing:g}"
+    return f"{name}: S is south of the equator; the band S lies north, write N"
 
 
 def _zone(value: Any) -> float:
@@ -268,7 +275,7 @@ def _member(key: str, read: Callable[..., float], *arguments: Any) -> float:
         raise misfit(str(error), (key,), rule=error.rule) from None
 
 
-def _zone_of_epsg(value: Any) -> float:
+def zone_of_epsg(value: Any) -> float:
     """Return the zone that a code of EPSG names: 326zz north, 327zz south."""
     text = str(value).upper().removeprefix("EPSG:")
     if len(text) == 5 and text[:3] in ("326", "327") and "01" <= text[3:] <= "60":
@@ -321,14 +328,14 @@ def _axes(mapping: dict[str, Any], reading: Reading, name: str) -> str:
     return str(value)
 
 
-def _check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
+def check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
     """Refuse a place on the Earth under another frame."""
     for key in ("parent", "frame"):
         value = mapping.get(key)
         if value in REPRESENTATIONS and value == UTM:
             raise Misfit("utm is no rigid frame and no parent; place the frame: at: {utm: {..}}, axes: grid", (key,))
         if value not in (None, *EARTH_FRAMES):
-            what = "at" if AT in own else next(iter(own))
+            what = "at" if AT in own else next(name for name in own if name in EARTH_KEYS)
             raise Misfit(f"{what} places a frame in ecef; {key} is {shown(value)}", (key,))
 
 
@@ -351,15 +358,14 @@ def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
     return x, y, z, w
 
 
-def _check_datum(own: dict[str, Any]) -> None:
+def check_datum(own: dict[str, Any]) -> None:
     """Refuse other datums, codes of other systems, and MGRS."""
     datum = own.get("datum", DATUMS[0])
     if datum not in DATUMS:
         what = f"datum {shown(str(datum))} is not WGS84 (up to a metre off, and drifting)"
         raise Misfit(f"{what}; convert with cs2cs or pyproj first", ("datum",))
     if "mgrs" in own:
-        what = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
-        raise Misfit(what, ("mgrs",), key=True)
+        raise Misfit(NO_MGRS, ("mgrs",), key=True)
     text = str(own.get("epsg", "4326")).upper().removeprefix("EPSG:")
     if text not in ("4326", "4979", "4978") and not ("easting" in own or UTM in own):
         raise Misfit(_other_epsg(text), ("epsg",))

@@ -182,6 +182,8 @@ def written(each: Answer) -> list[float]:
     for name, number in target.left_out(each.parts, floats):
         if abs(number) > FLAT:
             raise ValueInvalid(LEAVES_PLANE.format(name, number))
+    if target.place is not None:
+        target.place.check_result(*each.parts[:3])
     numbers = [number + 0.0 for number in target.written(each.parts, floats)]  # none is -0.0
     if not all(map(isfinite, numbers)):
         raise ValueInvalid("the result is not finite: the numbers are too large")

@@ -18,7 +18,6 @@ from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.rows.column_file import STAMP_NS, WHOLE, Made, OutColumn, not_finite
 from frametool.formats.table import FORMATS
 from frametool.geometry import arrays
-from frametool.stream.header import XYZ
 from frametool.stream.row_layout import POSE, SIX, TWIST, WRENCH, six_names
 from frametool.stream.row_poses import NO_STAMP, objects, plain_cells, text_of, texts_of
 from frametool.stream.writers import target_in
@@ -248,6 +247,12 @@ class ArrayWriter(ColumnsWriter):
 
     def of_block(self, block: RowPoses) -> bytes:
         """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
+        if (place := self.style.place) is not None and len(block.numbers):
+            from frametool.grammar.place import check_in_ecef
+
+            for parent in dict.fromkeys(block.parents):
+                check_in_ecef(parent, place)
+            place.settle(*(np.ascontiguousarray(column) for column in block.numbers.T[:3]))
         if not len(block.numbers):
             block = block._replace(numbers=np.empty((0, self.own - 3 * (not self.placed) + len(self.extras))))
         return self.of_columns(len(block.numbers), self._made(block))
@@ -262,8 +267,7 @@ class ArrayWriter(ColumnsWriter):
         """Name the numbers of a result."""
         if self.kind in SIX:
             return [*six_names(self.kind), *self.extras]
-        position = list(XYZ) if self.target.unit is not None else []
-        return [*position, *self.target.names, *self.extras]
+        return [*self.target.position_columns, *self.target.names, *self.extras]
 
     def _made(self, block: RowPoses) -> dict[str, Made]:
         """Return the columns of a block by name."""
@@ -274,6 +278,13 @@ class ArrayWriter(ColumnsWriter):
                 made[name] = Made(objects(list(given) * (1 if len(given) == size else size)))
         for name, column in zip(self._names(), self._numbers(block), strict=True):
             made[name] = Made(column, not_finite(column))
+        if (place := self.target.place) is not None:
+            for at, words in place.words.items():
+                name = place.columns[at]
+                numbers = np.nan_to_num(made[name].values).tolist()
+                made[name] = Made(objects([words[int(number)] for number in numbers]))
+            if self.target.notations:
+                made["axes"] = Made(objects([place.axes] * size))
         if block.stamps_ns is not None:
             none = block.stamps_ns == NO_STAMP
             made["stamp_ns"] = Made(block.stamps_ns.astype(STAMP_NS), none if none.any() else None)

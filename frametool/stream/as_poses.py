@@ -87,7 +87,8 @@ class FormatConverter:
             if self.request.on_error == STOP and outcome.faults:
                 before = int(np.searchsorted(poses.lines, outcome.faults[0].line))
                 poses = kept(poses, slice(0, before))
-            yield outcome._replace(text=writer.of_block(poses))
+            text = writer.of_block(poses)
+            yield outcome._replace(text=text, notes=[*outcome.notes, *self._zones(poses)])
         if writer is None and self.request.gathered is None:
             raise FormatError("nothing in it", source=self.source)
         if writer is not None:
@@ -110,6 +111,17 @@ class FormatConverter:
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
         writer = ArrayWriter if self.to_arrays else TextWriter
         return writer(self.style, kind, extras, placed=self.placed)
+
+    def _zones(self, poses: RowPoses) -> list[RowNote]:
+        """Return what there is to tell about the zones of results in UTM."""
+        place = self.style.place
+        there = np.flatnonzero(~np.isnan(poses.numbers[:, 0])) if place is not None and place.words else ()
+        if place is None or not len(there):
+            return []
+        from frametool.stream.earth_columns import zone_notes
+
+        numbers = place.numbers(*(np.ascontiguousarray(poses.numbers[there, at]) for at in range(3)))
+        return zone_notes(place, numbers, lambda row: int(poses.lines[there[row]]))
 
     def _settle(self, shape: Shape, plan: Plan, columns: str, line: int = 0) -> None:
         """Decide what rows become: without a rotation points, where nobody asked for one; raises FormatError."""

@@ -164,6 +164,11 @@ def covariance_columns(
         places, sigma = find_columns(table.names or (), 36 if POSE in kinds else 9)
     except NotARotation as error:
         raise FormatError(str(error), source=source, line=1) from None
+    shape = shapes[0]
+    if shape.place is not None:
+        from frametool.stream.earth_columns import along
+
+        places, shape = along(shape, table.names or (), places, source)
     if places and request.operation.formula is not None:
         warn(f"{source}: {LEFT_OUT.format('calc')}", rule="left-out")
     if places and request.gathered is not None:
@@ -175,7 +180,7 @@ def covariance_columns(
         raise FormatError(message, source=source, line=1)
     if request.degrees:
         sigma = tuple((at, unit or "deg" * (axis > 2)) for axis, (at, unit) in enumerate(sigma))
-    return places, (shapes[0]._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
+    return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
 
 
 def with_entries_at(beside: Sequence[int], columns: Sequence[Column], count: int) -> list[Column]:

@@ -14,7 +14,7 @@ from frametool.geometry.placed import inverse, pose_of, scale_of
 from frametool.geometry.quaternion import TOLERATED
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.covariance import in_unit, of_sigmas
-from frametool.stream.row_layout import MOVERS, POINT, POSE, TWIST, VECTOR, WRENCH
+from frametool.stream.row_layout import IDENTITY, MOVERS, POINT, POSE, TWIST, VECTOR, WRENCH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,6 +61,18 @@ def of_multiple(
     bare = tuple(number / s if at in shape.rotation_at else number for at, number in enumerate(own))
     pose = pose_of((*shape.position(own), *rotation(bare)))
     return inverse((*pose, s)) if shape.inverse else (*pose, s)
+
+
+def along_ecef(shape: Shape, own: Components, beside: Components) -> tuple[Shape, Components]:
+    """Return what stands beside a place with its covariance along the axes of ECEF, from the axes there."""
+    size, place = shape.covariance[0], shape.place
+    given = beside[:size]
+    if shape.sigma:
+        given = expanded(shape, given)
+        given = given if shape.kind == POSE else tuple(given[6 * i + j] for i in range(3) for j in range(3))
+    turn = place._replace(level=False).turned(own[: place.size], IDENTITY) if place is not None else IDENTITY
+    made = shape._replace(covariance=(len(given), *shape.covariance[1:]), sigma=())
+    return made, (*uncertainty.turned(given, *turn), *beside[size:])
 
 
 def expanded(shape: Shape, numbers: Components) -> Components:

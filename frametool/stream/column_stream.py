@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, listing, warn
+from frametool.errors import FormatError, ValueInvalid, listing, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.clouds import NORMALS
 from frametool.formats.rows.column_file import (
@@ -91,8 +91,8 @@ class ColumnRows:
         except FormatError as error:
             error.line = 0  # the names of columns stand in no line here
             raise
-        for place in self.layout.places:
-            if file.kind(place) is None:
+        for at, place in enumerate(self.layout.places):
+            if file.kind(place) is None and at not in self.plan.words:
                 raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
         self.plan = self.plan._replace(pieces=())
         self.naming = Naming(self.table, self.layout, self.request.for_kind(self.shape.kind))
@@ -223,6 +223,9 @@ class ColumnRows:
         for shape in self.plan.shapes:
             flags: Flags | None = None
             for at in range(first, first + shape.size):
+                if at in self.plan.words:
+                    columns[at] = self._words(batch, at, bad)
+                    continue
                 columns[at], missing = batch.numbers(places[at])
                 odd = not_finite(columns[at])
                 if odd is not None and not self.file.gaps:
@@ -236,6 +239,17 @@ class ColumnRows:
             absent.append(flags)
             first += shape.size
         return columns.T, absent or [None], bad
+
+    def _words(self, batch: Batch, at: int, bad: dict[int, tuple[str, str]]) -> list[float]:
+        """Read a column of words, each of which stands for a number."""
+        read, texts = self.plan.words[at], [str(text) for text in batch.texts(self.layout.places[at])]
+        known: dict[str, float] = {}
+        for row, text in enumerate(texts):
+            try:
+                known[text] = known[text] if text in known else read(text)
+            except ValueInvalid as error:
+                bad[row] = self.plan.names[at], str(error)
+        return [known.get(text, 0.0) for text in texts]
 
     def _without_pose(self, absent: Sequence[Flags | None]) -> Flags | None:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""

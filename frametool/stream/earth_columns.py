@@ -7,32 +7,57 @@ names only; loaded where one of them may say such a position.
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.geometry.earth import AXES as AXES_AT
 from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place
 from frametool.geometry.representations import HEADING, REPRESENTATIONS, Notation
-from frametool.grammar.names import PARENT_COLUMNS, may_be_on_earth
-from frametool.grammar.place import GEOID, NO_ALT, SAME, SEA_LEVEL, check_in_ecef, not_on_ellipsoid
-from frametool.stream.faults import Misused
+from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
+from frametool.geometry.transverse_mercator import zone_number
+from frametool.grammar.names import FIX, PARENT_COLUMNS, may_be_on_earth
+from frametool.grammar.place import (
+    GEOID,
+    NO_ALT,
+    NO_MGRS,
+    SAME,
+    SEA_LEVEL,
+    band_s,
+    check_datum,
+    check_in_ecef,
+    check_parent,
+    coordinate,
+    not_on_ellipsoid,
+    zone_of_epsg,
+)
+from frametool.stream.faults import ZONES, Misused, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, places_named
-from frametool.stream.row_layout import VECTOR
+from frametool.stream.row_layout import POINT, VECTOR
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
+    from typing import TypeAlias
 
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.table import Table
+    from frametool.text.spans import Floats
+
+    Reader: TypeAlias = Callable[[str], float]
 
 ECEF_COLUMNS = REPRESENTATIONS[ECEF].columns
-OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES)
+STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
+OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES,
+          STATUS, DATUM, EPSG, PARENT)  # fmt: skip
 FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for name in OTHERS}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
     r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
     re.IGNORECASE,
 )
+FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
 DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
 
 
@@ -54,7 +79,10 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
     for at, name in enumerate(names):
         if name and (match := PATTERN.fullmatch(name)):
             unit = (match[4] if match[4] is not None else match[3] or "").lower()
-            groups.setdefault(match[1].lower(), {}).setdefault(FIELDS[match[2].lower()], Spot(at, name, unit))
+            prefix, field = match[1].lower(), FIELDS[match[2].lower()]
+            if field == STATUS:  # of a NavSatFix: another may be anything
+                prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
+            groups.setdefault(prefix, {}).setdefault(field, Spot(at, name, unit))
     found = [
         (prefix, columns)
         for prefix, spots in groups.items()
@@ -82,7 +110,8 @@ def _position(
         return _local(kind, spots, earth)
     fields: list[tuple[str, Spot]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
     if kind == UTM:
-        zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
+        zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE) or spots.get(EPSG)
+        spots = {name: spot for name, spot in spots.items() if spot is not zone}
         if zone is None and earth.zone is None and {"easting", "northing"} <= spots.keys():
             raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
         fields = [(ZONE, zone)] if zone is not None else []
@@ -119,13 +148,14 @@ def _columns(kind: str, fields: Sequence[tuple[str, Spot]], spots: dict[str, Spo
         if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
-    if AXES in spots:
-        fields = [*fields, (AXES, spots[AXES])]
+    fields = [*fields, *((name, spots[name]) for name in (AXES, EPSG) if name in spots)]
+    staying = [(name, spots[name]) for name in (DATUM, STATUS, PARENT) if name in spots]
+    fields = [*fields, *staying]
     zone = earth.zone if kind == UTM and fields[0][0] != ZONE else None
     place = Place(kind, tuple(field for field, _ in fields), earth.axes or kind * (kind in LOCAL), zone,
                   earth.origin if kind in LOCAL else None)  # fmt: skip
     places, names = zip(*((spot.place, spot.name) for _, spot in fields), strict=True)
-    return Columns(places, names, unit=place)
+    return Columns(places, names, unit=place, staying=len(staying))
 
 
 def _in_radians(spot: Spot) -> bool:
@@ -172,10 +202,13 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 
     Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
     """
-    header = Header(names)
+    matches = {name: FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
+    known = () if request.given_place else ECEF_COLUMNS
+    header = Header(["" if matches.get(name) in known else name for name in names])
     earth, given = request.earth or Earth(), request.given_place
     if not given and (others := find_positions(header)):
-        if not request.operation.keeps_frames and (said := [name for name in names if may_be_on_earth(name)]):
+        said = [name for name, field in matches.items() if may_be_on_earth(name) or field == "lon"]
+        if not request.operation.keeps_frames and said:
             told = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
             warn(f"{source}: {told}; --columns lat,lon,alt --from lla turns it round")
         return None
@@ -202,6 +235,8 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 
 def _half(names: Iterable[str]) -> str:
     """Say what is missing of a position that is there by half; "" where there is none."""
+    if any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
+        return NO_MGRS
     fields = {FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
     if len(fields & {"lat", "lon"}) == 1:
         missing = "lon" if "lat" in fields else "lat"
@@ -241,6 +276,90 @@ def of_width(width: int, request: Request) -> str:
     return f"2-{width}" if width == fields + 1 else f"1-{width}"
 
 
+def of_fix(names: Sequence[str]) -> tuple[int, ...]:
+    """Return the places of the nine numbers of a NavSatFix's covariance: field.position_covariance0, or [0]."""
+    found = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
+    return tuple(found[at] for at in range(9)) if len(found) == 9 else ()
+
+
+def along(
+    shape: Shape, names: Sequence[str], places: tuple[int, ...], source: str
+) -> tuple[tuple[int, ...], Shape]:
+    """Say what the covariance beside a place is given in; that of a NavSatFix is, where nothing else is there.
+
+    Raises FormatError where nobody says so.
+    """
+    place = shape.place
+    if place is None:
+        return places, shape
+    if not places and shape.kind == POINT and (fix := of_fix(names)):
+        return fix, shape._replace(unit=place._replace(axes=ENU))
+    if places and not (place.axes or AXES in place.fields):
+        raise FormatError(UNSAID.replace("rotation", "covariance").replace("a pose", "a row"), source=source, line=1)
+    return places, shape
+
+
+def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader]]:
+    """Return what reads the words of a place, by the number's place, and what its angles with marks."""
+    fields = shape.place.fields if shape.place is not None else ()
+    words = {at: WORDS[field] for at, field in enumerate(fields) if field in WORDS}
+    return words, {at: partial(coordinate, field=field) for at, field in enumerate(fields) if field in ("lat", "lon")}
+
+
+def _zone(text: str) -> float:
+    return zone_of_epsg(text) if text.upper().removeprefix("EPSG:").isdecimal() and len(text) > 2 else zone_number(text)
+
+
+def _axes(text: str) -> float:
+    if text not in AXES_AT:
+        raise ValueInvalid(f"{shown(text)}: axes at a place are {', '.join(AXES_AT)}")
+    return float(AXES_AT.index(text))
+
+
+def _said(name: str, text: str) -> float:
+    """Check the datum or the code of EPSG of a row: nothing but WGS84."""
+    check_datum({name: text})
+    return 0.0
+
+
+def _status(text: str) -> float:
+    """Check the status of a NavSatFix."""
+    if parse_number(text) < 0.0:
+        raise ValueInvalid(f"status {text}: there was no fix")
+    return 0.0
+
+
+def _parent(text: str) -> float:
+    """Check the frame that a row names."""
+    check_parent({PARENT: text or None}, {"lat": None})
+    return 0.0
+
+
+WORDS: dict[str, Reader] = {
+    ZONE: _zone, AXES: _axes, DATUM: partial(_said, DATUM), EPSG: partial(_said, EPSG), STATUS: _status, PARENT: _parent
+}  # fmt: skip
+
+
+def zone_notes(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
+    """Return the zone of the first of some results in UTM, and where the first other one begins."""
+    notes = []
+    for at in place.words:
+        other = (columns[at] != columns[at][0]).nonzero()[0][:1].tolist()
+        notes += [RowNote(line_of(row), ZONES, ZONE_NAMES[int(columns[at][row])]) for row in (0, *other)]
+    return notes
+
+
+def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
+    """Wonder about the first row whose zone has the S of a band."""
+    given = dict(zip(place.fields, columns, strict=False))
+    if place.name != UTM:
+        return []
+    northing = given["northing"]
+    zone = given[ZONE] if place.zone is None else northing * 0.0 + place.zone
+    rows = ((zone < 0.0) & (northing >= 3.5e6) & (northing <= 4.5e6)).nonzero()[0][:1].tolist()
+    return [RowNote(line_of(row), "band-s", band_s(float(zone[row]), float(northing[row])), ZONE) for row in rows]
+
+
 def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tuple[Request, tuple[Shape, ...]]:
     """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
 
@@ -258,7 +377,8 @@ def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tupl
     if request.gathered is not None:
         request.gathered.frame = ECEF
     if request.operation.keeps_frames and request.place is None:
-        request = request._replace(place=Place.written((ECEF,), Earth()))
+        bare = shape.notation is None and all(form.representation.name == "quaternion" for form in request.notations)
+        request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
     if shape.notation is None and not (request.operation.inverse or request.operation.similar):
         return request, shapes
     if shape.notation is None or not (place.axes or AXES in place.fields):

@@ -16,8 +16,8 @@ from frametool.geometry import uncertainty
 from frametool.geometry.place import ENU, LLA, UNSAID, Place
 from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
-from frametool.grammar.names import EARTH_FRAMES
-from frametool.grammar.place import AT, EARTH_KEYS, SAME, placed_by, without_place
+from frametool.grammar.names import EARTH_FRAMES, FIX
+from frametool.grammar.place import AT, EARTH_KEYS, SAME, check_parent, placed_by, without_place
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     Inner = Callable[[dict[str, Any]], tuple[Pose, Sequence[str]]]
 
-FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
 STAYS = ("{} stay data: x, y, z are the position; to read the place, leave these out")
 WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "north")
@@ -74,6 +73,7 @@ def placed_record(
         raise Misfit("a vector has no place on the Earth; leave --as vector out")
     if request.gathered is not None:
         request.gathered.frame = EARTH_FRAMES[0]
+    check_parent(value, value)
     pose, used = inner(without_place(value))
     plain = _plain_point(value, request) if not used else ()
     return _numbered(value, plain, request) if plain else _read(value, pose, used, reading, request)

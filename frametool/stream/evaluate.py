@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -40,7 +41,7 @@ from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
@@ -64,6 +65,7 @@ class Plan(NamedTuple):
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
     edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    words: reads the numbers that are words of a table, by column: zones; marked: angles that are no plain number
     beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
     timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
     remedies: for each shape, what to do where its angles are degrees
@@ -90,6 +92,8 @@ class Plan(NamedTuple):
     beside: str = ""
     gathered: Gathered | None = None
     remedies: tuple[str, ...] = ()
+    words: Mapping[int, Callable[[str], float]] = MappingProxyType({})
+    marked: Mapping[int, Callable[[str], float]] = MappingProxyType({})
     offset_ns: int = 0
     window: tuple[int, int] | None = None
 
@@ -120,7 +124,6 @@ class Run:
         self.plan = plan
         self.block = block
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
-        self.words: dict[str, float] = {}
         self.mended: list[int] = []
         self.rounded: list[RowNote] = []
         self.doubted: list[tuple[int, int, str]] = []
@@ -144,6 +147,8 @@ class Run:
         if self.reasons or self.outside or self.lone is not None:
             gone = {*self.reasons, *self.outside, self.lone}
             self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
+        if plan.shapes and (plan.shapes[0].place or (plan.targets and plan.targets[0].place)):
+            self._note_zones()
         if plan.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
             plan.gathered.take(plan.shapes[0], moved[0], kept, weights, self.block.line_of)
@@ -158,24 +163,30 @@ class Run:
         """Read all numbers; those that are none are nan."""
         if self.block.values is not None:
             return self.block.values
+        words = self.plan.words
         numbers, bad = parse_floats(self.block.numbers)
-        for place in bad.tolist():
-            row, column = divmod(place, numbers.shape[1])
+        odd = [divmod(place, numbers.shape[1]) for place in bad.tolist()]
+        odd = [each for each in odd if each[1] not in words]
+        odd += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
+        known: dict[tuple[int, str], float] = {}
+        for row, column in odd:
             text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
-                numbers[row, column] = self._read_odd(text, column)
+                if column not in words:
+                    numbers[row, column] = self._read_odd(text, column)
+                    continue
+                if (column, text) not in known:
+                    known[column, text] = words[column](text)
+                numbers[row, column] = known[column, text]
             except ValueInvalid as error:
                 self._blame(row, self.plan.names[column], str(error))
         return numbers
 
     def _read_odd(self, text: str, column: int) -> float:
-        """Read what is no plain number: an angle with its unit, or a word that stands for a number."""
-        first = 0
-        for shape in self.plan.shapes if text not in self.words else ():
-            if shape.place is not None and (read := shape.place.readers.get(column - first)):
-                self.words[text] = read(text)
-            first += shape.size
-        return self.words[text] if text in self.words else read_number_or_angle(text, self._unit_of(column))
+        """Read what is no plain number: an angle with its unit, or one with marks where it may have them."""
+        if column in self.plan.marked:
+            return self.plan.marked[column](text)
+        return read_number_or_angle(text, self._unit_of(column))
 
     def _check_covariances(self, numbers: Floats) -> None:
         """Refuse rows whose covariance is none; sigmas cannot be negative."""
@@ -193,6 +204,16 @@ class Run:
                         self._blame(row, self.plan.names[at], reason)
                 at += size
             first += shape.size
+
+    def _note_zones(self) -> None:
+        """Tell of zones of UTM: those of results, and of a southern one that looks like a band."""
+        from frametool.stream.earth_columns import doubt_band, zone_notes
+
+        line_of = self.block.line_of
+        if (given := self.plan.shapes[0].place) is not None:
+            self.rounded += doubt_band(given, self.columns, line_of)
+        if (place := self.plan.targets[0].place) is not None and len(self.rows):
+            self.rounded += zone_notes(place, [*self.results.T], lambda row: line_of(int(self.rows[row])))
 
     def _doubt_turns(self, moved: Sequence[Components]) -> None:
         """Tell of the first row whose turn is too uncertain for the first order."""

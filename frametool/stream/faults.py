@@ -43,6 +43,7 @@ class Fault(NamedTuple):
 
 
 DEGREES = "degrees"
+ZONES = "zone"  # of UTM, of a row; `run` tells where it is first another than before
 
 
 class RowNote(NamedTuple):

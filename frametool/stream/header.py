@@ -49,6 +49,7 @@ class Columns(NamedTuple):
     absent: which numbers of a position or a rotation have no column
     kind: twist or wrench, of six columns
     wrong: what is wrong with the names, an error where the columns are used
+    staying: how many of the last ones are read and stay as they are: the status of a fix
     """
 
     places: tuple[int, ...]
@@ -62,6 +63,7 @@ class Columns(NamedTuple):
     absent: tuple[int, ...] = ()
     kind: str = ""
     wrong: str = ""
+    staying: int = 0
 
     @property
     def shown(self) -> str:

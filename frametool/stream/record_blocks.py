@@ -227,7 +227,8 @@ class RecordBlocks:
             odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
             notes += [run.note_of_degrees(*each) for each in run.doubted[:1]]
             notes += run.rounded
-            notes += [each._replace(line=run.block.line_of(0)) for each in cut.template.notes if len(cut.starts)]
+            told = [*cut.template.notes, *cut.template.of_places]
+            notes += [each._replace(line=run.block.line_of(0)) for each in told if len(cut.starts)]
         end = min((place for place, _ in faults), default=None) if stops else None
         groups = [group for run in runs for group in run.groups(end)]
         kept = sum(len(run.rows) for run in runs) + found.alone + (0 if skips else len(faults))

@@ -10,7 +10,7 @@ from frametool.documents.source import Source
 from frametool.errors import FormatError, FrametoolError
 from frametool.ros.message_stream import NOISE
 from frametool.stream.answers import number_writer, written
-from frametool.stream.faults import Fault, RowNote
+from frametool.stream.faults import ZONES, Fault, RowNote
 from frametool.stream.template import learn, nulled
 
 if TYPE_CHECKING:
@@ -48,7 +48,13 @@ def rendered(template: Template, request: Request, line: int, column: int) -> Re
     write = number_writer(request.precision, yaml=not template.json)
     text = template.with_numbers([write(number) for number in numbers], locked=locked)
     mended = sum(each.mended for each in answers)
-    return Rendered(text.encode(), mended, _notes(template, line, column))
+    notes = _notes(template, line, column)
+    if (place := answers[0].entry.target.place if answers else None) is not None:
+        from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
+
+        zones = (ZONE_NAMES[int(numbers[at])] for at in place.words)
+        notes += [RowNote(line + template.line, ZONES, zone) for zone in zones]
+    return Rendered(text.encode(), mended, notes)
 
 
 def _notes(template: Template, line: int, column: int) -> list[RowNote]:

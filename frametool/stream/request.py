@@ -200,6 +200,10 @@ class Operation(NamedTuple):
         seconds: the time since the row before, of which velocities are made; times_ns: its own time
         """
         own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
+        if shape.covariance and shape.place is not None:
+            from frametool.stream.carried import along_ecef
+
+            shape, beside = along_ecef(shape, own, beside)
         if shape.multiple:
             from frametool.stream.carried import of_multiple
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
-from frametool.stream.faults import RowNote
+from frametool.stream.faults import ZONES, RowNote
 from frametool.text.lines import ByteRange, content
 
 if TYPE_CHECKING:
@@ -63,12 +63,19 @@ def run(
     """
     line, rows, mended = 1, 0, 0
     told: set[str] = set()
+    zone = ""
     for outcome in outcomes:
         if outcome.text:
             write(outcome.text)
         advance(outcome.rows, outcome.size)
         faults = [fault._replace(line=fault.line + line) for fault in outcome.faults]
         for note in outcome.notes:  # in the order of the lines
+            if note.about == ZONES:
+                before, zone = zone or note.sentence, note.sentence
+                if before == zone:
+                    continue
+                sentence = f"the zone changes from {before} to {zone}: another grid; --zone {before} holds one"
+                note = note._replace(sentence=sentence)  # noqa: PLW2901
             if note.about in told:
                 continue
             told.add(note.about)

@@ -9,6 +9,7 @@ from frametool.grammar.names import (
     EARTH_FRAMES,
     NAME_KEYS,
     PARENT_COLUMNS,
+    PARENT_KEYS,
     in_nanoseconds,
     may_be_on_earth,
     may_be_uncertain,
@@ -57,7 +58,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     asked = tuple(_place(name, _names_or_numbers(table), source) for name in request.operation.columns)
     shapes = _shapes(poses, request, len(asked))
     if on_earth:
-        from frametool.stream.earth_columns import check_rows
+        from frametool.stream.earth_columns import check_rows, readers_of
 
         request, shapes = check_rows(request, shapes, source)
     if request.place is not None and (request.operation.moves or not on_earth):
@@ -74,14 +75,18 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
     frames = () if on_earth else _frame_columns(table, request, source)
+    if on_earth and PARENT_KEYS[0] in (table.names or ()):
+        frames = ((table.names or ()).index(PARENT_KEYS[0]),)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
     edge_of = None if on_earth else request.pose_of_row_frame
-    if frames and edge_of is None and request.operation.moves:
+    if frames and edge_of is None and request.operation.moves and not on_earth:
         edge_of = request.pose_from_frame
+    words, marked = readers_of(shapes[0]) if on_earth else ({}, {})
     edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
+    poses = [_written(pose) for pose in poses]
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if beside and not request.keep:
         from frametool.stream.beside import with_entries_at
@@ -99,7 +104,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
         edges=edges, sources=EARTH_FRAMES[:1] if on_earth else (),
         frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
-        window=request.window,
+        window=request.window, words=words, marked=marked,
     ), layout  # fmt: skip
 
 
@@ -207,6 +212,14 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.notations
     stays = not (_is_whole(request.notations) or pose.rotation.whole or leaves_plane)
     return PoseColumns(None, pose.rotation) if stays else pose
+
+
+def _written(pose: PoseColumns) -> PoseColumns:
+    """Leave out the columns that are read and stay as they are."""
+    position = pose.position
+    if position is None or not position.staying:
+        return pose
+    return pose._replace(position=position._replace(places=position.places[: -position.staying]))
 
 
 def _is_whole(notations: Sequence[Notation]) -> bool:

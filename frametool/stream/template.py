@@ -51,6 +51,7 @@ SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
 NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
 # scalars under these keys decide what a record is, wherever in it they stand ..
+OF_PLACES = ("no-alt", "band-s", "stays", "left-out")  # the rules of notes on places, which rows do not tell
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
 # .. and these in the mappings that hold the record
 _WORDS = frozenset(word.partition("_deg")[0].partition("_rad")[0] for word in (*OURS, *POSE_KEYS, "theta"))
@@ -68,6 +69,7 @@ class Template:
     stamps: the stretches of each entry's stamp
     pieces: what the result is made of
     notes: what is worth telling about all of them; own_notes: about the record that was learned alone
+    of_places: those of them that hold for all
     """
 
     def __init__(
@@ -87,6 +89,7 @@ class Template:
         self.json = json
         self.notes = list(_notes(entries))
         self.own_notes = notes
+        self.of_places = [RowNote(0, each.rule, each.message) for each in notes if each.rule in OF_PLACES]
         self._root = root
         self._request = request
         slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]

@@ -1,12 +1,17 @@
 """Time places on the Earth against plain numpy in one process: `python tests/benchmarks/bench_earth.py [ROWS]`.
 
+Then whole commands, `python tests/benchmarks/bench_earth.py ROWS commands` these alone.
+
 The ratio is to numpy's own sines and the textbook's formula of to-ECEF, which knows no checks; pyproj stands beside
 where it is installed.  Then how far results are off, against 60 digits, and whether floats and arrays agree to the bit.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -148,9 +153,59 @@ def same_bits() -> str:
     return f"floats and arrays: the same bits at {same} of {len(given)} places"
 
 
+SITE = "frames: [{name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}]\n"
+COMMANDS = {  # the first is what the others are compared with
+    "convert of poses, --to rpy": ["convert", "-i", "poses.csv", "--to", "rpy"],
+    "convert, lat lon alt to ecef": ["convert", "-i", "gps.csv", "--to", "ecef"],
+    "convert, lat lon alt to utm": ["convert", "-i", "gps.csv", "--to", "utm"],
+    "apply to a map": ["apply", "site.yaml", "map", "-i", "gps.csv"],
+}
+SCALARS = {
+    "convert of a rotation": ["convert", "--from", "rpy_deg", "0", "0", "90", "--to", "matrix"],
+    "convert, lat lon alt to ecef": ["convert", "--from", "lla", "48.1", "11.5", "520", "--to", "ecef"],
+    "convert, lat lon alt to utm": ["convert", "--from", "lla", "48.1", "11.5", "520", "--to", "utm"],
+    "lookup of two placed frames": ["lookup", "site.yaml", "ecef", "map", "--to", "lla"],
+}
+
+
+def cost(arguments: list[str], folder: Path) -> tuple[float, float]:
+    """Run a command; give the seconds of its processor and its peak of memory in MB."""
+    with (folder / "out").open("wb") as out:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "frametool", *arguments], cwd=folder, stdout=out, stderr=subprocess.DEVNULL
+        )
+        _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+
+
+def command_table(rows: int, folder: Path) -> list[str]:
+    """Time whole commands in turns, the least of three; give the rows of the table."""
+    draw = np.random.default_rng(4)
+    lla = np.column_stack([draw.uniform(-80, 84, rows), draw.uniform(-180, 180, rows), draw.uniform(0, 5000, rows)])
+    xyzw = draw.normal(size=(rows, 4))
+    poses = np.column_stack([draw.normal(size=(rows, 3)), xyzw / np.linalg.norm(xyzw, axis=1, keepdims=True)])
+    np.savetxt(folder / "gps.csv", lla, "%.9f", ",", header="lat,lon,alt", comments="")
+    np.savetxt(folder / "poses.csv", poses, "%.17g", ",", header="x,y,z,qx,qy,qz,qw", comments="")
+    (folder / "site.yaml").write_text(SITE)
+    best = dict.fromkeys(COMMANDS, (np.inf, np.inf))
+    for _ in range(3):
+        for name, arguments in COMMANDS.items():
+            best[name] = min(best[name], cost(arguments, folder))
+    first = best[next(iter(COMMANDS))][0]
+    table = [f"| {name} | {s:.2f} | {s / first:.2f} | {mb:.0f} |" for name, (s, mb) in best.items()]
+    starts = {name: min(cost(arguments, folder)[0] for _ in range(15)) for name, arguments in SCALARS.items()}
+    first = starts[next(iter(SCALARS))]
+    return [*table, *(f"| one: {name} | {s:.3f} | {s / first:.2f} | |" for name, s in starts.items())]
+
+
 def main() -> None:
     """Print the tables."""
     rows = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    with tempfile.TemporaryDirectory() as folder:
+        print("| command | processor, s | ratio | MB |\n|---|---|---|---|", *command_table(rows, Path(folder)), sep="\n")
+    if sys.argv[2:] == ["commands"]:
+        return
     print(f"{rows} rows; {processor()}, numpy {np.__version__}\n")
     print("| operation | ns a row | ratio | goal |\n|---|---|---|---|", *speed_table(rows), sep="\n")
     print("\n| height | to ECEF, eps r (goal 2) | lat, rad (8e-16) | lon, rad of arc (8e-16) | alt, eps r (2) |")

@@ -8,7 +8,8 @@ from typing import Any
 from samples import LATTICE, quaternions, random_quaternions, turned
 
 from frametool.geometry import euler, floats
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import ROTATIONS as TABLE
+from frametool.geometry.representations import notation
 from frametool.grammar.rotation_spelling import spelled
 
 ROTATIONS = random_quaternions(12, seed=12)
@@ -19,7 +20,7 @@ HOSTILE = [
 ALL = quaternions(30)
 SPECS = [
     f"{name}{unit}{axes}"
-    for name, row in REPRESENTATIONS.items() if not row.is_place
+    for name, row in TABLE.items()
     for unit in (("", "_deg") if row.angles else ("",))
     for axes in ([f":{each}" for each in euler.AXES] if name == "euler" else [""])
 ]

@@ -68,7 +68,7 @@ def command(
     \b
       frametool compare truth.tum odometry.tum --offset auto
       frametool compare truth.tum truth.tum mono.tum --align sim3 -f markdown
-      frametool compare gps.csv truth.tum --mount auto --report error.html
+      frametool compare antenna.csv truth.tum --mount auto --report error.html
       frametool compare truth.tum mono.tum --align sim3 --fail 'ate>1m,paired<90%'
 
     REF and EST are trajectories or positions in any form (help trajectories).
