@@ -77,7 +77,7 @@ def read_placed(
     spots = _spots(own, reading)
     if not spots:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
-    axes = _axes(rest, reading, spots[0].place.name)
+    said, axes = AXES_KEY in rest, take_axes(rest, reading, spots[0].place.name)
     _check_parent(rest, own)
     if "inverse" in rest:
         raise Misfit("a place on the Earth is given in ecef; leave inverse out", ("inverse",), key=True)
@@ -90,10 +90,13 @@ def read_placed(
     for other in others:
         _agree(position, _position(other))
     if AT not in own and inner.position is not None:
-        _agree(position, inner.position)  # the same said in ecef: of that the rotation is
-        return inner._replace(parent=inner.parent or ECEF)
+        _agree(position, inner.position)
+        if not said:  # the same said in ecef: of that the rotation is
+            return inner._replace(parent=inner.parent or ECEF)
+        inner = inner._replace(position=None)
     rotation = turn or inner.rotation
-    needs_axes = rotation is not None or AT in own or inner.covariance is not None
+    stands = AT in own or reading.framed  # a frame has axes, a position none
+    needs_axes = stands or rotation is not None or inner.covariance is not None
     if needs_axes and not axes:
         raise Misfit(UNSAID)
     if not needs_axes:
@@ -106,7 +109,7 @@ def read_placed(
     base = _base(place, numbers)
     made = placed.compose(base, inner._replace(rotation=rotation, scale=1.0).placed)
     found = Pose.of(made, inner.name, inner.parent or ECEF)
-    return found if rotation is not None or AT in own else found._replace(rotation=None)
+    return found if rotation is not None or stands else found._replace(rotation=None)
 
 
 def _base(place: Place, numbers: tuple[float, ...]) -> tuple[float, ...]:
@@ -308,7 +311,7 @@ def _agree(first: Any, second: Any) -> None:
         raise Misfit(f"two positions in one entry disagree by {apart:.6g} m; keep one")
 
 
-def _axes(rest: dict[str, Any], reading: Reading, name: str) -> str:
+def take_axes(rest: dict[str, Any], reading: Reading, name: str = "") -> str:
     """Take what rotations are given in out of a mapping, else what holds for all."""
     default = reading.earth.axes if reading.earth else ""
     default = name if name in LOCAL else default
