@@ -29,8 +29,6 @@ PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
     "north", "up", "down",
 ))  # fmt: skip
-# a place says its frame, by either name
-EARTH_FRAMES = ("ecef", "earth")
 
 
 def in_nanoseconds(name: str) -> bool:

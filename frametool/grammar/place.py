@@ -16,9 +16,8 @@ from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, placed
 from frametool.geometry.place import ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
-from frametool.geometry.representations import HEADING, REPRESENTATIONS
+from frametool.geometry.representations import EARTH_FRAMES, HEADING, REPRESENTATIONS
 from frametool.geometry.transverse_mercator import zone_number
-from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import Pose, read_pose, read_position
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -113,8 +112,8 @@ def read_placed(
 
 
 def _base(place: Place, numbers: tuple[float, ...]) -> tuple[float, ...]:
-    found = place.base(numbers) if place.axes != ECEF else (*place.ecef(numbers), 0.0, 0.0, 0.0, 1.0)
-    return tuple(found)
+    rotation = (0.0, 0.0, 0.0, 1.0) if place.axes == ECEF else place.base(numbers)[3:]
+    return (*place.ecef(numbers), *rotation)
 
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
