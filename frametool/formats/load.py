@@ -273,11 +273,15 @@ class Assembly:
             self.earth = next((name for name in names if name and name in EARTH_FRAMES), "")
         return any(name in EARTH_FRAMES and name != self.earth for name in names) and self.rules.policy == "frametool"
 
+    def one_name(self, frame: str) -> str:
+        """Return a name, the Earth's as it is here."""
+        return self.earth if frame in EARTH_FRAMES else frame
+
     def add_edge(self, edge: Edge, place: Place) -> None:
         """Add an edge, or a root; one between the two names of the Earth's frame must be nothing."""
         parent, child = edge.parent, edge.child
         if (parent in EARTH_FRAMES or child in EARTH_FRAMES) and self.renames(parent, child):
-            parent, child = (self.earth if name in EARTH_FRAMES else name for name in (parent, child))
+            parent, child = parent and self.one_name(parent), self.one_name(child)
             if parent == child:
                 if any(edge.components[:6]):
                     what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"

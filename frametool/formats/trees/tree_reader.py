@@ -276,7 +276,8 @@ def _given_in(entry: dict[str, Any], reading: Reading) -> Earth:
     from frametool.grammar.place import take_axes
 
     if not any(may_be_on_earth(key) for sample in entry["samples"] if type(sample) is dict for key in sample):
-        raise Misfit("axes beside samples are those at places on the Earth; none of these has one", (AXES_KEY,), key=True)
+        what = "axes beside samples are those at places on the Earth; none of these has one"
+        raise Misfit(what, (AXES_KEY,), key=True)
     return Earth(axes=take_axes({AXES_KEY: entry[AXES_KEY]}, reading))
 
 
