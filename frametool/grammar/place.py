@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
-from frametool.geometry import floats, placed
-from frametool.geometry.place import ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
+from frametool.geometry import floats, placed, quaternion
+from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
 from frametool.geometry.representations import EARTH_FRAMES, HEADING, REPRESENTATIONS
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.pose import Pose, read_pose, read_position
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
+from frametool.grammar.result import rounded
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
 
@@ -406,6 +407,50 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     local = place.local(x, y, z, pose.rotation)
     axes = {} if place.name == ECEF else {AXES_KEY: place.axes}
     return entry | axes, pose._replace(position=None, rotation=(local[0], local[1], local[2], local[3]))
+
+
+def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
+    """Return where a frame of ecef stands as a tree has it, `at` and `axes`, and its pose and covariance in these.
+
+    Raises as `placed_entry` does, and for axes of a zone that is not said.
+    """
+    if place.axes == GRID and place.zone is not None and UTM not in (place.name, *(each.name for each in place.more)):
+        raise ValueInvalid(f"--to {place.name} does not say the zone of axes grid; --to utm does")
+    turned = pose.components[3:]
+    try:
+        at, local = placed_entry(pose._replace(parent=ECEF), place)
+    except ValueInvalid as error:
+        raise ValueInvalid(f"frame {shown(pose.name)}: {error}" if pose.name else str(error)) from None
+    local = local._replace(parent=pose.parent)
+    if pose.covariance is not None and local.rotation is not None:
+        back = quaternion.compose(*local.rotation, *quaternion.conjugate(*turned))
+        made = placed.compose((0.0, 0.0, 0.0, *back), (0.0, 0.0, 0.0, *turned, *pose.covariance))
+        local = local._replace(covariance=Pose.of(made).covariance)
+    axes = at.pop(AXES_KEY)
+    return {AT: at, AXES_KEY: axes}, local
+
+
+def seen_at(pose: Pose, place: Place | None, precision: int | None) -> tuple[str, str, Pose]:
+    """Say where a frame of ecef stands in a few words, and name the axes that the pose left is given in.
+
+    Nothing of a frame that is no place, and the pose as it is.
+    """
+    place = Place(LLA, REPRESENTATIONS[LLA].names, ENU) if place is None else place
+    try:
+        entry, local = placed_entry(pose, place._replace(more=()).with_grid(gridded=False))
+    except ValueInvalid:
+        return "", "", pose
+    if place.name == ECEF:
+        return "", "", pose
+    decimals = {"lat": 9, "lon": 9}  # 0.1 mm
+    axes = entry.pop(AXES_KEY)
+    members = entry.get(UTM, entry).items()
+    said = (
+        f"{key} {value}" if type(value) is str
+        else f"{key} {rounded(value, decimals.get(key, 3) if precision is None else precision)}"
+        for key, value in members
+    )  # fmt: skip
+    return " ".join(said), f"{axes} ", local
 
 
 def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict[str, Any]:
