@@ -58,13 +58,17 @@ class RowFrames:
             if (name is None) == (column is None):
                 raise click.UsageError(f"name {option} or its column, one of the two")
         fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
-        frames = tuple(name for name in (self.target, self.source) if name is not None)
+        frames, place = tuple(name for name in (self.target, self.source) if name is not None), task.output.style.place
 
         def edge_of(names: str) -> Components:
             cells = names.split("\0") if len(frames) == 2 else [names]
             if len(cells) > len(frames):
                 raise UnknownFrame(names, known=tree.frames)  # a NUL in a cell is no end of a name
             ends = fixed_target or cells[0], fixed_source or cells[-1]
+            if place is not None:
+                from frametool.grammar.place import check_in_ecef
+
+                check_in_ecef(ends[0], place)
             if sigmas is None:
                 return tree.lookup(*ends, at).components
             found = sigmas.noted(looked_up(tree, *ends, at, covariance=True))

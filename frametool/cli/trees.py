@@ -20,8 +20,8 @@ from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
 from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Answers
+from frametool.grammar.names import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence

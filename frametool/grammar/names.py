@@ -9,6 +9,7 @@ import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
+from frametool.geometry import representations
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -29,6 +30,7 @@ PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
     "north", "up", "down",
 ))  # fmt: skip
+EARTH_FRAMES = representations.EARTH_FRAMES
 
 
 def in_nanoseconds(name: str) -> bool:

@@ -16,8 +16,9 @@ from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, placed, quaternion
 from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
-from frametool.geometry.representations import EARTH_FRAMES, HEADING, REPRESENTATIONS
+from frametool.geometry.representations import HEADING, REPRESENTATIONS
 from frametool.geometry.transverse_mercator import zone_number
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import Pose, read_pose, read_position
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
 from frametool.grammar.result import rounded

@@ -273,8 +273,8 @@ def refuse_elsewhere(table: Table, request: Request, source: str) -> None:
 
     Raises FormatError.
     """
-    if request.place is None:
-        return
+    if request.place is None or request.frames:
+        return  # a look-up looks at each row
     frame = request.result_frame if request.operation.moves else None
     if frame is None and any(name in PARENT_COLUMNS for name in table.names or ()) and not request.operation.moves:
         return  # each row says its own

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid
 from frametool.geometry import uncertainty
 from frametool.geometry.place import ENU, LLA, Earth
-from frametool.geometry.representations import EARTH_FRAMES, notation
+from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.place import AT, EARTH_KEYS, SAME, read_placed
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within

@@ -13,8 +13,8 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
-from frametool.geometry.representations import EARTH_FRAMES, ROTATIONS, notation
-from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_on_earth, may_be_uncertain
+from frametool.geometry.representations import ROTATIONS, notation
+from frametool.grammar.names import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, may_be_on_earth, may_be_uncertain
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
     POSE_KEYS,

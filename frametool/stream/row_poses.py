@@ -14,8 +14,7 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.geometry.representations import EARTH_FRAMES
-from frametool.grammar.names import in_nanoseconds, stamp_places
+from frametool.grammar.names import EARTH_FRAMES, in_nanoseconds, stamp_places
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.evaluate import Run, State

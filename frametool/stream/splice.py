@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import quoted
-from frametool.geometry.representations import EARTH_FRAMES, ROTATIONS
-from frametool.grammar.names import PARENT_KEYS, PLACE_KEYS
+from frametool.geometry.representations import ROTATIONS
+from frametool.grammar.names import EARTH_FRAMES, PARENT_KEYS, PLACE_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS

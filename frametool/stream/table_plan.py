@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.names import (
+    EARTH_FRAMES,
     NAME_KEYS,
     PARENT_COLUMNS,
     in_nanoseconds,

@@ -31,7 +31,8 @@ from frametool.formats.rows.pose_rows import (
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays, floats, quaternion, rigid
-from frametool.geometry.representations import EARTH_FRAMES, notation
+from frametool.geometry.representations import notation
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.header import XYZ

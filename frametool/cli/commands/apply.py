@@ -29,9 +29,9 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose_algebra import looked_up
 from frametool.text.numbers import NotFinite, parse_number
 

@@ -26,7 +26,9 @@ from frametool.cli.options import (
 )
 from frametool.cli.streaming import OPTIONS, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
+from frametool.errors import shown
 from frametool.formats.table import holds_arrays
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 
@@ -83,6 +85,10 @@ def command(
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
+    named = None if by_row and by_row.target is not None else target
+    if output.style.place is not None and named not in (None, *EARTH_FRAMES):
+        name = output.style.place.name
+        raise click.UsageError(f"--to {name} wants TARGET ecef: what is in {shown(named)} has no lat and lon")
     if covariance:
         _check_covariance(output, derives=task.derives, fixed=fixed, by_row=bool(by_row))
     if by_row:
@@ -138,6 +144,9 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
         raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
     if by_row:
         refuse_unused("is not for --covariance: the edges that are taken for exact are counted in one process", "jobs")
+    if output.style.place is not None:
+        name = output.style.place.name
+        raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
     form = output.told if by_row else output.style.form
     if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")

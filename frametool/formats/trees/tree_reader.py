@@ -18,10 +18,9 @@ from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
 from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown
 from frametool.frames.stamps import parse_stamp
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
-from frametool.grammar.names import may_be_on_earth
+from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
