@@ -32,7 +32,8 @@ from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 from frametool.formats.table import FORMATS, is_trajectory
 from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS
-from frametool.grammar.readers import Misfit, tell
+from frametool.grammar.readers import Misfit
+from frametool.grammar.readers import tell as tell_notes
 from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
@@ -103,10 +104,10 @@ def _values(source: Source, scope: Scope) -> Term | None:
             scope.leave_out(not COVARIANCE_KEYS.isdisjoint(alone))
             reading = scope.reading(source)
             found = literal(alone, reading)
-            tell(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
-            return found
         except Misfit as misfit:
             raise misfit.placed(source, 0) from None
+        tell_notes(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
+        return found
     poses = read_poses(source, Request(degrees=scope.degrees, normalize=scope.normalize))
     if not poses:
         raise FormatError("nothing in it", source=source.name)

@@ -10,6 +10,7 @@ Loaded where a mapping has such keys.
 from __future__ import annotations
 
 import re
+from math import hypot, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
@@ -17,7 +18,7 @@ from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, placed, quaternion
 from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
 from frametool.geometry.representations import HEADING, REPRESENTATIONS
-from frametool.geometry.transverse_mercator import zone_number
+from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import Pose, read_pose, read_position
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
@@ -44,6 +45,7 @@ SAID = frozenset(("datum", "epsg", "mgrs", "convergence_deg", "grid_scale"))
 EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 DATUMS = ("WGS84", "WGS 84", "WGS-84", "wgs84")
+LEVEL = 1e-9  # of 1: what is less level points nowhere
 NEAR = 0.01  # metres: how far two positions of one entry may lie apart
 MINUTE, SECOND = "['\u2032\u2019]", "(?:[\"\u2033\u201d]|'')"
 DMS = re.compile(
@@ -408,6 +410,27 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     local = place.local(x, y, z, pose.rotation)
     axes = {} if place.name == ECEF else {AXES_KEY: place.axes}
     return entry | axes, pose._replace(position=None, rotation=(local[0], local[1], local[2], local[3]))
+
+
+def overview(pose: Pose) -> list[tuple[str, str]]:
+    """Say for a person where a pose or point of ecef is: lat lon alt, UTM, and the heading of its x; [] of no place."""
+    x, y, z = pose.position or (0.0, 0.0, 0.0)
+    lat, lon, alt = wgs84.lla(x, y, z, floats)
+    if not isfinite(alt):
+        return []
+    said = [("lat lon alt", f"{round(lat, 9) + 0.0:.9f} {round(lon, 9) + 0.0:.9f} deg  {round(alt, 4) + 0.0:.4f} m")]
+    if SOUTH <= lat <= NORTH:
+        zone = standard_zone(lat, lon, floats)
+        easting, northing, convergence, _ = utm(zone, lat, lon, floats)
+        grid = f"{ZONES[int(zone)]} {easting:.4f} {northing:.4f} m  convergence {round(convergence, 6) + 0.0:.6f} deg"
+        said.append(("utm", grid))
+    if pose.rotation is not None:
+        local = Place(LLA, REPRESENTATIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
+        east, north, _ = quaternion.rotate(*local, 1.0, 0.0, 0.0)
+        level = hypot(east, north)
+        heading = round(floats.bearing(east, north, level, floats) * floats.RADIAN, 6) % 360.0 if level > LEVEL else 0.0
+        said.append(("heading", f"x {heading:.6f} deg from true north" if level > LEVEL else "none: x is upright"))
+    return said
 
 
 def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
