@@ -26,9 +26,7 @@ from frametool.cli.options import (
 )
 from frametool.cli.streaming import OPTIONS, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
-from frametool.errors import shown
 from frametool.formats.table import holds_arrays
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import stop
 from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
 
@@ -85,10 +83,8 @@ def command(
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times)
-    named = None if by_row and by_row.target is not None else target
-    if output.style.place is not None and named not in (None, *EARTH_FRAMES):
-        name = output.style.place.name
-        raise click.UsageError(f"--to {name} wants TARGET ecef: what is in {shown(named)} has no lat and lon")
+    if target is not None and not (by_row and by_row.target is not None):
+        output.check_target(target)
     if covariance:
         _check_covariance(output, derives=task.derives, fixed=fixed, by_row=bool(by_row))
     if by_row:
