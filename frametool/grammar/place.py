@@ -22,7 +22,6 @@ from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import Pose, read_pose, read_position
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, within
-from frametool.grammar.result import rounded
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
 
@@ -425,8 +424,8 @@ def overview(pose: Pose) -> list[tuple[str, str]]:
         grid = f"{ZONES[int(zone)]} {easting:.4f} {northing:.4f} m  convergence {round(convergence, 6) + 0.0:.6f} deg"
         said.append(("utm", grid))
     if pose.rotation is not None:
-        local = Place(LLA, REPRESENTATIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
-        east, north, _ = quaternion.rotate(*local, 1.0, 0.0, 0.0)
+        qx, qy, qz, qw = Place(LLA, REPRESENTATIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
+        east, north, _ = quaternion.rotate(qx, qy, qz, qw, 1.0, 0.0, 0.0)
         level = hypot(east, north)
         heading = round(floats.bearing(east, north, level, floats) * floats.RADIAN, 6) % 360.0 if level > LEVEL else 0.0
         said.append(("heading", f"x {heading:.6f} deg from true north" if level > LEVEL else "none: x is upright"))
@@ -454,8 +453,8 @@ def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     return {AT: at, AXES_KEY: axes}, local
 
 
-def seen_at(pose: Pose, place: Place | None, precision: int | None) -> tuple[str, str, Pose]:
-    """Say where a frame of ecef stands in a few words, and name the axes that the pose left is given in.
+def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
+    """Return where a frame of ecef stands, in one way, and the axes that the pose left is given in.
 
     Nothing of a frame that is no place, and the pose as it is.
     """
@@ -463,18 +462,8 @@ def seen_at(pose: Pose, place: Place | None, precision: int | None) -> tuple[str
     try:
         entry, local = placed_entry(pose, place._replace(more=()).with_grid(gridded=False))
     except ValueInvalid:
-        return "", "", pose
-    if place.name == ECEF:
-        return "", "", pose
-    decimals = {"lat": 9, "lon": 9}  # 0.1 mm
-    axes = entry.pop(AXES_KEY)
-    members = entry.get(UTM, entry).items()
-    said = (
-        f"{key} {value}" if type(value) is str
-        else f"{key} {rounded(value, decimals.get(key, 3) if precision is None else precision)}"
-        for key, value in members
-    )  # fmt: skip
-    return " ".join(said), f"{axes} ", local
+        return {}, pose
+    return ({}, pose) if place.name == ECEF else (entry.pop(UTM, {}) | entry, local)
 
 
 def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict[str, Any]:

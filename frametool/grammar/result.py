@@ -11,7 +11,7 @@ from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry import euler, floats, quaternion
 from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.pose import NAMES, SCALE, Pose
-from frametool.grammar.rotation_spelling import spelled
+from frametool.grammar.rotation_spelling import AXES_KEY, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -285,10 +285,17 @@ def edge_label(transform: Transform, style: Style, parent: str) -> tuple[str, st
     Under the Earth's frame: `lat 48.1 lon 11.5 alt 520` and `enu rpy_deg 0 15 0`.
     """
     pose, at, axes = Pose.of(transform.components, None, parent), "", ""
+    digits = {"lat": 9, "lon": 9} if style.precision is None else {}  # 0.1 mm
     if parent in EARTH_FRAMES:
         from frametool.grammar.place import seen_at
 
-        at, axes, pose = seen_at(pose, style.place, style.precision)
+        members, pose = seen_at(pose, style.place)
+        axes = f"{members.pop(AXES_KEY)} " if members else ""
+        usual = METRES if style.precision is None else style.precision
+        at = " ".join(
+            f"{key} {each if type(each) is str else _rounded(each, digits.get(key, usual))}"
+            for key, each in members.items()
+        )
     chosen = style.notations[0] if style.notations else notation("rpy_deg")
     degrees = bool(chosen.representation.angles) and style.in_degrees(chosen)
     position = _short(pose.components[:3], style.precision if style.precision is not None else METRES)
@@ -303,10 +310,10 @@ def graphviz(text: str) -> str:
 
 def _short(values: Iterable[float], decimals: int) -> str:
     """Round for reading; trailing zeros and minus zero say nothing."""
-    return " ".join(rounded(value, decimals) for value in values)
+    return " ".join(_rounded(value, decimals) for value in values)
 
 
-def rounded(value: float, decimals: int) -> str:
+def _rounded(value: float, decimals: int) -> str:
     """Round a number for reading; what would vanish or grow endless gets an exponent."""
     if abs(value) < NOISE:
         value = 0.0

@@ -54,7 +54,7 @@ def golden(*, utm: bool = False) -> dict[str, Any]:
 
 def apart(one: Any, other: Any) -> float:
     """Return how far two quaternions are apart, whatever their sign."""
-    return min(max(abs(a - sign * b) for a, b in zip(one, other, strict=True)) for sign in (1, -1))
+    return float(min(max(abs(a - sign * b) for a, b in zip(one, other, strict=True)) for sign in (1, -1)))
 
 
 def test_frames_and_lookups_between_them_have_the_golden_numbers(tmp_path: Path) -> None:
