@@ -263,6 +263,8 @@ TREES = {
     "several-roots": f"[{OK}, {{name: b, parent: odom, xyz: [1, 0, 0]}}]",
     "slash": "{name: a, parent: /map, xyz: [1, 0, 0]}",
     "empty": "frames:\n",
+    "no-alt": "{name: a, at: {lat: 48, lon: 11}, axes: enu}",
+    "band-s": "{name: a, at: {utm: {zone: 32S, easting: 5e5, northing: 4e6, alt: 0}}, axes: grid}",
 }
 
 

@@ -197,6 +197,10 @@ def plain_result(term: Term, style: Style) -> Any:
         return angle_in(term, degrees=style.degrees) if type_.unit == RADIAN else numbers[0]
     if type_.kind == ANGLES:
         return frame | ({"rpy_deg": [each * DEGREES for each in numbers]} if style.degrees else {"rpy": list(numbers)})
+    if type_.kind == POINT and style.place is not None:
+        from frametool.grammar.place import point_entry
+
+        return point_entry(type_.target, numbers, style.place)
     return frame | {type_.kind: list(numbers)}
 
 

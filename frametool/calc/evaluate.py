@@ -21,6 +21,7 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, FrametoolError, did_you_mean, shown, warn
 from frametool.geometry import floats
+from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, read_pose
 from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, slash_note, within
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from frametool.calc.parser import Branch, Line
     from frametool.calc.values import RowValues
     from frametool.frames.lookups import Frames
+    from frametool.geometry.place import Earth
     from frametool.geometry.types import Components
     from frametool.grammar.pose import Pose
 
@@ -46,7 +48,10 @@ def literal(value: Any, reading: Reading) -> Term:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     key = next((key for key in PLACED if key in value), "")
     if not key:
-        return term_of_pose(read_pose(value, reading))
+        pose = read_pose(value, reading)
+        if pose.position is not None and pose.rotation is None and any(map(may_be_on_earth, value)):
+            return Term(Type(POINT, pose.parent), pose.position)  # a place that nothing turns
+        return term_of_pose(pose)
     if unknown := [each for each in value if each not in (key, "frame")]:
         hint = did_you_mean(unknown[0], ("frame",))
         raise Misfit(f"unknown key {shown(unknown[0])} beside {key}{hint}; expected frame", (unknown[0],), key=True)
@@ -81,6 +86,7 @@ class Scope:
         self.row = row
         self.degrees = degrees
         self.normalize = normalize
+        self.earth: Earth | None = None  # what is said of all places
         self.seen: set[str | None] = {None}
         self.told: set[str] = set()  # what is told once
 
@@ -96,12 +102,12 @@ class Scope:
         scope = Scope(
             tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
         )  # fmt: skip
-        scope.told = self.told
+        scope.told, scope.earth = self.told, self.earth
         return scope
 
     def reading(self, source: Source) -> Reading:
         """Return how the literals of a text are read."""
-        return Reading(source, degrees=self.degrees, normalize=self.normalize)
+        return Reading(source, degrees=self.degrees, normalize=self.normalize, earth=self.earth)
 
     @property
     def trees(self) -> list[tuple[str, Frames]]:
@@ -290,7 +296,12 @@ class _Walk:
         return rules.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
 
     def _bare(self, name: str, tree: Frames | None = None) -> str:
-        """Take a leading `/` off a frame's name, which tf2 has given up, unless a frame is called so."""
+        """Take a leading `/` off a frame's name, which tf2 has given up, unless a frame is called so.
+
+        The Earth's frame is called `ecef` here, as places call it, by either name.
+        """
+        if name in EARTH_FRAMES:
+            return EARTH_FRAMES[0]
         trees = [tree] if tree is not None else [each for _, each in self.scope.trees]
         if len(name) < 2 or not name.startswith("/") or any(name in each.frames for each in trees):
             return name

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.calc.parser import PLAIN, CalcError, frame_text
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import floats
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.validation import single
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
 
 def meet(a: str | None, b: str | None) -> bool:
     """Tell whether two frames can be one."""
-    return a is None or b is None or a == b
+    return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)
 
 
 def unit_text(unit: Dimension) -> str:

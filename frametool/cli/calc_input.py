@@ -30,8 +30,10 @@ from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 from frametool.formats.table import FORMATS, is_trajectory
+from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit
+from frametool.grammar.readers import tell as tell_notes
 from frametool.grammar.result import Result
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
@@ -96,12 +98,16 @@ def _values(source: Source, scope: Scope) -> Term | None:
     documents = [document.value for document in parse_documents(source.text, source.name)]
     if any(type(each) is dict and not OF_TREES.isdisjoint(each) for each in documents):
         return None
-    if len(documents) == 1 and type(documents[0]) is dict and not PLACED.keys().isdisjoint(documents[0]):
+    alone = documents[0] if len(documents) == 1 and type(documents[0]) is dict else {}
+    if not PLACED.keys().isdisjoint(alone) or any(map(may_be_on_earth, alone)):
         try:
-            scope.leave_out(not COVARIANCE_KEYS.isdisjoint(documents[0]))
-            return literal(documents[0], scope.reading(source))
+            scope.leave_out(not COVARIANCE_KEYS.isdisjoint(alone))
+            reading = scope.reading(source)
+            found = literal(alone, reading)
         except Misfit as misfit:
             raise misfit.placed(source, 0) from None
+        tell_notes(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
+        return found
     poses = read_poses(source, Request(degrees=scope.degrees, normalize=scope.normalize))
     if not poses:
         raise FormatError("nothing in it", source=source.name)
@@ -198,7 +204,10 @@ def _for_a_person(term: Term, style: Style) -> str:
             return write_poses([result], style)
         return f"{type_}\n{write_poses([Result(result.pose._replace(name=None, parent=None), result.extras)], style)}"
     if type_.kind in (POINT, VECTOR):
-        return write_points([plain_result(term, style)], style)
+        result = plain_result(term, style)
+        if type_.kind not in result:  # at a place on the Earth
+            from frametool.formats.trees.yaml_json import write_points
+        return str(write_points([result], style))
     return line_of_value(term, style)
 
 
@@ -231,6 +240,9 @@ def _csv(terms: Sequence[Term], style: Style) -> str:
             raise ValueInvalid("a table holds poses or other values; write json or yaml")
         if isinstance(result, float):
             rows.append({RESULT: result})
+            continue
+        if style.place is not None and term.type.kind == POINT:
+            rows.append(result)
             continue
         *frame, (key, numbers) = result.items()
         names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]

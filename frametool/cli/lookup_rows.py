@@ -68,7 +68,7 @@ class RowFrames:
             if (name is None) == (column is None):
                 raise click.UsageError(f"name {option} or its column, one of the two")
         fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
-        frames = tuple(name for name in (self.target, self.source) if name is not None)
+        frames, place = tuple(name for name in (self.target, self.source) if name is not None), task.output.style.place
 
         def ends_of(names: str | None) -> tuple[str, str]:
             cells = (names or "").split("\0") if len(frames) == 2 else [names or ""]
@@ -78,6 +78,10 @@ class RowFrames:
 
         def edge_of(names: str | None, own: int | None = at) -> Components:
             ends = ends_of(names)
+            if place is not None:
+                from frametool.grammar.place import check_in_ecef
+
+                check_in_ecef(ends[0], place)
             if sigmas is None:
                 return tree.lookup(*ends, own).components
             found = sigmas.noted(looked_up(tree, *ends, own, covariance=True))

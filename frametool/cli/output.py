@@ -11,6 +11,8 @@ from itertools import islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
+from click import UsageError
+
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
@@ -18,6 +20,7 @@ from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, listing, printable, shown, warn
 from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
 from frametool.geometry.representations import notation
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
@@ -79,6 +82,12 @@ class Output:
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
         self.style.put_at(place)
+
+    def check_target(self, target: str) -> None:
+        """Stop where places are asked for of what is seen from another frame than the Earth's."""
+        if self.style.place is not None and target not in EARTH_FRAMES:
+            what = f"what is in {shown(target)} has no lat and lon"
+            raise UsageError(f"--to {self.style.place.name} wants TARGET ecef: {what}")
 
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
         """Keep the axes of the camera that poses are of: as --camera-axes says, else as their form has them."""

@@ -120,15 +120,18 @@ def load_sides(
     count = len(a) + len(b)
     every: list[Recording] = []
 
-    def side(arguments: Sequence[str], behind: int) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
+    def side(
+        arguments: Sequence[str], behind: int, earth: str
+    ) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
         where: dict[str, Place] = {}
         every.extend(files := opened(arguments, behind=behind, of=count))
-        return _loaded(files, Rules(normalize=normalize), where), where
+        return _loaded(files, Rules(normalize=normalize, earth=earth), where), where
 
-    sides = [
-        _read_once(arguments, f"{normalize} {behind} of {count}", partial(side, arguments, behind))
-        for arguments, behind in ((a, 0), (b, len(a)))
-    ]
+    sides: list[tuple[FrameTree | TransformBuffer, dict[str, Place]]] = []
+    for arguments, behind in ((a, 0), (b, len(a))):
+        earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
+        options = f"{normalize} {behind} of {count} {earth}"
+        sides.append(_read_once(arguments, options, partial(side, arguments, behind, earth)))
     if len(every) == count:  # in a batch they may have been read before, and looked at
         refuse_idle(every)
     return sides

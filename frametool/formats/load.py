@@ -33,6 +33,7 @@ from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import BAG, CHOICES, FORMATS, readers
 from frametool.frames.lookups import FrameTree, two_covariances
 from frametool.frames.policy import Refused
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, at_other_times, stop
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
@@ -222,12 +223,14 @@ class Rules(NamedTuple):
     moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still
     policy, keep_ns: as TransformBuffer has them
     normalize: any non-zero quaternion and any matrix near a rotation is taken
+    earth: what the Earth's frame is called; "" as it is said first, `ecef` or `earth`
     """
 
     moving: bool = False
     policy: str = "frametool"
     keep_ns: int | None = None
     normalize: bool = False
+    earth: str = ""
 
 
 class Replaced(NamedTuple):
@@ -247,6 +250,7 @@ class Assembly:
         """Create an empty assembly; `name` says in messages where they come from."""
         self.name = name
         self.rules = rules or Rules()
+        self.earth, self._one_earth = self.rules.earth, False  # its name, and whether an edge to itself was told
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
         self._first: dict[str, tuple[str, Rigid, Place]] = {}  # child -> what was said first
@@ -267,6 +271,35 @@ class Assembly:
     def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
         (self.tree if self.buffer is None else self.buffer).add_root(self._kept(frame))
+
+    def renames(self, *names: str | None) -> bool:
+        """Tell whether the Earth's frame is among names by that of its two that did not come first; tf2 keeps both."""
+        if self.rules.policy == "frametool" and not self.earth:
+            self.earth = next((name for name in names if name and name in EARTH_FRAMES), "")
+        return any(name in EARTH_FRAMES and name != self.earth for name in names) and self.rules.policy == "frametool"
+
+    def one_name(self, frame: str) -> str:
+        """Return a name, the Earth's as it is here."""
+        return self.earth if frame in EARTH_FRAMES else frame
+
+    def add_edge(self, edge: Edge, place: Place) -> None:
+        """Add an edge, or a root; one between the two names of the Earth's frame must be nothing."""
+        parent, child = edge.parent, edge.child
+        if (parent in EARTH_FRAMES or child in EARTH_FRAMES) and self.renames(parent, child):
+            parent, child = parent and self.one_name(parent), self.one_name(child)
+            if parent == child:
+                if any(edge.components[:6]):
+                    what = "'earth' and 'ecef' are one frame, this edge puts one elsewhere in the other; rename one"
+                    raise place.error(what, BadTopology)
+                if not self._one_earth:
+                    warn(f"{self.name}: 'earth' and 'ecef' are one frame; the edge between them is left out")
+                self._one_earth = True
+                return self.add_root(self.earth)
+        if parent is None:
+            self.add_root(child)
+        else:
+            self.add(parent, child, edge.components, edge.stamp_ns, place)
+        return None
 
     def _kept(self, name: str) -> str:
         """Return the name under which the buffer keeps a frame: tf2 strips one slash."""
@@ -566,14 +599,13 @@ def _add(assembly: Assembly, file: Recording) -> None:
     piece = None
     rules = assembly.rules
     for piece in file.pieces(raw=rules.policy != "frametool", normalize=rules.normalize):
-        if isinstance(piece, EdgeColumns):
-            assembly.add_columns(file, piece)
-        elif isinstance(piece, Samples):
+        if isinstance(piece, Samples) and not assembly.renames(piece.parent, piece.child):
             assembly.add_samples(SamplesOfFile(file, piece))
-        elif piece.parent is None:
-            assembly.add_root(piece.child)
+        elif isinstance(piece, EdgeColumns) and not assembly.renames(*dict.fromkeys((*piece.parents, *piece.children))):
+            assembly.add_columns(file, piece)
         else:
-            assembly.add(piece.parent, piece.child, piece.components, piece.stamp_ns, Place(file, piece))
+            for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
+                assembly.add_edge(edge, Place(file, edge))
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
     assembly.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}

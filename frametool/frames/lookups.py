@@ -17,6 +17,7 @@ from frametool.frames.policy import FRAMETOOL, left_out
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 
@@ -69,6 +70,12 @@ class Frames:
         """Return every frame, in the order of first mention."""
         return tuple(self._frames)
 
+    def called(self, frame: str) -> str:
+        """Return what a frame is called here: the Earth's, `ecef` or `earth`, is one by either name, save for tf2."""
+        if frame in EARTH_FRAMES and frame not in self._frames and self.policy is FRAMETOOL:
+            return next((other for other in EARTH_FRAMES if other in self._frames), frame)
+        return frame
+
     @property
     def roots(self) -> tuple[str, ...]:
         """Return the frames without a parent."""
@@ -81,7 +88,7 @@ class Frames:
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
         """Return a frame's parent at a time, or the newest; None for a root or where it is not known."""
-        track = self._tracks.get(frame)
+        track = self.track(frame)
         if track is None:
             return None
         return track.parent if at_ns is None else track.parent_at(at_ns)
@@ -93,7 +100,7 @@ class Frames:
 
     def track(self, frame: str) -> Track | None:
         """Return what is known about a frame over time; None for a root."""
-        return self._tracks.get(frame)
+        return self._tracks.get(frame) or self._tracks.get(self.called(frame))
 
     def tracks(self) -> Iterator[Track]:
         """Walk what is known about each frame that has a parent, in the order of first mention."""
@@ -258,7 +265,7 @@ class Frames:
         if at_ns is None and self._varies:
             at_ns = self.latest(target, source)
         down, up = self.between(target, source, at_ns)
-        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else source
+        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else self.called(source)
         return [*reversed(down), str(top), *reversed(up)]
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
@@ -329,6 +336,7 @@ class Frames:
     def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
         """Name the edges between two frames that both exist, as `edges_between` does."""
         self.require(target, source)
+        target, source = self.called(target), self.called(source)
         try:
             parent_of = partial(self.parent, at_ns=at_ns) if self._varies else self.parent
             found = edges_between(target, source, parent_of)
@@ -346,7 +354,7 @@ class Frames:
         self._require(source, "source_frame")
 
     def _require(self, frame: str, role: str) -> None:
-        if frame not in self._frames or self.policy.is_bad_name(frame):
+        if self.called(frame) not in self._frames or self.policy.is_bad_name(frame):
             raise self.policy.unknown(frame, role, self)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
@@ -390,6 +398,7 @@ class FrameTree(Frames):
         Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
         ValueInvalid for numbers that are no covariance.
         """
+        parent, child = self.called(parent), self.called(child)
         known, found = self._tracks.get(child), taken(covariance)
         if known is not None and known.parent == parent and self.covariances.get(child) != found:
             raise two_covariances(parent, child, self.covariances.get(child), found)

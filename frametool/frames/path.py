@@ -10,6 +10,7 @@ from operator import attrgetter
 from frametool.errors import BadTopology, NotConnected, bare, shown
 from frametool.frames.track import StandingTrack
 from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 
 TYPE_CHECKING = False
@@ -65,13 +66,14 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
 
 
 def compose_path(
-    to_target: Sequence[Edge], to_source: Sequence[Edge], sample: Callable[[Edge], Rigid | None]
+    to_target: Sequence[Edge], to_source: Sequence[Edge], sample: Callable[[Edge], Rigid | None], *, far: bool = False
 ) -> Rigid | None:
     """Return target_from_source, floats or columns; None if an edge has no pose.
 
     to_target, to_source: the edges from the common ancestor down to either end.  A branch without edges leaves the
     other's bits alone.
     sample: returns parent_from_child of an edge, or None.
+    far: the common ancestor is far off: subtracted first and then turned, positions are rounded half as much.
     """
     top_from_target, top_from_source = _product(to_target, sample), _product(to_source, sample)
     if top_from_target is None or top_from_source is None:
@@ -80,6 +82,8 @@ def compose_path(
         return top_from_source
     if not to_source:
         return rigid.inverse(*top_from_target)
+    if far:
+        return rigid.relative(*top_from_target, *top_from_source)
     return rigid.compose(*rigid.inverse(*top_from_target), *top_from_source)
 
 
@@ -106,24 +110,26 @@ class Query:
 
     fixed: the answer, where nothing on the way moves; otherwise None
     moving: the edges that move
+    far: whether the common ancestor is the Earth
     """
 
-    __slots__ = ("fixed", "moving", "to_source", "to_target")
+    __slots__ = ("far", "fixed", "moving", "to_source", "to_target")
 
     def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
         """Compose what stands still; both branches come topmost edge first."""
         self.moving = [track for track in (*to_target, *to_source) if not track.standing]
+        self.far = bool(to_target) and to_target[0].parent in EARTH_FRAMES
         self.fixed: Rigid | None = None
         self.to_target: Sequence[Track] = ()
         self.to_source: Sequence[Track] = ()
         if self.moving:
             self.to_target, self.to_source = _folded(to_target), _folded(to_source)
         else:
-            self.fixed = compose_path(to_target, to_source, attrgetter("components"))
+            self.fixed = compose_path(to_target, to_source, attrgetter("components"), far=self.far)
 
     def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:
         """Return target_from_source of the poses that `sample` finds for the edges."""
-        return compose_path(self.to_target, self.to_source, sample)
+        return compose_path(self.to_target, self.to_source, sample, far=self.far)
 
     def at(self, at_ns: int) -> Rigid | None:
         """Return target_from_source at a time; None if an edge has no data then."""

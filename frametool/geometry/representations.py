@@ -313,6 +313,7 @@ REPRESENTATIONS: dict[str, Representation] = {
     "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up"),
     "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down"),
 }  # fmt: skip
+EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
 ROTATIONS = {_name: _row for _name, _row in REPRESENTATIONS.items() if not _row.is_place}
 for _name, _row in REPRESENTATIONS.items():
     _row.name = _name

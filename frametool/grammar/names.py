@@ -9,6 +9,7 @@ import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
+from frametool.geometry import representations
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -30,8 +31,7 @@ PLACE_KEYS = frozenset((
     "north", "up", "down",
 ))  # fmt: skip
 FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
-# a place says its frame, by either name
-EARTH_FRAMES = ("ecef", "earth")
+EARTH_FRAMES = representations.EARTH_FRAMES
 
 
 def in_nanoseconds(name: str) -> bool:

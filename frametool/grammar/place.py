@@ -10,14 +10,15 @@ Loaded where a mapping has such keys.
 from __future__ import annotations
 
 import re
+from math import hypot, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
-from frametool.geometry import floats, placed
-from frametool.geometry.place import ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
+from frametool.geometry import floats, placed, quaternion
+from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
 from frametool.geometry.representations import HEADING, REPRESENTATIONS
-from frametool.geometry.transverse_mercator import ZONES, zone_number
+from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -44,6 +45,7 @@ EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}
 NO_MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 DATUMS = ("WGS84", "WGS 84", "WGS-84", "wgs84")
+LEVEL = 1e-9  # of 1: what is less level points nowhere
 NEAR = 0.01  # metres: how far two positions of one entry may lie apart
 MINUTE, SECOND = "['\u2032\u2019]", "(?:[\"\u2033\u201d]|'')"
 DMS = re.compile(
@@ -79,7 +81,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     spots = _spots(own, reading)
     if not spots:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
-    axes = _axes(mapping, reading, spots[0].place.name)
+    said, axes = AXES_KEY in mapping, take_axes(mapping, reading, spots[0].place.name)
     check_parent(mapping, own)
     if "inverse" in mapping:
         raise Misfit("a place on the Earth is given in ecef; leave inverse out", ("inverse",), key=True)
@@ -91,10 +93,13 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     for other in others:
         _agree(position, _position(other))
     if AT not in own and inner.position is not None:
-        _agree(position, inner.position)  # the same said in ecef: of that the rotation is
-        return inner._replace(parent=inner.parent or ECEF)
+        _agree(position, inner.position)
+        if not said:  # the same said in ecef: of that the rotation is
+            return inner._replace(parent=inner.parent or ECEF)
+        inner = inner._replace(position=None)
     rotation = turn or inner.rotation
-    needs_axes = rotation is not None or AT in own or inner.covariance is not None
+    stands = AT in own or reading.framed  # a frame has axes, a position none
+    needs_axes = stands or rotation is not None or inner.covariance is not None
     if needs_axes and not axes:
         raise Misfit(UNSAID)
     if not needs_axes:
@@ -107,12 +112,12 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     base = _base(place, numbers)
     made = placed.compose(base, inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
-    return found if rotation is not None or AT in own else found._replace(rotation=None)
+    return found if rotation is not None or stands else found._replace(rotation=None)
 
 
 def _base(place: Place, numbers: tuple[float, ...]) -> tuple[float, ...]:
-    found = place.base(numbers) if place.axes != ECEF else (*place.ecef(numbers), 0.0, 0.0, 0.0, 1.0)
-    return tuple(found)
+    rotation = (0.0, 0.0, 0.0, 1.0) if place.axes == ECEF else place.base(numbers)[3:]
+    return (*place.ecef(numbers), *rotation)
 
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
@@ -315,7 +320,7 @@ def _agree(first: Any, second: Any) -> None:
         raise Misfit(f"two positions in one entry disagree by {apart:.6g} m; keep one")
 
 
-def _axes(mapping: dict[str, Any], reading: Reading, name: str) -> str:
+def take_axes(mapping: dict[str, Any], reading: Reading, name: str = "") -> str:
     """Return what rotations are given in, as a mapping says, else as holds for all."""
     default = reading.earth.axes if reading.earth else ""
     default = name if name in LOCAL else default
@@ -426,6 +431,61 @@ def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     }
     axes = {} if pose.rotation is None else {AXES_KEY: entry.get(AXES_KEY, ECEF)}
     return cells | axes, local
+
+
+def overview(pose: Pose) -> list[tuple[str, str]]:
+    """Say for a person where a pose or point of ecef is: lat lon alt, UTM, and the heading of its x; [] of no place."""
+    x, y, z = pose.position or (0.0, 0.0, 0.0)
+    lat, lon, alt = wgs84.lla(x, y, z, floats)
+    if not isfinite(alt):
+        return []
+    said = [("lat lon alt", f"{round(lat, 9) + 0.0:.9f} {round(lon, 9) + 0.0:.9f} deg  {round(alt, 4) + 0.0:.4f} m")]
+    if SOUTH <= lat <= NORTH:
+        zone = standard_zone(lat, lon, floats)
+        easting, northing, convergence, _ = utm(zone, lat, lon, floats)
+        grid = f"{ZONES[int(zone)]} {easting:.4f} {northing:.4f} m  convergence {round(convergence, 6) + 0.0:.6f} deg"
+        said.append(("utm", grid))
+    if pose.rotation is not None:
+        qx, qy, qz, qw = Place(LLA, REPRESENTATIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
+        east, north, _ = quaternion.rotate(qx, qy, qz, qw, 1.0, 0.0, 0.0)
+        level = hypot(east, north)
+        heading = round(floats.bearing(east, north, level, floats) * floats.RADIAN, 6) % 360.0 if level > LEVEL else 0.0
+        said.append(("heading", f"x {heading:.6f} deg from true north" if level > LEVEL else "none: x is upright"))
+    return said
+
+
+def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
+    """Return where a frame of ecef stands as a tree has it, `at` and `axes`, and its pose and covariance in these.
+
+    Raises as `placed_entry` does, and for axes of a zone that is not said.
+    """
+    if place.axes == GRID and place.zone is not None and UTM not in (place.name, *(each.name for each in place.more)):
+        raise ValueInvalid(f"--to {place.name} does not say the zone of axes grid; --to utm does")
+    turned = pose.components[3:]
+    try:
+        at, local = placed_entry(pose._replace(parent=ECEF), place)
+    except ValueInvalid as error:
+        raise ValueInvalid(f"frame {shown(pose.name)}: {error}" if pose.name else str(error)) from None
+    local = local._replace(parent=pose.parent)
+    if pose.covariance is not None and local.rotation is not None:
+        back = quaternion.compose(*local.rotation, *quaternion.conjugate(*turned))
+        made = placed.compose((0.0, 0.0, 0.0, *back), (0.0, 0.0, 0.0, *turned, *pose.covariance))
+        local = local._replace(covariance=pose.of(made).covariance)
+    axes = at.pop(AXES_KEY)
+    return {AT: at, AXES_KEY: axes}, local
+
+
+def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
+    """Return where a frame of ecef stands, in one way, and the axes that the pose left is given in.
+
+    Nothing of a frame that is no place, and the pose as it is.
+    """
+    place = Place(LLA, REPRESENTATIONS[LLA].names, ENU) if place is None else place
+    try:
+        entry, local = placed_entry(pose, place._replace(more=()).with_grid(gridded=False))
+    except ValueInvalid:
+        return {}, pose
+    return ({}, pose) if place.name == ECEF else (entry.pop(UTM, {}) | entry, local)
 
 
 def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict[str, Any]:

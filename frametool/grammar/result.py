@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry import euler, floats, quaternion
-from frametool.geometry.representations import notation
+from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.pose import NAMES, SCALE, Pose
-from frametool.grammar.rotation_spelling import spelled
+from frametool.grammar.rotation_spelling import AXES_KEY, spelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -196,12 +196,35 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     """Yield a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
     yield from ({"name": root} for root in tree.roots)
     for track in tree.tracks():
-        beside = uncertain(tree.covariances.get(track.child))
+        covariance = tree.covariances.get(track.child)
         if track.standing:
-            yield Result(Pose.of(track.components, track.child, track.parent), beside).mapping(style)
-        else:
-            samples = {"samples": list(_samples(track, style))}
-            yield {"name": track.child, "parent": track.parent} | beside | samples
+            yield _edge(Pose.of((*track.components, *(covariance or ())), track.child, track.parent), style)
+            continue
+        if covariance and style.place is not None and track.parent in EARTH_FRAMES:
+            warn(f"frame {shown(track.child)} is written by xyz: its one covariance is along the axes of ecef")
+        samples = {"samples": list(_samples(track, _by_xyz(style) if covariance else style))}
+        yield {"name": track.child, "parent": track.parent} | uncertain(covariance) | samples
+
+
+def _by_xyz(style: Style) -> Style:
+    """Return the same style with positions as x, y, z."""
+    plain = style.in_form(style.form)
+    plain.put_at(None)
+    return plain
+
+
+def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
+    """Return an edge as a mapping: under the Earth's frame at its place, where positions are written so.
+
+    above: the frame that a sample hangs under, where it does not name it
+    """
+    if style.place is None or style.place.name == EARTH_FRAMES[0] or (above or pose.parent) not in EARTH_FRAMES:
+        return Result(pose, uncertain(pose.covariance)).mapping(_by_xyz(style))
+    from frametool.grammar.place import frame_entry
+
+    at, pose = frame_entry(pose, style.place)
+    entry = Result(pose, uncertain(pose.covariance)).mapping(_by_xyz(style))
+    return {key: entry.pop(key) for key in ("name", "parent") if key in entry} | at | entry
 
 
 def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
@@ -217,7 +240,7 @@ def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:
     """Yield the samples of a moving frame; one under another parent than the newest names it."""
     for stamp_ns, parent, components in track.walk():
         pose = Pose.of(components, None, None if parent == track.parent else parent)
-        yield {"stamp_ns": stamp_ns} | Result(pose).mapping(style)
+        yield {"stamp_ns": stamp_ns} | _edge(pose, style, parent)
 
 
 def sample_results(tree: Frames) -> Iterator[Result]:
@@ -273,14 +296,28 @@ MOST_PLAIN = 1e9
 NOISE = 1e-9  # what rounding leaves of a zero, metres or degrees
 
 
-def edge_label(transform: Transform, style: Style) -> tuple[str, str]:
-    """Return two lines: `xyz 0.1 0 1.2` and `rpy_deg 0 15 0`, or the first representation asked for."""
-    pose = Pose.of(transform.components)
+def edge_label(transform: Transform, style: Style, parent: str) -> tuple[str, str]:
+    """Return two lines: `xyz 0.1 0 1.2` and `rpy_deg 0 15 0`, or the first representation asked for.
+
+    Under the Earth's frame: `lat 48.1 lon 11.5 alt 520` and `enu rpy_deg 0 15 0`.
+    """
+    pose, at, axes = Pose.of(transform.components, None, parent), "", ""
+    digits = {"lat": 9, "lon": 9} if style.precision is None else {}  # 0.1 mm
+    if parent in EARTH_FRAMES:
+        from frametool.grammar.place import seen_at
+
+        members, pose = seen_at(pose, style.place)
+        axes = f"{members.pop(AXES_KEY)} " if members else ""
+        usual = METRES if style.precision is None else style.precision
+        at = " ".join(
+            f"{key} {each if type(each) is str else _rounded(each, digits.get(key, usual))}"
+            for key, each in members.items()
+        )
     chosen = style.notations[0] if style.notations else notation("rpy_deg")
     degrees = bool(chosen.representation.angles) and style.in_degrees(chosen)
     position = _short(pose.components[:3], style.precision if style.precision is not None else METRES)
     decimals = style.precision if style.precision is not None else DEGREES if degrees else METRES
-    return f"xyz {position}", f"{chosen.spec} {_short(rotation_numbers(pose, chosen, style), decimals)}"
+    return at or f"xyz {position}", f"{axes}{chosen.spec} {_short(rotation_numbers(pose, chosen, style), decimals)}"
 
 
 def graphviz(text: str) -> str:

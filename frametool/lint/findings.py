@@ -25,6 +25,8 @@ RULES = {
     "w-first": ("warning", "x = 1 of x, y, z, w: the identity with w first?"),
     "identity": ("warning", "an entry with neither position nor rotation"),
     "slash": ("warning", "a frame name that begins with /"),
+    "no-alt": ("note", "a place on the Earth without its height"),
+    "band-s": ("warning", "a zone of UTM with S, which is south"),
     "noise": ("note", "lines that a tool printed between messages"),
     "topics": ("note", "the topics that transforms came by"),
     "two-topics": ("error", "a frame that comes by the topics of two robots"),

@@ -13,6 +13,8 @@ from frametool.formats.trees.tree_reader import read_edges, without_slashes
 from frametool.frames.edge_log import EdgeLog
 from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
+from frametool.geometry.representations import EARTH_FRAMES
+from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.readers import Misfit, Note, Reading
 from frametool.lint.findings import Finding
 
@@ -134,7 +136,7 @@ def _written_xyzw(value: Any, edge: Edge) -> bool:
     """Return whether an edge's rotation was written as a quaternion, not as angles."""
     for step in edge.path:
         value = value[step]
-    return type(value) is dict and not WRITTEN_XYZW.isdisjoint(value)
+    return type(value) is dict and not WRITTEN_XYZW.isdisjoint(value) and not any(map(may_be_on_earth, value))
 
 
 FLICKER = 3  # so many changes of parent are no picking up and putting down
@@ -146,13 +148,29 @@ def check(files: Sequence[Recording], *, normalize: bool = False, tree: FrameTre
     tree: takes what stands still
     """
     findings: list[Finding] = []
-    everything = _statements(files, findings, normalize=normalize)
+    everything = _of_one_earth(_statements(files, findings, normalize=normalize), findings.append)
     if tree is not None:
         everything, again = tee(everything)
         _stand(tree, again)
     findings += lint(everything)
     order = {file.name: index for index, file in enumerate(files)}
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
+
+
+def _of_one_earth(everything: Iterable[Statement], find: Find) -> Iterator[Statement]:
+    """Call the Earth's frame by the one of its names that comes first; report edges between the two."""
+    earth = ""
+    for each in everything:
+        names = [name for name in each[:2] if name in EARTH_FRAMES]
+        if not names:
+            yield each
+        elif names in ([*EARTH_FRAMES], [*reversed(EARTH_FRAMES)]):
+            rule = "self" if any(each.components[:6]) else "odd"
+            find(each.finding(rule, "'earth' and 'ecef' are one frame, this is an edge between them"))
+        else:
+            earth = earth or names[0]
+            parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
+            yield each._replace(parent=parent, child=child)
 
 
 def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:

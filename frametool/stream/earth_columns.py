@@ -389,13 +389,26 @@ def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tupl
     return request, (shape._replace(unit=place._replace(level=level)),)
 
 
+def check_formula(request: Request, source: str, *, on_earth: bool) -> None:
+    """Stop where an expression does not fit rows of places, or has a result elsewhere that is asked for at places.
+
+    Raises FormatError, CalcError.
+    """
+    frame = None if request.rename is None else request.rename(ECEF if on_earth else None, None)[0]
+    try:
+        if request.place is not None:
+            check_in_ecef(frame, request.place)
+    except ValueInvalid as error:
+        raise FormatError(str(error), source=source, line=1) from None
+
+
 def refuse_elsewhere(table: Table, request: Request, source: str) -> None:
     """Stop where places are asked for of rows whose frame is not the Earth's, or is not said.
 
     Raises FormatError.
     """
-    if request.place is None:
-        return
+    if request.place is None or request.frames or request.operation.formula is not None:
+        return  # a look-up looks at each row, an expression at its own frames
     frame = request.result_frame if request.operation.moves else None
     if frame is None and any(name in PARENT_COLUMNS for name in table.names or ()) and not request.operation.moves:
         return  # each row says its own

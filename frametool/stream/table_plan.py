@@ -71,6 +71,10 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
 
         beside, shapes = covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
+    if request.operation.formula is not None and (on_earth or request.place is not None):
+        from frametool.stream.earth_columns import check_formula
+
+        check_formula(request, source, on_earth=on_earth)
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)

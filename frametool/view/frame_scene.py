@@ -8,11 +8,16 @@ from __future__ import annotations
 import re
 from functools import cached_property
 from itertools import pairwise
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
+from frametool.frames.buffer import TransformBuffer
 from frametool.frames.snapshot import Snapshot
-from frametool.geometry import rigid
+from frametool.geometry import earth as wgs84
+from frametool.geometry import floats, rigid
+from frametool.geometry.place import ECEF as EARTH
+from frametool.geometry.place import ENU
 from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
@@ -52,6 +57,39 @@ def _expression(text: str) -> re.Pattern[str]:
         raise ValueInvalid(f"{shown(text)} is no regular expression: {error}") from None
 
 
+class Ground(NamedTuple):
+    """What is drawn in the place of the Earth's frame: level axes, x east and y north, at a frame that stands there."""
+
+    name: str
+    pose: Rigid
+
+
+def _ground(tree: Frames) -> Ground | None:
+    """Return the ground below the first frame on the Earth, one that stands still if there is any."""
+    earth = tree.called(EARTH)
+    there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.standing)
+    if not there or earth not in tree.roots:
+        return None
+    x, y, z = there[0].components[:3]
+    lat, lon, alt = wgs84.lla(x, y, z, floats)
+    if not isfinite(alt):
+        return None
+    return Ground(f"enu at {there[0].child}", (x, y, z, *wgs84.pose(lat, lon, alt, ENU, floats)[3:]))
+
+
+def _on(tree: Frames, ground: Ground) -> Frames:
+    """Return the same frames with the ground in the place of the Earth's frame."""
+    earth, found = tree.called(EARTH), TransformBuffer(name=tree.name)
+    for frame in tree.frames:
+        found.add_root(ground.name if frame == earth else frame)
+    for track in tree.tracks():
+        for stamp_ns, parent, pose in track.walk():
+            above, seen = (ground.name, rigid.relative(*ground.pose, *pose)) if parent == earth else (parent, pose)
+            found.insert_components(above, track.child, seen, stamp_ns)
+    found.camera_axes, found.covariances = tree.camera_axes, tree.covariances
+    return found
+
+
 class FrameScene:
     """The frames of a tree as they are drawn.
 
@@ -68,16 +106,21 @@ class FrameScene:
     def __init__(
         self, tree: Frames, *, fixed: str | None = None, at_ns: int | None = None, below: str | None = None,
         only: str | None = None, target: str | None = None, source: str | None = None, path_only: bool = False,
+        ground: Ground | None = None,
     ) -> None:  # fmt: skip
         """Choose what is drawn.
 
-        fixed: left out, the target, or `below`, or the root of most frames.
+        fixed: left out, the target, or `below`, or the root of most frames; on the Earth the ground.
+        ground: that of another scene; left out, below the first frame that stands on the Earth.
         at_ns: left out, the first time that all moving edges have.
         below: only this frame and those that hang from it.  only: a regular expression that names must match.
         Raises UnknownFrame; ValueInvalid for an empty tree, a bad expression, or one that matches nothing.
         """
         if not tree.frames:
             raise ValueInvalid("no frames in it: nothing to draw")
+        self.ground = None if tree.called(EARTH) in (fixed, below, target, source) else ground or _ground(tree)
+        if self.ground is not None:  # the Earth's centre is no place to look from
+            tree = _on(tree, self.ground)
         for frame in filter(None, (fixed, below, target, source)):
             tree.require(frame, frame)
         self.tree = tree
@@ -100,9 +143,9 @@ class FrameScene:
 
     def _choice(self, below: str | None, only: str | None) -> set[str] | None:
         """Return the names to draw."""
-        if below is None and only is None and not self.path_only:
+        if below is None and only is None and not self.path_only and self.ground is None:
             return None
-        chosen = set(self.names)
+        chosen = {name for name in self.names if self.ground is None or name != self.ground.name}
         if below is not None:
             chosen &= {*Snapshot(self.tree, self.at_ns).below(below)}
         if self.path_only and self.target and self.source:

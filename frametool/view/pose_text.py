@@ -12,14 +12,14 @@ from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import ROTATIONS, ROWS, notation
-from frametool.grammar.pose import TIMES
+from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.pose import TIMES, Pose
 from frametool.grammar.result import Result, is_locked, placed, rotation_entry, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.geometry.representations import Notation
-    from frametool.grammar.pose import Pose
     from frametool.grammar.result import Style
 
 OVERVIEW = [name + unit for name, row in ROTATIONS.items() for unit in row.overview]
@@ -58,7 +58,11 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
         ]
         frames.append("".join([frame, at, *others]))
         rows.append([style.number(value + 0.0) for value in numbers])
-    return "".join(f"{'  '.join(cells)}  {frame}\n" for cells, frame in zip(_aligned(rows), frames, strict=True))
+    text = "".join(f"{'  '.join(cells)}  {frame}\n" for cells, frame in zip(_aligned(rows), frames, strict=True))
+    if len(rows) == 1 and record.get("frame") in EARTH_FRAMES and style.place is None and "point" in record:
+        lines = list(_earth_lines(Pose(tuple(record["point"]), parent=record["frame"])))
+        text += _layout(lines, style) if lines else ""
+    return text
 
 
 def _describe(result: Result, style: Style) -> str:
@@ -76,6 +80,8 @@ def _describe(result: Result, style: Style) -> str:
     if pose.rotation is not None:
         for each in style.notations or map(notation, OVERVIEW):
             lines += _rotation_lines(pose, each, style)
+    if pose.parent in EARTH_FRAMES and not style.notations and style.place is None:
+        lines += _earth_lines(pose)
     lines += _extra_lines(result.said(style))
     if style.place is not None and style.place.origin is not None:  # of its axes, not of the Earth's
         result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
@@ -121,6 +127,13 @@ def in_width(text: str, more: str, *, gap: str = " ") -> str:
     """Return one line, or two where one is wider than the terminal."""
     width = get_terminal_size((WIDTH, 0)).columns
     return f"{text}{gap}{more}\n" if len(text) + len(gap) + len(more) <= width else f"{text}\n  {more}\n"
+
+
+def _earth_lines(pose: Pose) -> Iterator[NumberLine]:
+    """Yield the lines of where a pose or point in ecef is on the Earth, and where its x points; nothing of no place."""
+    from frametool.grammar.place import overview
+
+    yield from (NumberLine(label, [], said) for label, said in overview(pose))
 
 
 def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[NumberLine]:

@@ -69,7 +69,7 @@ def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
 
 def _label(track: Track, style: Style, covariance: Components | None) -> tuple[str, ...]:
     """Return the pose of an edge, how uncertain it is, and how it moves: its newest pose then."""
-    label: tuple[str, ...] = edge_label(Transform.of(*track.components), style)
+    label: tuple[str, ...] = edge_label(Transform.of(*track.components), style, track.parent)
     if covariance is not None:
         from frametool.view.pose_text import largest_sigmas
 

@@ -12,6 +12,7 @@ from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import mentions_row, walk
 from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
+from frametool.cli.group import settings
 from frametool.cli.options import (
     FILE,
     ColumnNames,
@@ -86,6 +87,11 @@ def command(
     stream = Stream(options)
     output = Output("points", deg=deg, **options)
     scope = Scope(degrees=deg, normalize=normalize)
+    said = settings()
+    if said.origin or said.local_axes or said.zone:
+        from frametool.cli.earth import earth
+
+        scope.earth = earth()
     given = list(_given(arguments, expressions, scope))
     lines = [read_line(text) for text, _ in given]
     scope.tree = _tree(trees, lines)
@@ -160,5 +166,5 @@ def _request(formula: RowExpressions, kind: str, time_column: str | None, *, deg
     counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
     return Request(
         Operation(moves=True, formula=formula), kind=kind, degrees=degrees, normalize=normalize, timed=timed,
-        frame_is_counter=counters,
+        frame_is_counter=counters, earth=formula.scope.earth,
     )  # fmt: skip

@@ -59,6 +59,9 @@ def command(
         raise click.UsageError("--start is after --stop")
     taken = rules_of(options)
     out = Output("poses", output=output, otherwise=None if output else "text", **options)
+    out.check_target(target)
+    if out.style.place is not None and out.style.form == "text":
+        raise click.UsageError(f"--to {out.style.place.name}: tf2_echo's blocks have x, y, z; -f yaml, json or csv")
     frames = load_tree(tree, more, taken)
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)

@@ -86,6 +86,8 @@ def command(
     if not by_row and (target is None or source is None):
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
     _check(at, source_at, fixed, times, window)
+    if target is not None and not (by_row and by_row.target is not None):
+        output.check_target(target)
     if covariance:
         _check_covariance(output, derives=task.derives, fixed=fixed, by_row=bool(by_row))
     if by_row:
@@ -151,6 +153,9 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
         raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
     if by_row:
         refuse_unused("is not for --covariance: the edges that are taken for exact are counted in one process", "jobs")
+    if output.style.place is not None:
+        name = output.style.place.name
+        raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
     form = output.told if by_row else output.style.form
     if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")

@@ -38,6 +38,9 @@ def command(tree: str, more: Sequence[str], at: int | str | None, color: str, **
     """
     taken = rules_of(options)
     output = Output("tree", "trajectory", **options)
+    place, drawn = output.style.place, output.style.form in ("yaml", "json", "text", "dot", "mermaid")
+    if place is not None and (not drawn or place.origin is not None):
+        raise click.UsageError(f"--to {place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
     frames = load_tree(tree, more, taken, drawings=True)
     stamp = at_ns(at)
     output.tree(frames if stamp is None else frames.tree_at(stamp), color)

@@ -104,7 +104,9 @@ def command(
     gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
     if gone and chosen != "html":  # which goes to the nearest time
         say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
-    before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed) if overlay else None
+    before = None
+    if overlay:
+        before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
     on_terminal = chosen == "text" and output is None and sys.stdout.isatty()
     if live and (not on_terminal or scene.at_ns is None):
         raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")

@@ -67,7 +67,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     lines = ["digraph frames {", "  node [shape=ellipse];"]
     lines += [f'  "{graphviz(frame)}";' for frame in tree.frames]
     for parent, child, transform in tree.edges():
-        label = "\\n".join(map(graphviz, edge_label(transform, style)))
+        label = "\\n".join(map(graphviz, edge_label(transform, style, parent)))
         lines.append(f'  "{graphviz(parent)}" -> "{graphviz(child)}" [label="{label}"];')
     return "\n".join([*lines, "}", ""])
 
@@ -78,7 +78,7 @@ def _flowchart(tree: Frames, style: Style) -> str:
     lines = ["flowchart TD"]
     lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]
     for parent, child, transform in tree.edges():
-        label = "<br>".join(map(_escaped, edge_label(transform, style)))
+        label = "<br>".join(map(_escaped, edge_label(transform, style, parent)))
         lines.append(f'  {ids[parent]} -->|"{label}"| {ids[child]}')
     return "\n".join([*lines, ""])
 

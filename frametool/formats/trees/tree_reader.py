@@ -4,6 +4,7 @@
     frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
     {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
     {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
+    {name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}              a place on the Earth, in `ecef`
 
 Metres, radians unless a key says degrees; every pose is that of the frame in its parent: parent_from_child.  What other
 forms in YAML and JSON read their documents with stands below, and knows nothing of their keys.
@@ -19,14 +20,16 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
+from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
-from frametool.grammar.rotation_spelling import rotation_of
+from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
 from frametool.ros import messages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
+    from frametool.geometry.place import Earth
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
@@ -69,6 +72,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
 
     Raises Misfit with the path from the document's top.
     """
+    reading.framed = True
     if type(value) is list:
         yield from _entries(value, (), reading)
     elif type(value) is not dict:
@@ -153,8 +157,8 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
         for key in ("name", "parent"):
             if key in as_mapping(entry, f"the pose of frame {shown(child)}"):
                 raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
-        pose = read_pose(entry, reading, CHILDREN)
-        yield from _edges(entry, pose, parent, child, path, reading)
+        pose = _pose(entry, reading, CHILDREN)
+        yield from _edges(entry, pose, _above(pose, parent, entry), child, path, reading)
     except Misfit as misfit:
         reading.refuse(misfit.below(*path))
 
@@ -174,7 +178,7 @@ def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]
 def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
     """Read {name, parent, pose} or {name, parent, samples}; without parent and pose it only names a root."""
     try:
-        pose = read_pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
+        pose = _pose(as_mapping(entry, "an entry {name, parent, ..}"), reading, TIMED)
         if pose.name is None:
             raise Misfit("missing name; an entry is {name: .., parent: .., xyz: [..], ..}")
         if pose.parent is None and (pose.position or pose.rotation or (pose.covariance and "samples" not in entry)):
@@ -183,6 +187,23 @@ def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
     except Misfit as misfit:
         reading.refuse(misfit.below(*path))
         return []
+
+
+def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pose:
+    """Read the pose of an entry; axes beside samples are what these are given in."""
+    if AXES_KEY in entry and "samples" in entry:
+        entry = {key: value for key, value in entry.items() if key != AXES_KEY}
+    return read_pose(entry, reading, also)
+
+
+def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
+    """Return the frame that a pose is given in: that around it, or of its own; raises Misfit for a place elsewhere."""
+    if pose.parent is None or "parent" in entry:
+        return pose.parent or parent
+    if parent not in (None, *EARTH_FRAMES):  # a place says its frame
+        key = next(filter(may_be_on_earth, entry))
+        raise Misfit(f"{key} places a frame in ecef; it stands under {shown(parent)}", (key,), key=True)
+    return parent or pose.parent
 
 
 def _edges(
@@ -228,22 +249,35 @@ def read_samples(
     samples = entry["samples"]
     if type(samples) is not list or not samples:
         raise Misfit(f"expected samples as a list of {{stamp: .., xyz: [..], ..}}, found {kind(samples)}", ("samples",))
-    outer = reading.degrees
+    outer, earth = reading.degrees, reading.earth
     edges = []
     try:
         reading.degrees = read_angle_unit(entry["angles"]) if "angles" in entry else outer
+        if AXES_KEY in entry:
+            reading.earth = _given_in(entry, reading)
         for index, sample in enumerate(samples):
             reading.here = (*path, "samples", index)
             moved, stamp_ns = within(("samples", index), _sample, sample, reading, uncertain=bool(pose.covariance))
-            above = moved.parent or parent
+            above = within(("samples", index), _above, moved, parent, sample)
             if above is None:
                 raise Misfit(f"frame {shown(child)} moves but has no parent", ("samples", index))
             edges.append(
                 Edge(above, child, moved.components, stamp_ns, path=reading.here, covariance=pose.covariance)
             )
     finally:
-        reading.degrees = outer
+        reading.degrees, reading.earth = outer, earth
     return edges
+
+
+def _given_in(entry: dict[str, Any], reading: Reading) -> Earth:
+    """Return what is said of all places among samples: the axes beside them."""
+    from frametool.geometry.place import Earth
+    from frametool.grammar.place import take_axes
+
+    if not any(may_be_on_earth(key) for sample in entry["samples"] if type(sample) is dict for key in sample):
+        what = "axes beside samples are those at places on the Earth; none of these has one"
+        raise Misfit(what, (AXES_KEY,), key=True)
+    return Earth(axes=take_axes({AXES_KEY: entry[AXES_KEY]}, reading))
 
 
 def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
@@ -251,6 +285,8 @@ def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, in
     pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
     if said := COVARIANCE_KEYS.intersection(sample):
         raise Misfit(f"{min(said)} is one for all samples; write it beside samples", (min(said),), key=True)
+    if uncertain and pose.parent is not None and "parent" not in sample:
+        raise Misfit("axes turn from place to place; one covariance for all is in no axes; leave it out")
     if uncertain and sample.get("inverse") == "true":
         raise Misfit("a sample that is inverted has no part in one covariance for all; write its inverse", ("inverse",))
     if pose.name is not None:
