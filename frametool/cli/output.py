@@ -19,8 +19,7 @@ from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, listing, printable, shown, warn
 from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
-from frametool.geometry.representations import notation
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:

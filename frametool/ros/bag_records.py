@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, Unanswered, listing
-from frametool.ros.bags import opened_bag
+from frametool.ros.bags import TYPES, opened_bag
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 
@@ -62,8 +62,10 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
         if any(not wanted or topic in wanted for topic in clouds):
             return None
         known = listing(sorted({f"{each.topic} ({each.msgtype})" for each in reader.connections})) or "none"
+        has_frames = any(each.msgtype in TYPES for each in reader.connections)
     named = f" on {listing(chosen)}" if chosen else ""
-    raise FormatError(f"no points, poses or fixes{named}; topics: {known}", source=path)
+    remedy = f"; its frames: frametool lookup {path} TARGET SOURCE" if has_frames else ""
+    raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
 
 
 def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[bytes]:

@@ -49,6 +49,11 @@ def test_what_is_no_text_is_named_wherever_a_pose_is_read(
 ) -> None:
     data, message = FILES[name]
     done = run(*(name if each == "FILE" else each for each in arguments), files={name: data})
+    if message.endswith("TARGET SOURCE") and arguments[0] not in ("interpolate", "apply"):  # bags are streams of records
+        assert (done.status, done.out) == (1, "")
+        assert done.err.startswith(f"frametool: {name}: the bag cannot be read; is it whole, and its suffix right? (")
+        assert done.err.count("\n") == 1
+        return
     assert (done.status, done.out, done.err) == (1, "", f"frametool: {name}: {message}\n")
 
 

@@ -54,7 +54,7 @@ def test_findings_for_machines_stay_one_each(run: Run) -> None:
 
 
 def test_warnings_about_many_poses_are_told_of_three_and_counted(run: Run) -> None:
-    poses = "".join(f"{{xyz: [0, 0, {at}], xyzw: [0, 0, 0.7071, 0.7071]}}\n---\n" for at in range(67))
+    poses = "".join(f"{{xyz: [0, 0, {at}], xyzw: [0, 0, 0.7068, 0.7071]}}\n---\n" for at in range(67))
     outcome = run("convert", "f.yaml", "-f", "json", files={"f.yaml": poses})
     assert outcome.status == 0
     assert len(outcome.err.splitlines()) == 4

@@ -68,6 +68,11 @@ LINES += [(f"{name} {option}", "") for name in NAMES for option in ("--help", "-
 DRAWN = ("view",)  # a picture has no words to lose
 
 
+def _words(text: str) -> set[str]:
+    """Return the words of a text without the marks that a fold puts between them."""
+    return set(text.replace(",", " ").replace(":", " ").split())
+
+
 @pytest.mark.parametrize(("line", "name"), LINES, ids=[f"{line} < {name}".rstrip("< ") for line, name in LINES])
 def test_text_fits_eighty_columns_and_loses_nothing_in_fewer_or_more(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, name: str
@@ -85,4 +90,4 @@ def test_text_fits_eighty_columns_and_loses_nothing_in_fewer_or_more(
         if "help" in line:
             assert "".join(printed[columns].split()) == "".join(printed[80].split())
         elif not line.startswith(DRAWN):
-            assert set(printed[columns].split()) == set(printed[80].split())
+            assert _words(printed[columns]) == _words(printed[80])

@@ -506,7 +506,7 @@ def test_what_lookup_prints_as_csv_is_a_tree_again(run: Run) -> None:
 @pytest.mark.parametrize(("text", "said"), [
     ("x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n", "no column of stamps among x, y, z, qx, qy, qz, qw"),
     ("stamp,x,y,z\n1,2,3,0\n", "no rotation among the columns stamp, x, y, z"),
-    ("timestamp,x,y,z,qx,qy,qz,qw\n1403636579763555584,1,2,3,0,0,0,1\n", "then call them stamp_ns"),
+    ("timestamp,x,y,z,qx,qy,qz,qw\n1403636579763555584,1,2,3,0,0,0,1\n", "or call them stamp_ns"),
 ])  # fmt: skip
 def test_a_table_that_is_no_trajectory_says_what_is_missing(text: str, said: str, run: Run) -> None:
     done = run("tree", "a.csv", files={"a.csv": text})

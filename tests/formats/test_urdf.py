@@ -84,7 +84,7 @@ def test_quat_xyzw_says_a_rotation_alone_or_beside_angles_that_agree(tmp_path: P
 
 
 def test_a_quaternion_with_few_digits_is_normalised_with_a_warning(tmp_path: Path) -> None:
-    text = robot(joint(kind="fixed", parts='<origin quat_xyzw="0 0 0.7071 0.7071"/>'), links="a b")
+    text = robot(joint(kind="fixed", parts='<origin quat_xyzw="0 0 0.7068 0.7068"/>'), links="a b")
     with pytest.warns(FrametoolWarning, match=r"r\.urdf:2: a quaternion was off norm 1"):
         tree = loaded(tmp_path, text)
     assert tree.lookup("a", "b").xyzw.tolist() == [0.0, 0.0, 0.7071067811865476, 0.7071067811865476]

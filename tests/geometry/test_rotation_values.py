@@ -15,7 +15,7 @@ import pytest
 from frametool.errors import FrametoolWarning, ValueInvalid
 from frametool.geometry import arrays, euler, floats
 from frametool.geometry.conventions import AXES, axes_change
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import ROTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -220,7 +220,7 @@ def test_bad_input_is_named(call: Callable[[], Any], message: str) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("name", [*(each for each in REPRESENTATIONS if each not in ("quaternion", "euler")), "rpy_deg", "euler:rzyx", "euler_deg:sxyz"])
+@pytest.mark.parametrize("name", [*(each for each in ROTATIONS if each not in ("quaternion", "euler")), "rpy_deg", "euler:rzyx", "euler_deg:sxyz"])
 def test_a_transform_is_made_of_a_position_and_any_notation(name: str, shape: tuple[int, ...]) -> None:
     turn, xyz = batch(shape), np.random.default_rng(2).normal(size=(*shape, 3))
     form = notation(name)

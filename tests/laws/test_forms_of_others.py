@@ -130,21 +130,15 @@ COMMANDS = (
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("name", EARTH)
-def test_latitude_and_longitude_are_refused_by_their_names_and_never_position_0(name: str, command: str, run: Run) -> None:
+@pytest.mark.parametrize("name", [name for name in EARTH if name != "csv, no rotation"])
+def test_a_rotation_at_a_place_says_its_axes_and_no_position_is_0(name: str, command: str, run: Run) -> None:
     words = ["{xyz: [1, 0, 0], rpy: [0, 0, 0]}" if word == "P" else word for word in command.split()]
     done = run(*words, files={"file": EARTH[name]})
     assert (done.status, done.out) == (1, "")
-    assert "are coordinates on the Earth, which are not read; give x, y, z in metres" in done.err
-    assert "lat" in done.err
-    assert "lon" in done.err
-
-
-def test_latitude_and_longitude_are_refused_in_every_other_way(run: Run) -> None:
-    assert "on the Earth" in run("convert", "{lat: 47, lon: 8, rpy: [0, 0, 0]}").err
-    assert "on the Earth" in run("compose", "{lat: 47, lon: 8, rpy: [0, 0, 0]}", "{xyz: [1, 0, 0]}").err
-    assert "on the Earth" in run("tree", "a.csv", files={"a.csv": "t," + EARTH["csv"].replace("\n47", "\n1,47")}).err
-    assert "on the Earth" in run("convert", "-i", "b.csv", "--columns", "lat_deg,lon_deg,alt", files={"b.csv": EARTH["csv, no rotation"]}).err
+    assert "a pose at lat, lon does not say what its rotation is given in; axes: enu, ned, grid or ecef" in done.err
+    told = run(*words, "--local-axes", "enu", files={"file": EARTH[name]})
+    assert told.status == 0
+    assert told.out
 
 
 def test_beside_a_position_they_are_other_columns(run: Run) -> None:

@@ -283,11 +283,6 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         f"a message {NOT_WHOLE} 'height', 'width', 'encoding', 'is_bigendian', 'step', 'data'; see help records",
     ),
     "Range": ({"header": HEADER, "field_of_view": 0.1, "range": 2.0}, f"a message {NOT_WHOLE} 'field_of_view', 'range'; see help records"),
-    "NavSatFix": (
-        {"header": HEADER, "status": {"status": 0, "service": 1}, "latitude": 1.0, "longitude": 2.0, "altitude": 3.0,
-         "position_covariance": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], "position_covariance_type": 2},
-        f"a position on the Earth {NOT_WHOLE} 'status', 'latitude', 'longitude', 'altitude', 'position_covariance', 'position_covariance_type'; see",
-    ),
     "JointState": (
         {"header": HEADER, "name": ["a", "b", "c"], "position": [1.0, 2.0, 3.0], "velocity": [], "effort": []}, f"'name' {WHAT}",
     ),

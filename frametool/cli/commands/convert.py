@@ -91,12 +91,11 @@ def command(
     \b
       frametool convert --from rpy_deg 0 0 90
       frametool convert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}' --to matrix
-      frametool convert --all-axes unity_from_ros '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'
+      frametool convert --all-axes unity_from_ros '{rpy_deg: [0, 0, 90]}'
       frametool convert --from rpy_deg 10 20 30 --find 30,20,10 --deg
 
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
-    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping as above, what another tool printed (help pose), a file, or - for
-    standard input, which is read without any argument too.
+    its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
     values = rejoined(values)
     window = window_of(options.pop("start"), options.pop("stop"), time_column)
