@@ -205,7 +205,8 @@ def _are_poses(begin: Beginning, words: str) -> bool:
             return len(entry) == 7 and all(isinstance(each, str) for each in entry)
         keys = set(entry) if isinstance(entry, dict) else set()
         is_message = "child_frame_id" in keys and not keys.isdisjoint(("timestamp", "stamp"))  # of Foxglove
-        return any(re.fullmatch(words, key) for key in keys) and keys.isdisjoint(("header", "transform")) and not is_message
+        is_message = is_message or not keys.isdisjoint(("header", "transform"))
+        return any(re.fullmatch(words, key) for key in keys) and not is_message
 
     names = [key for key in top if isinstance(key, str) and re.fullmatch(f"{words}|{_NO_NAME}", key)]
     return bool(entries) and not names and all(map(is_pose, entries))
