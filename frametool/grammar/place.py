@@ -40,7 +40,7 @@ LLA_KEYS = frozenset((*SAME, "lat_rad", "lon_rad", *SEA_LEVEL, *GEOID))
 LOCAL_KEYS = frozenset(("east", "north", "up", "down"))
 UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
 HEADINGS = {"heading_deg": True, "heading_rad": False}
-SAID = frozenset(("datum", "epsg", "mgrs", "convergence_deg", "grid_scale"))
+SAID = frozenset(("datum", "epsg", "mgrs", LLA, "convergence_deg", "grid_scale"))
 EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}
 NO_MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
@@ -369,6 +369,8 @@ def check_datum(own: dict[str, Any]) -> None:
     if datum not in DATUMS:
         what = f"datum {shown(str(datum))} is not WGS84 (up to a metre off, and drifting)"
         raise Misfit(f"{what}; convert with cs2cs or pyproj first", ("datum",))
+    if LLA in own:
+        raise Misfit("lla does not say which number is lat; write {lat: .., lon: .., alt: ..}", (LLA,), key=True)
     if "mgrs" in own:
         raise Misfit(NO_MGRS, ("mgrs",), key=True)
     text = str(own.get("epsg", "4326")).upper().removeprefix("EPSG:")

@@ -38,7 +38,7 @@ WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "no
 
 def is_on_earth(value: dict[str, Any]) -> bool:
     """Tell whether a mapping says a position on the Earth, whole or by half."""
-    return not {*WHOLE, "mgrs"}.isdisjoint(value) and not EARTH_KEYS.isdisjoint(value)
+    return not {*WHOLE, "mgrs", LLA}.isdisjoint(value) and not EARTH_KEYS.isdisjoint(value)
 
 
 class Placed(NamedTuple):
