@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused, settings
+from frametool.cli.group import settings
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
@@ -88,8 +88,3 @@ def mapping_of(texts: Sequence[str], name: str) -> str:
         raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")
     members: Any = dict(zip(fields, texts, strict=False))
     return dump({"ecef": members} if name == "ecef" else {"utm": members} if name == "utm" else members)
-
-
-def refuse_earth(why: str) -> None:
-    """Stop where an option about places would not be used."""
-    refuse_unused(why, "origin", "local_axes", "zone")

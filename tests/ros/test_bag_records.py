@@ -1,0 +1,99 @@
+"""Messages of bags as streams of records: fixes, poses, points; what else a bag holds says what it is."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Run = Callable[..., Any]
+
+FIXES = [(48.137, 0), (48.138, 0), (float("nan"), 0), (48.1, -1), (99.0, 0)]
+FIX, POSE = "sensor_msgs/msg/NavSatFix", "geometry_msgs/msg/PoseStamped"
+TF = "tf2_msgs/msg/TFMessage"
+
+
+def messages(store: Any, *, ros1: bool) -> list[tuple[str, str, Any]]:
+    types = store.types
+
+    def header(at: int, frame: str) -> Any:
+        stamp = types["builtin_interfaces/msg/Time"](10 + at, 5)
+        return types["std_msgs/msg/Header"](at, stamp, frame) if ros1 else types["std_msgs/msg/Header"](stamp, frame)
+
+    made = []
+    for at, (lat, status) in enumerate(FIXES):
+        state = types["sensor_msgs/msg/NavSatStatus"](status, 1)
+        covariance = np.diag([1.0, 1.0, 4.0]).ravel()
+        made.append(("/fix", FIX, types[FIX](header(at, "gps"), state, lat, 11.576, 519.0, covariance, 2)))
+    point, turn = types["geometry_msgs/msg/Point"](1.0, 2.0, 3.0), types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    made.append(("/pose", POSE, types[POSE](header(0, "map"), types["geometry_msgs/msg/Pose"](point, turn))))
+    return made
+
+
+@pytest.fixture(params=["bag1", "bag2"])
+def bag(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    ros1 = request.param == "bag1"
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    path = tmp_path / ("run.bag" if ros1 else "run")
+    with Writer1(path) if ros1 else Writer2(path, version=9) as writer:
+        topics: dict[str, Any] = {}
+        for at, (topic, kind, message) in enumerate(messages(store, ros1=ros1)):
+            if topic not in topics:
+                topics[topic] = writer.add_connection(topic, kind, typestore=store)
+            data = store.serialize_ros1(message, kind) if ros1 else store.serialize_cdr(message, kind)
+            writer.write(topics[topic], (10 + at) * 10**9, data)
+    return path
+
+
+def test_fixes_of_a_bag_are_points_of_the_earth_and_what_is_no_fix_is_a_bad_row(bag: Path, run: Run) -> None:
+    done = run("convert", "-i", str(bag), "--topic", "/fix", "--to", "lla", "--on-error", "skip")
+    rows = [json.loads(line) for line in done.out.splitlines()]
+    assert [(round(row["lat"], 9), row["name"], row["stamp_ns"]) for row in rows] == [
+        (48.137, "gps", 10_000_000_005), (48.138, "gps", 11_000_000_005),
+    ]
+    assert done.status == 3
+    assert "'nan' is not finite" in done.err
+    assert "status -1: there was no fix" in done.err
+    assert "lat 99.0 is beyond 90 degrees" in done.err
+
+
+def test_a_fix_is_moved_with_its_covariance(bag: Path, run: Run) -> None:
+    site = "frames: [{name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}]"
+    done = run("apply", "site.yaml", "map", "-i", str(bag), "--topic", "/fix", "--on-error", "skip", files={"site.yaml": site})
+    first = json.loads(done.out.splitlines()[0])
+    assert first["point"] == pytest.approx([5656.952384, 4117.254609, -4.834100], abs=1e-6)
+    assert np.trace(np.reshape(first["covariance"], (3, 3))) == pytest.approx(6.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("call", [("convert", "BAG"), ("convert", "-i", "BAG"), ("mean", "BAG"), ("invert", "BAG")])
+def test_poses_of_a_bag_are_records_wherever_rows_are_read(bag: Path, call: tuple[str, ...], run: Run) -> None:
+    done = run(*(str(bag) if each == "BAG" else each for each in call), "--topic", "/pose", "-f", "csv")
+    assert done.status == 0, done.err
+    names, cells = (line.split(",") for line in done.out.splitlines())
+    row = dict(zip(names, cells, strict=False))
+    size = -1.0 if call[0] == "invert" else 1.0
+    assert [float(row[name]) for name in "xyz"] == [size, 2.0 * size, 3.0 * size]
+
+
+def test_of_several_topics_one_is_named(bag: Path, run: Run) -> None:
+    done = run("convert", "-i", str(bag))
+    assert (done.status, done.out) == (2, "")
+    assert done.err.count("\n") == 1
+    assert "several topics hold records; give --topic /fix|/pose" in done.err
+
+
+def test_a_topic_without_records_says_which_there_are(bag: Path, run: Run) -> None:
+    done = run("convert", "-i", str(bag), "--topic", "/scan")
+    assert (done.status, done.out) == (1, "")
+    assert f"no points, poses or fixes on /scan; topics: /fix ({FIX}), /pose ({POSE})" in done.err
