@@ -100,6 +100,18 @@ class Place(NamedTuple):
             made.append(cls(name, fields, axes, earth_.zone, origin))
         return made[0]._replace(more=tuple(made[1:]))
 
+    @classmethod
+    def of_xyz(cls, name: str, said: Earth) -> Place | None:
+        """Return what x, y, z are in ecef, or in the local axes of the origin; None of a name that has none.
+
+        Raises ValueInvalid for local axes without an origin.
+        """
+        if name not in (ECEF, *LOCAL):
+            return None
+        if name in LOCAL and said.origin is None:
+            raise ValueInvalid(f"--from {name} needs --origin: {{lat: .., lon: ..}}")
+        return cls(name, REPRESENTATIONS[name].names, name, None, said.origin if name in LOCAL else None)
+
     @property
     def size(self) -> int:
         """Count its numbers."""

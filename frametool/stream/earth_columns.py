@@ -214,8 +214,8 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
         return None
     try:
         found = find(names, earth, given)
-        if found is None and given == ECEF and (positions := find_positions(header)):
-            found = PoseColumns(positions[0]._replace(unit=Place(ECEF, REPRESENTATIONS[ECEF].names, ECEF)), None)
+        if found is None and (place := Place.of_xyz(given, earth)) and (positions := find_positions(header)):
+            found = PoseColumns(positions[0]._replace(unit=place), None)
         if found is None and not given and (half := _half(names)):
             raise ValueInvalid(half)  # noqa: TRY301 - so that it gets its place as others do
     except ValueInvalid as error:

@@ -462,7 +462,23 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
         record = record._replace(others=tuple(rotations[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
-    return record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
+    record = record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
+    return _given_on_earth(record, request) if request.given_place else record
+
+
+def _given_on_earth(record: Record, request: Request) -> Record:
+    """Return a record whose x, y, z are in ecef or the axes of an origin, as --from says."""
+    from frametool.geometry.place import Earth, Place
+
+    place = Place.of_xyz(request.given_place, request.earth or Earth())
+    shape = record.shape
+    if place is None or shape.whole or shape.unit is None:
+        return record
+    if shape.unit != 1.0:
+        raise Misfit(f"--from {request.given_place} takes metres")
+    is_point = shape.notation is None and not request.kind and request.operation.keeps_frames
+    shape = shape._replace(unit=place, kind=POINT if is_point else shape.kind)
+    return record._replace(shape=shape, parent=Name(EARTH_FRAMES[0]))
 
 
 def _beside_place(rest: dict[str, Any], path: Path, reading: Reading, request: Request) -> tuple[Pose, list[str]]:
