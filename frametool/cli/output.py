@@ -15,7 +15,7 @@ from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, listing, printable, shown, warn
+from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
 from frametool.geometry.representations import notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
@@ -284,7 +284,7 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
     """Return the one frame of a tree that has a parent; raise ValueInvalid for several."""
     children = [track.child for track in tree.tracks()]
     if len(children) != 1:
-        frames = ", ".join(map(shown, children[:8])) or "none"
+        frames = first_of(children, 8, quote=shown) or "none"
         instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
         raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
     return children[0]
