@@ -53,6 +53,15 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
 
 
+def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Return the patterns of what is wrong in a report, each with a group called by its colour."""
+    odd = [entry for entry in entries if entry["jumps"] or entry["backward"]]
+    names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in odd)
+    rows = (rf"(?m)^(?P<red>{parent} +{child} .*)$" for parent, child in names)
+    said = r"(?P<red>\b(?:jumps|back) [1-9]\d*)", r"(?m)(?P<yellow>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
+    return *rows, *said
+
+
 def _folded_edge(row: dict[str, str], titles: Sequence[str]) -> list[str]:
     """Return the lines of one edge where a table would be too wide: its frames, then what is said of it."""
     parent, child = (short(row[key], WIDTH // 2 - 4) for key in ("parent", "child"))
