@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SHOWN = 60  # characters of the input that a message quotes at most
 LONGEST_NAME = 200  # characters of a name that is compared with others
 MOST_COMPARED = 500  # names
+NEAREST = 5  # names that come first in a list that is cut
 USUAL_NAME = 20  # characters
 
 
@@ -290,7 +291,7 @@ def listing(names: Iterable[str], most: int = 20, *, near: str = "") -> str:
     from heapq import nsmallest
 
     everything = list(names)
-    first = _closest(near, everything, most, 0.4) if near and len(everything) > most + 1 else []
+    first = _closest(near, everything, min(most, NEAREST), 0.5) if near and len(everything) > most + 1 else []
     rest = nsmallest(most + 1, (each for each in everything if each not in first) if first else everything)
     return first_of([*first, *rest], most, quote=bare, count=len(everything))
 
