@@ -46,7 +46,7 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
     pads = [str.ljust if key in LEFT else str.rjust for key in shown]
     aligned = ([pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows)
     lines = ["  ".join(row).rstrip() for row in aligned]
-    if max(map(cells, lines)) > get_terminal_size((WIDTH, 0)).columns:
+    if max(map(cells, lines)) > max(WIDTH, get_terminal_size((WIDTH, 0)).columns):
         lines = [line for row in rows[1:] for line in _folded_edge(dict(zip(shown, row, strict=True)), rows[0])]
     table = "".join(f"{line}\n" for line in lines)
     table += "".join(map(_motion, (entry for entry in edges if entry["length_m"])))
