@@ -21,7 +21,7 @@ from contextlib import contextmanager
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from typing import TypeVar
 
     Result = TypeVar("Result")
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SHOWN = 60  # characters of the input that a message quotes at most
 LONGEST_NAME = 200  # characters of a name that is compared with others
 MOST_COMPARED = 500  # names
+NEAREST = 5  # names that come first in a list that is cut
 USUAL_NAME = 20  # characters
 
 
@@ -143,7 +144,7 @@ class UnknownFrame(LookupFailed):
         place = f" in {where}" if where else ""
         near = did_you_mean(name, self.known)
         self.short = f"unknown frame {shown(name)}{place}{near}"
-        message = f"{self.short}{'' if near else ';'} frames: {listing(self.known)}"
+        message = f"{self.short}{'' if near else ';'} frames: {listing(self.known, near=name)}"
         super().__init__(message, frame=name, known=nsmallest(20, self.known))
 
 
@@ -217,10 +218,15 @@ def overheard(
 
 def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
     """Return `; did you mean 'x'?` for the nearest known name, or nothing."""
+    near = _closest(name, list(known), 1, cutoff)
+    return f"; did you mean {shown(near[0])}?" if near else ""
+
+
+def _closest(name: str, known: list[str], count: int, cutoff: float) -> list[str]:
+    """Return the names most like one, the best first."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name[:LONGEST_NAME], _likely(name[:LONGEST_NAME], list(known)), n=1, cutoff=cutoff)
-    return f"; did you mean {shown(near[0])}?" if near else ""
+    return get_close_matches(name[:LONGEST_NAME], _likely(name[:LONGEST_NAME], known), n=count, cutoff=cutoff)
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
@@ -277,17 +283,30 @@ def _sharing_most(names: list[str], name: str, least: int, *, ends: bool) -> lis
 def alternatives(name: str, known: Iterable[str], label: str) -> str:
     """Return `; did you mean 'x'? frames: a, b`, or only what there is."""
     names = list(known)
-    return f"{did_you_mean(name, names) or ';'} {label}: {listing(names)}"
+    return f"{did_you_mean(name, names) or ';'} {label}: {listing(names, near=name)}"
 
 
-def listing(names: Iterable[str], most: int = 20) -> str:
-    """Return the names sorted and joined by commas, cut after `most` of them."""
+def listing(names: Iterable[str], most: int = 20, *, near: str = "") -> str:
+    """Return the names sorted and joined by commas, cut after `most`; then those nearest to a name come first."""
     from heapq import nsmallest
 
     everything = list(names)
-    most += len(everything) == most + 1  # the last one takes no more room than a word on it
-    more = f" and {len(everything) - most} more" if len(everything) > most else ""
-    return ", ".join(bare(name) for name in nsmallest(most, everything)) + more
+    first = _closest(near, everything, min(most, NEAREST), 0.5) if near and len(everything) > most + 1 else []
+    rest = nsmallest(most + 1, (each for each in everything if each not in first) if first else everything)
+    return first_of([*first, *rest], most, quote=bare, count=len(everything))
+
+
+def first_of(
+    names: Sequence[str], most: int, *, quote: Callable[[str], str] = str, gap: str = ", ", count: int | None = None
+) -> str:
+    """Return the first names and how many more there are: the one way in which a list is cut.
+
+    A last one is named: it takes no more room than a word on it.
+    count: how many names there are, where these are not all
+    """
+    count = len(names) if count is None else count
+    most += count == most + 1
+    return gap.join(map(quote, names[:most])) + f" and {count - most} more" * (count > most)
 
 
 def bare(name: str) -> str:

@@ -167,7 +167,7 @@ def _term(name: str, value: Any) -> Term:
         found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
     else:
         found = _of_numbers(name, value)
-    return found._replace(text=name, atomic=True)
+    return found._replace(text=name, atomic=True, inverse_of=None)
 
 
 def _of_numbers(name: str, value: Any) -> Term:

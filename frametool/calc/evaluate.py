@@ -160,8 +160,8 @@ def evaluate_line(line: Line, scope: Scope) -> Term:
     except FrametoolError as error:
         raise pointed(error, line.text) from None
     if line.name:
-        scope.names[line.name] = term._replace(text=line.name, atomic=True)
-    scope.names["ans"] = term._replace(text="ans", atomic=True)
+        scope.names[line.name] = term._replace(text=line.name, atomic=True, inverse_of=None)
+    scope.names["ans"] = term._replace(text="ans", atomic=True, inverse_of=None)
     return term
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import operator
 from contextlib import suppress
 from functools import partial
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from frametool.calc.parser import METRE, PLAIN, RADIAN, CalcError, frame_text
@@ -46,17 +45,22 @@ PLACED = (POINT, VECTOR)
 
 
 def inverse_text(term: Term) -> str:
-    """Write the inverse of a term: that of an inverse is what stands in it."""
-    inner = term.text[4:-1]
-    depths = list(accumulate((each == "(") - (each == ")") for each in inner))
-    is_inverse = term.text.startswith("inv(") and term.text.endswith(")") and min(depths, default=0) >= 0
-    return inner if is_inverse and inner else f"inv({term.text})"
+    """Write the inverse of a term: that of an inverse is what was inverted."""
+    term = _simplest(term)
+    return f"inv({term.text})" if term.inverse_of is None else term.inverse_of.bracketed
+
+
+def _simplest(term: Term) -> Term:
+    """Return what was inverted twice."""
+    while term.inverse_of is not None and term.inverse_of.inverse_of is not None:
+        term = term.inverse_of.inverse_of
+    return term
 
 
 def _forms(term: Term) -> tuple[tuple[str, str | None, str | None], ...]:
     """Return a pose and its inverse: text, target, source."""
     target, source = term.type.target, term.type.source
-    return (term.bracketed, target, source), (f"{inverse_text(term)}", source, target)
+    return (_simplest(term).bracketed, target, source), (inverse_text(term), source, target)
 
 
 def rewritten_products(left: Term, right: Term) -> Iterator[str]:
@@ -93,7 +97,7 @@ def for_same_frames(left: Term, right: Term) -> str:
         return f"; {inverse_text(right)} is {frame_text(b.source)}<-{frame_text(b.target)}"
     if a.target is not None and a.target == b.target and a.source != b.source:
         seen = f"{frame_text(b.source)} seen from {frame_text(a.source)}"
-        return f"; for {seen}: {inverse_text(left)} * {right.bracketed}"
+        return f"; for {seen}: {inverse_text(left)} * {_simplest(right).bracketed}"
     return ""
 
 
@@ -281,7 +285,7 @@ def over(left: Term, right: Term, _: Trees) -> Term:
     """Divide by a number."""
     a, b = left.type, right.type
     if b.kind != NUMBER:
-        hint = f"; for poses: {inverse_text(right)} * {left.bracketed}" if a.kind == b.kind == POSE else ""
+        hint = f"; for poses: {inverse_text(right)} * {_simplest(left).bracketed}" if a.kind == b.kind == POSE else ""
         raise CalcError(f"cannot divide by {b.named}{hint}")
     if a.kind == NUMBER:
         type_ = Type(NUMBER, unit=_added(a.unit, raised(b.unit, -1.0)))
@@ -360,7 +364,8 @@ def unsigned(term: Term) -> Term:
 
 def inverse(term: Term) -> Term:
     """Return b<-a of a<-b."""
-    return arithmetic(Type(POSE, term.type.source, term.type.target), rigid.inverse, term)
+    found = arithmetic(Type(POSE, term.type.source, term.type.target), rigid.inverse, term)
+    return found._replace(inverse_of=term)
 
 
 def power(base: Term, exponent: Term) -> Term:
@@ -423,7 +428,7 @@ def as_frames(term: Term, target: str | None, source: str | None) -> Term:
         raise CalcError(f"only a pose has two frames; found {type_.named}")
     if not (meet(type_.target, target) and meet(type_.source, source)):
         raise CalcError(f"this is {type_} already")
-    return term._replace(type=type_._replace(target=target, source=source))
+    return term._replace(type=type_._replace(target=target, source=source), inverse_of=None)
 
 
 def in_frame(term: Term, frame: str) -> Term:

@@ -80,6 +80,7 @@ class Term(NamedTuple):
 
     parts: None where they depend on a row; items: those of a list; tree: what can be asked for look-ups
     text: as it was written, for suggestions; atomic: it needs no brackets
+    inverse_of: what was inverted, where that is all
     """
 
     type: Type
@@ -89,6 +90,7 @@ class Term(NamedTuple):
     tree: Frames | None = None
     text: str = ""
     atomic: bool = True
+    inverse_of: Term | None = None
 
     def at(self, row: RowValues | None) -> Components:
         """Return the numbers, of a row where they depend on it."""

@@ -5,6 +5,8 @@ Pictures on their way out: in which form, by the suffix of a file.
 
 from __future__ import annotations
 
+import os
+import re
 import sys
 from importlib import import_module
 from itertools import islice
@@ -17,7 +19,7 @@ from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, listing, printable, shown, warn
+from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
 from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
@@ -59,6 +61,7 @@ class Output:
         """
         self.path = output
         self.force = force
+        self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
         self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
         place = None
         if any(each.representation.is_place for each in notations or ()):
@@ -100,6 +103,12 @@ class Output:
         """Keep the axes of a frame of a tree: where none is known to be a camera, --camera-axes is about this one."""
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
+
+    def mark_frames(self, target: str, source: str) -> None:
+        """Give target and source a colour each, in what says which is seen from which."""
+        target, source = re.escape(printable(target)), re.escape(printable(source))
+        seen = rf"(?m)^(?P<green>{source})(?: at \S+)? seen from (?P<cyan>{target})(?= |$)"
+        self.marks = seen, rf"\(maps points in (?P<green>{source}) to points in (?P<cyan>{target})\)"
 
     def _refuse_place(self) -> None:
         """Stop where a form has no place for latitude and longitude."""
@@ -241,8 +250,9 @@ class Output:
         if self.style.form != "text":
             self.text(self._module("").write_points(entries, self.style))
             return
-        from frametool.view.report_text import write_report
+        from frametool.view.report_text import trouble, write_report
 
+        self.marks = trouble(entries)
         self.text(write_report(entries, self.style))
 
     @property
@@ -258,7 +268,9 @@ class Output:
         with writing(self.path, force=self.force) as write:
             for piece in pieces:
                 for_people = is_plain and isinstance(piece, str)
-                write("\n".join(map(printable, str(piece).split("\n"))) if for_people else piece)
+                text = "\n".join(map(printable, str(piece).split("\n"))) if for_people else piece
+                marked = self.marks and for_people and self.path is None and sys.stdout.isatty()
+                write(in_colour(str(text), self.marks) if marked else text)
         self._tell_of_suffix()
 
     def _tell_of_suffix(self) -> None:
@@ -271,6 +283,15 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
+
+
+def in_colour(text: str, marks: Sequence[str]) -> str:
+    """Return text for the terminal: named groups of patterns in the colour of their name, unless NO_COLOR is set."""
+    if os.environ.get("NO_COLOR"):
+        return text
+    from frametool.view.tree_text import coloured
+
+    return coloured(text, marks)
 
 
 def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:
@@ -292,7 +313,7 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
     """Return the one frame of a tree that has a parent; raise ValueInvalid for several."""
     children = [track.child for track in tree.tracks()]
     if len(children) != 1:
-        frames = ", ".join(map(shown, children[:8])) or "none"
+        frames = first_of(children, 8, quote=shown) or "none"
         instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
         raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
     return children[0]

@@ -8,7 +8,7 @@ import click
 
 from frametool.cli.group import settings
 from frametool.cli.stderr import say, say_error
-from frametool.errors import ValueInvalid, alternatives, shown, warn
+from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.stream.faults import STOP
 
@@ -94,9 +94,9 @@ def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], list[Any]])
     frames = [_solved_frame(found, name, fixed) for name in sorted(found.frames, key=lambda name: name != found.root)]
     unknown = [each.name for each in frames if each.parent and each.name not in found.fixed and not each.covariance]
     if unknown:
-        warn(f"no covariance of {_some(unknown)}: neither loops nor sigmas say how sure that is")
+        warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
     if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
-        tell_taken(f"in no loop, so that nothing checks them: {_some(alone)}")
+        tell_taken(f"in no loop, so that nothing checks them: {first_of(alone, 5)}")
     rows = [
         _row(m.place, at, m.id, m.parent, m.child, found.residuals[at], float(found.u[at]),
              used=bool(found.used[at]), checked=bool(found.checked[at]), fits=found.fits[at])
@@ -117,11 +117,6 @@ def _solved_frame(found: TreeSolution, name: str, fixed: dict[tuple[str, str], l
         covariance = _listed(found.marginal(name))
     seen = found.rows[name], found.frame_checked[name], is_fixed
     return SolvedFrame(name, parent, _numbers(pose), covariance, *seen)
-
-
-def _some(names: Sequence[str], most: int = 5) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
 
 
 def _listed(covariance: Array | None) -> Components | None:

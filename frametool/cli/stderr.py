@@ -54,8 +54,25 @@ def tell(text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write one line about the work, under the program's name."""
-    tell(printable(f"frametool: {_place()}{text}"))
+    """Write one line about the work, under the program's name; several where a terminal ends."""
+    _tell_folded(f"frametool: {_place()}{text}")
+
+
+def _tell_folded(text: str) -> None:
+    text = printable(text)
+    tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
+
+
+def folded(line: str) -> str:
+    """Break a line between words where the terminal ends; what follows stands further in."""
+    from shutil import get_terminal_size
+
+    width = get_terminal_size().columns
+    if len(line) <= width:
+        return line
+    from textwrap import fill
+
+    return fill(line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
 def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
@@ -68,7 +85,10 @@ def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = Fra
 
         if settings().quiet:
             return
-    tell(printable(message if kind is Tf2Warning else f"frametool: {_place()}warning: {message}"))
+    if kind is Tf2Warning:
+        tell(printable(message))
+    else:
+        _tell_folded(f"frametool: {_place()}warning: {message}")
 
 
 def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
@@ -80,7 +100,7 @@ def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
         tell(as_json(error, _lines[-1] if _lines else None, fate))
         return
     first, *rest = str(error).split("\n") if error.many_lines else [str(error)]
-    say(f"{first} ({fate})" if fate else first)
+    tell(printable(f"frametool: {_place()}{f'{first} ({fate})' if fate else first}"))
     for line in rest:
         tell(printable(line))
     if snippet := getattr(error, "snippet", ""):

@@ -101,6 +101,6 @@ def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
 
 
 def _grouped(groups: dict[int, list[str]], most: int) -> str:
-    parts = [listing(names, most) for names in list(groups.values())[:most]]
+    parts = [listing(names, most) for names in list(groups.values())[: most + (len(groups) == most + 1)]]
     more = len(groups) - len(parts)
     return " | ".join(parts) + (f" | {more} more groups" if more else "")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, printable
+from frametool.errors import ValueInvalid, first_of, printable
 from frametool.fit.graph import bridges
 from frametool.fit.measurements import best_blunder
 from frametool.fit.robust import KEPT
@@ -137,8 +137,7 @@ class _Case:
         if self.measurements[row].place:
             advice += f" (--without {place_of(self.measurements, row)})"
         for most in range(len(places), 0, -1):
-            more = f" and {len(places) - most} more" if most < len(places) else ""
-            text = f"undecided: {', '.join(places[:most])}{more} form a loop open by {open_by}; {advice}"
+            text = f"undecided: {first_of(places, most)} form a loop open by {open_by}; {advice}"
             if len(text) <= ONE_LINE:
                 break
         return text

@@ -33,7 +33,7 @@ from contextlib import suppress
 from functools import cached_property
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
-from frametool.errors import FormatError, bare
+from frametool.errors import FormatError, bare, first_of
 from frametool.formats.table import BAG, FORMATS, by_suffix, readers, unread
 
 TYPE_CHECKING = False
@@ -385,8 +385,7 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     if begin.xml:
         likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].signs))
         what = f"XML with the root element {bare(''.join(begin.elements[:1]))}"
-    more = f" and {len(likely) - _MOST_NAMED} more" if len(likely) > _MOST_NAMED else ""
-    named = f"{', '.join(likely[:_MOST_NAMED])}{more}"
+    named = first_of(likely, _MOST_NAMED)
     return FormatError(
         f"cannot tell the form of {what}; forms: {named}; `frametool formats` lists all, --in FORM names one",
         source=name or "stdin",

@@ -456,6 +456,7 @@ class Assembly:
         for each in self._replaced:
             if each.child in standing:
                 raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
+        most += len(self._replaced) == most + 1
         for each in self._replaced[:most]:
             places = f"{each.earlier.seen_from(each.later)} and {each.later.seen_from(each.later)}"
             what = f"frame {shown(each.child)} has two poses at {format_stamp(each.stamp_ns)}: {places}"

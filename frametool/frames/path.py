@@ -99,7 +99,7 @@ def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> R
 
 def cycle_message(frames: list[str]) -> str:
     """Draw a cycle, parents to the left: `a <- b <- a`; of a long one both ends."""
-    if len(frames) > MOST_SHOWN:
+    if len(frames) > MOST_SHOWN + 1:
         left_out = f"({len(frames) - MOST_SHOWN} more)"
         frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
     return f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}"

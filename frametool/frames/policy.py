@@ -185,7 +185,7 @@ def seconds(duration_ns: int) -> str:
 def _way(target: str, source: str, path: Sequence[Track]) -> str:
     """Write the way with arrows from source to target, cut in the middle when it is long."""
     frames = list(map(bare, frames_on(target, source, path)))
-    if len(frames) > 12:
+    if len(frames) > 13:
         frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
     return f"on the path {' <- '.join(frames)}"
 

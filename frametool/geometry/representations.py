@@ -448,9 +448,8 @@ def notation(spec: str) -> Notation:
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
     if row is None:
-        raise ValueInvalid(
-            f"unknown representation {shown(bare)}{_near_names(bare)} representations: {listing(REPRESENTATIONS)}"
-        )
+        known = f"{_near_names(bare)} representations: {listing(REPRESENTATIONS, near=bare)}"
+        raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
     if colon and row.axes != NAMED_AXES:

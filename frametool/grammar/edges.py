@@ -6,7 +6,7 @@ from itertools import repeat
 from types import MappingProxyType
 from typing import NamedTuple
 
-from frametool.errors import shown
+from frametool.errors import listing, shown
 from frametool.grammar.readers import is_slashed, slash_note
 
 TYPE_CHECKING = False
@@ -227,7 +227,7 @@ class Topics:
         known = {*self.counts, *self.seen} - {""}
         if not self.chosen or not known or any(map(self.chooses, self.counts)):
             return ""
-        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {', '.join(sorted(known))}"
+        return f"no transforms on {', '.join(sorted(self.chosen))}; topics: {listing(known, near=min(self.chosen))}"
 
 
 def _source_of(topic: str) -> str:

@@ -236,8 +236,9 @@ def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
         if named and len("; ".join([*named, text])) > MOST_CHARACTERS:
             break
         named.append(text)
-    more = [f"and {count - len(named)} more"] if count > len(named) else []
-    return "; ".join([*named, *more])
+    left = count - len(named)
+    last = [f"and {shown(hints[-1][0]) if left == 1 else f'{left} more'}"] if left else []
+    return "; ".join([*named, *last])
 
 
 def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
@@ -245,6 +246,6 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
     if unknown:
-        named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[:MOST_NAMED]], len(unknown))
+        named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
         choices = ", ".join(ROTATIONS)
         raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

@@ -113,7 +113,7 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     for note in notes:
         firsts.setdefault(alike(note), note)
     counts = Counter(map(alike, notes))
-    told = list(firsts.values())[:most]
+    told = list(firsts.values())[: most + (len(firsts) == most + 1)]
     places = locate_many(source.text, [note.path for note in told])
     for (line, column), note in zip(places, told, strict=True):
         place = ":".join(map(str, (source.name, *(() if isinstance(source, Pasted) else source.place(line, column)))))

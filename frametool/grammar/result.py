@@ -82,10 +82,10 @@ class Style:
         return style
 
     def number(self, value: float) -> str:
-        """Write a finite number: shortest text that reads back to the same bits, or fixed decimals."""
+        """Write a finite number: shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        return repr(value) if self.precision is None else f"{value:.{self.precision}f}"
+        return repr(value + 0.0) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
         """Tell whether a notation's angles are written in degrees: its own suffix wins."""

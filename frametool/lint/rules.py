@@ -7,7 +7,7 @@ from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import BadTopology, FormatError, Unanswered, shown
+from frametool.errors import BadTopology, FormatError, Unanswered, first_of, shown
 from frametool.formats.load import refuse_unknown_joints
 from frametool.formats.trees.tree_reader import read_edges, without_slashes
 from frametool.frames.edge_log import EdgeLog
@@ -336,8 +336,7 @@ def _roots(children: dict[str, Child]) -> Iterator[Finding]:
     }
     if len(roots) > 1:
         names = sorted(roots)
-        shown = ", ".join(map(repr, names[:10]))
-        yield roots[names[1]].finding("several-roots", f"{len(roots)} roots: {shown}{' ..' if len(names) > 10 else ''}")
+        yield roots[names[1]].finding("several-roots", f"{len(roots)} roots: {first_of(names, 10, quote=repr)}")
 
 
 def _at(seen: Statement) -> str:

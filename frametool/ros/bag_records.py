@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
-from frametool.errors import FormatError, Unanswered, listing
+from frametool.errors import FormatError, Unanswered, first_of, listing
 from frametool.ros.bags import TYPES, opened_bag
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -43,7 +43,8 @@ def record_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
     if wanted:
         return [topic for topic in there if topic.strip("/") in wanted]
     if len(there) > 1:
-        raise Unanswered(f"several topics hold records; give --topic {'|'.join(sorted(there)[:8])}", source=path)
+        named = first_of(sorted(there), 8, gap="|")
+        raise Unanswered(f"several topics hold records; give --topic {named}", source=path)
     return list(there)
 
 
@@ -61,7 +62,8 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
         clouds = [each.topic.strip("/") for each in reader.connections if each.msgtype == CLOUD]
         if any(not wanted or topic in wanted for topic in clouds):
             return None
-        known = listing(sorted({f"{each.topic} ({each.msgtype})" for each in reader.connections})) or "none"
+        held = {f"{each.topic} ({each.msgtype})" for each in reader.connections}
+        known = listing(held, near=next(iter(chosen), "")) or "none"
         has_frames = any(each.msgtype in TYPES for each in reader.connections)
     named = f" on {listing(chosen)}" if chosen else ""
     remedy = f"; its frames: frametool lookup {path} TARGET SOURCE" if has_frames else ""

@@ -20,7 +20,7 @@ from frametool.documents.chunks import Piece, counted_from, documents, lines
 from frametool.documents.document import parse_documents
 from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text
-from frametool.errors import FormatError, shown
+from frametool.errors import FormatError, first_of, shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Misfit, Reading, as_mapping
@@ -360,7 +360,7 @@ def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict
         topic = str(mapping.get("topic") or f"op {mapping['op']}")
         tally.others[topic] = tally.others.get(topic, 0) + 1
     else:
-        keys = ", ".join(map(shown, list(mapping)[:8]))
+        keys = first_of(list(mapping), 8, quote=shown)
         raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
 
 

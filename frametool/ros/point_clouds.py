@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, Unanswered, ValueInvalid, listing, shown
+from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
 from frametool.ros.messages import STAMPS, stamp_problem
 
@@ -56,9 +56,10 @@ def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
         known = listing({each.topic for each in reader.connections}) or "none"
         raise FormatError(f"no clouds (PointCloud2) in the bag; its topics: {known}", source=path)
     if wanted:
-        raise FormatError(f"no clouds on {listing(chosen)}; topics with clouds: {listing(there)}", source=path)
+        known = listing(there, near=next(iter(chosen)))
+        raise FormatError(f"no clouds on {listing(chosen)}; topics with clouds: {known}", source=path)
     if len(there) > 1:
-        raise Unanswered(f"several topics hold clouds; give --topic {'|'.join(there)}", source=path)
+        raise Unanswered(f"several topics hold clouds; give --topic {first_of(there, 8, gap='|')}", source=path)
     return there
 
 

@@ -333,7 +333,7 @@ class World:
         Raises ServiceRefused when there is none: its services went with it.
         """
         if name not in self._turtles:
-            raise ServiceRefused(f"no turtle [{name}] to call; turtles: {listing(self._turtles) or 'none'}")
+            raise ServiceRefused(f"no turtle [{name}] to call; turtles: {listing(self._turtles, near=name) or 'none'}")
         return self._turtles[name]
 
     def call(self, service: str, **arguments: float | str) -> str:

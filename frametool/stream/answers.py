@@ -193,7 +193,7 @@ def written(each: Answer) -> list[float]:
 def number_writer(precision: int | None, *, yaml: bool) -> Callable[[float], str]:
     """Return what writes a number as the bulk of a stream does."""
     if precision is not None:
-        return lambda value: f"{value:.{precision}f}"
+        return lambda value: f"{value:z.{precision}f}"
     if not yaml:
         return repr
 

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, shown
+from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, listing, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.stream.faults import Misused
@@ -577,4 +577,4 @@ def places_named(word: str, numbers: dict[str, int], width: int) -> list[int]:
             return list(range(low - 1, high))
         raise Misused(f"--columns: {word} is not within 1-{width}")
     near = did_you_mean(word, numbers)
-    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {listed(list(numbers) or [f'1-{width}'])}")
+    raise Misused(f"--columns: no column {shown(word)}{near}; columns: {listing(numbers, near=word) or f'1-{width}'}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
-from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
+from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, first_of, listing, shown, warn
 from frametool.formats.robots.model import TURNING, JointValue
 from frametool.formats.robots.posture import find_joint_columns
 from frametool.formats.table import FORMATS
@@ -122,7 +122,7 @@ def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequenc
     """Say which joints have no column; one of the others may be meant."""
     near = did_you_mean(missing[0], others)
     plural = "s" * (len(missing) > 1)
-    columns = f"{', '.join(map(bare, names[:12]))}{', ..' * (len(names) > 12)}"
+    columns = first_of(names, 12, quote=bare)
     example = f"give --joint {missing[0]}=VALUE" if not near else "or give it by --joint"
     return f"no column for joint{plural} {listing(missing)}{near or ';'} {example}; columns: {columns}"
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
+from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, first_of, shown
 from frametool.geometry.representations import ROTATIONS, notation
 from frametool.grammar.names import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, may_be_on_earth, may_be_uncertain
 from frametool.grammar.pose import (
@@ -162,7 +162,7 @@ def _nothing_in(document: Any) -> Misfit:
     if near:
         return _unknown(near)
     wanted_here = "a point like {point: [x, y, z]} or a pose like {xyz: [..], rpy_deg: [..]}"
-    return Misfit(f"expected {wanted_here}, found the keys {_named_keys(list(document))}")
+    return Misfit(f"expected {wanted_here}, found the keys {first_of(list(document), MOST_KEYS, quote=shown)}")
 
 
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
@@ -220,20 +220,15 @@ def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
     if is_message and not found:
-        fields = _named_keys([key for key in value if key != "header"])
+        fields = first_of([key for key in value if key != "header"], MOST_KEYS, quote=shown)
         raise Misfit(f"a message that cannot be moved whole: its fields are {fields}; see help records", path)
     used = {"header", *stays}.union(*((*each.path[len(path) :][:1], each.field, *each.covariances) for each in found))
     if any(each.path == path and not each.field for each in found):
         used |= USED
     rest = [key for key, each in value.items() if key not in used and _is_geometry(key, each, doubtful=is_message)]
     if found and rest:
-        given = f"{_named_keys(rest, 2)} may be given in a frame that changes, and would stay"
+        given = f"{first_of(rest, 2, quote=shown)} may be given in a frame that changes, and would stay"
         raise Misfit(f"{given}; leave out what does not move, see help records", (*path, rest[0]), key=True)
-
-
-def _named_keys(keys: Sequence[str], most: int = MOST_KEYS) -> str:
-    """Name the first keys and count the others."""
-    return ", ".join(map(shown, keys[:most])) + f" and {len(keys) - most} more" * (len(keys) > most)
 
 
 def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:

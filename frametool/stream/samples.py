@@ -14,7 +14,7 @@ import numpy as np
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile
-from frametool.errors import FormatError, ValueInvalid, bare, shown
+from frametool.errors import FormatError, ValueInvalid, bare, first_of, shown
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import shown_keys
@@ -320,12 +320,13 @@ def matched(a: Points, b: Points) -> Matched:
         rows = [at for at, name in enumerate(a.ids) if name in of_b]
         others = [of_b[a.ids[at]] for at in rows]
         if not rows:
-            raise ValueInvalid(f"{a.file} and {b.file} have no id in common: {_some(a.ids)} | {_some(b.ids)}")
+            named = " | ".join(first_of(ids, MOST_NAMED, quote=bare) for ids in (a.ids, b.ids))
+            raise ValueInvalid(f"{a.file} and {b.file} have no id in common: {named}")
         for one, other in ((a, b), (b, a)):
             known = {*(other.ids or ())}
             if alone := [name for name in one.ids or () if name not in known]:
                 count = f"{len(alone)} of {len(one.xyz)} points have no partner in {other.file}"
-                told.append(f"{one.file}: {count}: {_some(alone)}")
+                told.append(f"{one.file}: {count}: {first_of(alone, MOST_NAMED, quote=bare)}")
     elif len(a.xyz) != len(b.xyz):
         raise ValueInvalid(f"{a.file} has {len(a.xyz)} points, {b.file} {len(b.xyz)}, and no ids to match them")
     else:
@@ -337,11 +338,6 @@ def matched(a: Points, b: Points) -> Matched:
     return Matched(
         a.xyz[rows], b.xyz[others], weights, [a.places[at] for at in rows], ids and [ids[at] for at in rows], told
     )
-
-
-def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(map(bare, names[:MOST_NAMED])) + more
 
 
 def _weights(a: Points, b: Points, rows: Sequence[int], others: Sequence[int]) -> list[float] | None:

@@ -64,11 +64,9 @@ def _check(rows: TablePoses, form: Poses, file: InputFile, options: Options) -> 
         message = f"no rotation among the columns {rows.columns}: points are no frames"
         raise FormatError(message, source=file.name, line=1)
     if rows.stamp_at is None and not form.counted and not options.answers.stamps and len(rows.roles) < 2:
-        raise FormatError(
-            f"no column of stamps among {rows.columns}; call it stamp or stamp_ns, or give --stamps FILE",
-            source=file.name,
-            line=1,
-        )
+        lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
+        wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
+        raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)
 
 
 def _times(block: RowPoses, stamps: StampFile | None, form: Poses, before: int) -> list[int] | None:

@@ -1,6 +1,6 @@
 """Floats to text in bulk: the shortest that reads back the same, or a fixed number of decimals.
 
-Byte for byte as `repr` and `'%.{precision}f'` write them; floats of 32 bits as the shortest that reads back to these.
+Byte for byte as `repr` and `{:z.{precision}f}` write them; floats of 32 bits as the shortest that reads back to these.
 """
 
 from __future__ import annotations
@@ -184,8 +184,9 @@ def _fixed_spans(flat: Floats, precision: int) -> Spans:
     if slow.size:
         size[slow] = 0.0
     decimals = min(precision, _MOST_DECIMALS)
-    spans = _write_fixed(_scaled(size, decimals), np.signbit(flat), decimals)
-    return replaced(spans, slow, [f"{value:.{precision}f}" for value in flat[slow].tolist()])
+    numbers = _scaled(size, decimals)
+    spans = _write_fixed(numbers, np.signbit(flat) & (numbers != 0), decimals)
+    return replaced(spans, slow, [f"{value:z.{precision}f}" for value in flat[slow].tolist()])
 
 
 def _slow_places(size: Floats, precision: int, limit: float) -> Ints:

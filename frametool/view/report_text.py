@@ -46,11 +46,20 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
     pads = [str.ljust if key in LEFT else str.rjust for key in shown]
     aligned = ([pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows)
     lines = ["  ".join(row).rstrip() for row in aligned]
-    if max(map(cells, lines)) > get_terminal_size((WIDTH, 0)).columns:
+    if max(map(cells, lines)) > max(WIDTH, get_terminal_size((WIDTH, 0)).columns):
         lines = [line for row in rows[1:] for line in _folded_edge(dict(zip(shown, row, strict=True)), rows[0])]
     table = "".join(f"{line}\n" for line in lines)
     table += "".join(map(_motion, (entry for entry in edges if entry["length_m"])))
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
+
+
+def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Return the patterns of what is wrong in a report, each with a group called by its colour."""
+    odd = [entry for entry in entries if entry["jumps"] or entry["backward"]]
+    names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in odd)
+    rows = (rf"(?m)^(?P<red>{parent} +{child} .*)$" for parent, child in names)
+    said = r"(?P<red>\b(?:jumps|back) [1-9]\d*)", r"(?m)(?P<yellow>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
+    return *rows, *said
 
 
 def _folded_edge(row: dict[str, str], titles: Sequence[str]) -> list[str]:

@@ -67,6 +67,18 @@ def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
     )  # fmt: skip
 
 
+def coloured(text: str, marks: Sequence[str]) -> str:
+    """Return text as the terminal shows it: each named group of some patterns in the colour that is its name."""
+    from rich.text import Text
+
+    whole, console = Text(text), coloured_console()
+    for pattern in marks:
+        whole.highlight_regex(pattern)
+    with console.capture() as shown:
+        console.print(whole, end="")
+    return shown.get()
+
+
 def _label(track: Track, style: Style, covariance: Components | None) -> tuple[str, ...]:
     """Return the pose of an edge, how uncertain it is, and how it moves: its newest pose then."""
     label: tuple[str, ...] = edge_label(Transform.of(*track.components), style, track.parent)

@@ -287,6 +287,25 @@ def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:
     assert hint.replace("ROBOT", str(by.EXAMPLES / "robot.yaml")) in str(caught.value)
 
 
+@pytest.mark.parametrize(("text", "written"), [
+    ("inv(map<-tool) * (base_link<-map)", "inv(map<-tool) * inv(base_link<-map)  (= tool<-base_link), or base_link<-map * map<-tool  (= base_link<-tool)"),
+    ("inv(map<-tool) * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * inv(map<-tool)  (= base_link<-map)"),
+    ("( inv (map<-tool) ) * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * inv (map<-tool)  (= base_link<-map)"),
+    ("(map<-tool) ^ -1 * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * ((map<-tool) ^ -1)  (= base_link<-map)"),
+    ("inv(inv(map<-tool)) * (map<-base_link)", "inv(map<-tool) * map<-base_link  (= tool<-base_link), or inv(map<-base_link) * map<-tool  (= base_link<-tool)"),
+    ("inv((map<-tool)^-1) * (map<-base_link)", "inv(map<-tool) * map<-base_link  (= tool<-base_link), or inv(map<-base_link) * map<-tool  (= base_link<-tool)"),
+    ("inv(inv(inv(map<-tool))) * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * inv(map<-tool)  (= base_link<-map)"),
+    ("({} as a<-b)^-1 * ({} as b<-c)", "({} as a<-b) * ({} as b<-c)  (= a<-c), or inv({} as b<-c) * (({} as a<-b)^-1)  (= c<-a)"),
+])  # fmt: skip
+def test_no_suggestion_inverts_an_inverse(text: str, written: str) -> None:
+    with pytest.raises(FrametoolError) as caught:
+        evaluate(text, scope())
+    assert str(caught.value).partition("frames that touch: ")[2] == written
+    for each in written.split(", or "):
+        product, _, frames = each[:-1].partition("  (= ")
+        assert str(evaluate(product, scope()).type) == frames
+
+
 @pytest.mark.parametrize("text", [
     "map<-tool", "inv(map<-tool) * (map<-lidar)", "(map<-lidar) * [1, 2, 3]", "(map<-lidar) * vector([1, 2, 3])", "log(map<-tool)", "exp([1, 2, 3, 0.1, 0.2, 0.3])",
 ])  # fmt: skip

@@ -503,10 +503,16 @@ def test_what_lookup_prints_as_csv_is_a_tree_again(run: Run) -> None:
     assert json.loads(run("lookup", "-", "map", "a", "-f", "json", stdin=text).out)["xyz"] == [1.0, 2.0, 3.0]
 
 
+WANTED = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
+
+
 @pytest.mark.parametrize(("text", "said"), [
-    ("x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n", "no column of stamps among x, y, z, qx, qy, qz, qw"),
+    ("x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n", f"no column parent, name nor stamp among x, y, z, qx, qy, qz, qw; {WANTED}"),
+    ("sensor,x,y,z,yaw\nlidar,1,2,3,0\n", f"no column parent, name nor stamp among sensor, x, y, z, yaw; {WANTED}"),
+    ("frame,x,y,z,yaw\nlidar,1,2,3,0\n", f"no column name nor stamp among frame, x, y, z, yaw; {WANTED}"),
+    ("name,x,y,z,yaw\nlidar,1,2,3,0\n", f"no column parent nor stamp among name, x, y, z, yaw; {WANTED}"),
     ("stamp,x,y,z\n1,2,3,0\n", "no rotation among the columns stamp, x, y, z"),
-    ("timestamp,x,y,z,qx,qy,qz,qw\n1403636579763555584,1,2,3,0,0,0,1\n", "or call them stamp_ns"),
+    ("timestamp,x,y,z,qx,qy,qz,qw\n1403636579763555584,1,2,3,0,0,0,1\n", "is beyond 64 bits of nanoseconds; are these some? then write ns behind them, or call them stamp_ns"),
 ])  # fmt: skip
 def test_a_table_that_is_no_trajectory_says_what_is_missing(text: str, said: str, run: Run) -> None:
     done = run("tree", "a.csv", files={"a.csv": text})

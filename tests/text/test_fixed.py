@@ -15,7 +15,7 @@ def lines(values: list[float], precision: int) -> list[str]:
 
 
 def by_percent(values: list[float], precision: int) -> list[str]:
-    return [f"{value:.{precision}f}" for value in values]
+    return [f"{value:z.{precision}f}" for value in values]
 
 
 @pytest.mark.parametrize("precision", [0, 1, 6, 9, 15, 20])
@@ -41,7 +41,7 @@ def test_decimal_halves_go_where_their_float_lies(digits: int, precision: int) -
 
 
 def test_rows_are_written_with_the_separator_of_each_column() -> None:
-    assert join([fixed_spans(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n")]) == b"1.0,-0.0\n100000000000000000000.0,-2.5\n"
+    assert join([fixed_spans(np.array([[1.0, -0.0], [1e20, -2.5]]), 1, b",\n")]) == b"1.0,0.0\n100000000000000000000.0,-2.5\n"
 
 
 def test_no_rows_are_no_text() -> None:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import sys
 from functools import partial
 from math import radians
-from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.group import EVERYTHING
 from frametool.cli.options import FILE, Command, Parsed, file_options
+from frametool.cli.output import in_colour
 from frametool.cli.sink import writing
-from frametool.cli.stderr import say
+from frametool.cli.stderr import folded, say
 from frametool.cli.trees import opened, refuse_two_readers, state
 from frametool.errors import listing, warn
 from frametool.lint.findings import RULES, WRITERS
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
+TROUBLE = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<yellow>warning): ")
 
 
 class CheckCommand(Command):
@@ -79,7 +80,8 @@ def command(
     state(recordings)
     text = WRITERS[form](findings)
     with writing(None) as write:
-        write(_in_terminal(text) if form == "text" and sys.stdout.isatty() else text)
+        is_seen = form == "text" and sys.stdout.isatty()
+        write(in_colour("\n".join(map(folded, text.split("\n"))), TROUBLE) if is_seen else text)
     counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
     summary = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
     if summary:
@@ -112,13 +114,3 @@ def _with_loops(
     if apart:
         warn(f"{apart} of {len(rows)} measurements not compared: their frames are not connected by what stands still")
     return [*findings, *found]
-
-
-def _in_terminal(text: str) -> str:
-    """Break lines between words where the terminal ends."""
-    from textwrap import TextWrapper
-
-    wrapper = TextWrapper(
-        get_terminal_size().columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
-    )
-    return "".join(f"{wrapper.fill(line)}\n" for line in text.splitlines())

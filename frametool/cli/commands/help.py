@@ -67,6 +67,7 @@ def _wrapped(line: str, indent: int = 2) -> str:
 
 
 def _titles(label: str, titles: list[str], most: int = 12) -> str:
+    most += len(titles) == most + 1
     more = [f".. and {len(titles) - most} more"] if len(titles) > most else []
     return "".join([f"{label}:\n\n", *(f"  {each}\n" for each in titles[:most] + more)])
 

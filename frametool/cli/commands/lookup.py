@@ -117,6 +117,7 @@ def command(
         found = derive.lookup(plan, frames, target, source, at_ns=at_ns(at), source_at_ns=at_ns(source_at), fixed=fixed)
         return task.write(found)
     output.take_axes_in(frames, source)
+    output.mark_frames(target, source)
     every = output.holds_all or window is not None
     every = every and at is None and fixed is None and frames.latest(target, source) is not None
     if times is not None or every:

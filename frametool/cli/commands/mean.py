@@ -70,10 +70,11 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
         warn("covariances left out: mean's is that of the rows")
     result, left_out = _mean(gathered, given, robust=robust)
     task.output.poses([result])
-    for line in left_out[:MOST]:
+    most = MOST + (len(left_out) == MOST + 1)
+    for line in left_out[:most]:
         warn(line)
-    if len(left_out) > MOST:
-        warn(f"{len(left_out) - MOST} more poses left out")
+    if len(left_out) > most:
+        warn(f"{len(left_out) - most} more poses left out")
     return ROWS_SKIPPED if left_out else status
 
 

@@ -51,10 +51,11 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
     clashes: list[FormatError] = []
     report = monitor(files, *frames, normalize=normalize, clashing=clashes.append)
     state(files)
-    for error in clashes[:MOST_TOLD]:
+    most = MOST_TOLD + (len(clashes) == MOST_TOLD + 1)
+    for error in clashes[:most]:
         say_error(error, in_json=output.told == "json")
-    if len(clashes) > MOST_TOLD:
-        say(f"{len(clashes) - MOST_TOLD} more frames come by two topics")
+    if len(clashes) > most:
+        say(f"{len(clashes) - most} more frames come by two topics")
     if clocks_differ(report):
         say("note: stamps and the recorder's clock are years apart (simulated time?): the delays say nothing")
     output.report(report)

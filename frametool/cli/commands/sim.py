@@ -180,7 +180,7 @@ def run(scene: str, duration: float | None, seed: int | None, **options: Any) ->
     chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
     if late := chosen.late_calls():
         end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
-        more = f", nor do {len(late) - 1} more" if late[1:] else ""
+        more = f", nor do{f'es {late[1].place}' if len(late) == 2 else f' {len(late) - 1} more'}" if late[1:] else ""
         say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
     output.run(chosen)
 

@@ -19,7 +19,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.source import InputFile, Source
-from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, listing, shown, warn
+from frametool.errors import (
+    BadAnswer,
+    FormatError,
+    ValueInvalid,
+    alternatives,
+    bare,
+    did_you_mean,
+    first_of,
+    listing,
+    shown,
+    warn,
+)
 from frametool.formats.detect import detect
 from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.table import FORMATS, readers
@@ -466,7 +477,7 @@ class JointFile:
         try:
             columns = find_joint_columns(names, self.joints)
             if not columns:
-                named = ", ".join(map(bare, names[:20]))
+                named = first_of(names, 20, quote=bare)
                 raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(self.joints)}")
             if problem := misspelt(names, self.joints):
                 raise ValueInvalid(problem)
@@ -528,5 +539,4 @@ def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]
     """Say that a robot has no such joint, or that it does not move."""
     if joint in fixed:
         return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(joints)}"
-    near = did_you_mean(joint, joints)
-    return f"no joint {shown(joint)}{near or ';'} joints: {listing(joints)}"
+    return f"no joint {shown(joint)}{alternatives(joint, joints, 'joints')}"

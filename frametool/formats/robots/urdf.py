@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.source import UTF16, InputFile, paused_collector
 from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
-from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, listing, shown
+from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
 from frametool.formats.load import Recording, refuse_unknown_joints
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.robots.posture import Posture
@@ -94,7 +94,7 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
     if not robot.frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
-        named = f"{', '.join(map(bare, roots[:5]))}{', ..' * (len(roots) > 5)}"
+        named = first_of(roots, 5, quote=bare)
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
         options.tally.note(Note("several-roots", message, ()), robot.frames[roots[1]])
     return robot

@@ -15,7 +15,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.yaml import TAG
-from frametool.errors import bare, shown
+from frametool.errors import bare, first_of, shown
 from frametool.formats.table import DIRECTIONS
 from frametool.formats.trees.tree_reader import Unclear, dotted, named
 from frametool.geometry import floats, rigid
@@ -450,9 +450,8 @@ class Matrices:
         edges = edges_of(self.poses, self.reading)
         tally.about = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
         if self.left:
-            more = f" and {len(self.left) - MOST_TOLD} more" if len(self.left) > MOST_TOLD else ""
             verb = "is no pose" if len(self.left) == 1 else "are no poses"
-            tally.about += f"; {', '.join(self.left[:MOST_TOLD])}{more} {verb}"
+            tally.about += f"; {first_of(self.left, MOST_TOLD)} {verb}"
         return edges
 
     def _of_block(self, block: MatrixBlock) -> Iterator[Stated]:

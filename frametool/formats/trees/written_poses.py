@@ -91,7 +91,7 @@ def of_angles(angles: Iterable[float]) -> Quaternion:
 def rows_of(pose: Rigid) -> tuple[list[list[float]], Rigid]:
     """Return the rows of the 4x4 matrix of a pose, and the pose that they read back to."""
     position, given = pose[:3], quaternion.from_quaternion(*pose[3:], floats)
-    numbers = rigid.to_homogeneous(*position, *given, floats)
+    numbers = [number + 0.0 for number in rigid.to_homogeneous(*position, *given, floats)]  # none is -0.0
     turn = matrix.check(*numbers[0:3], *numbers[4:7], *numbers[8:11])
     back = quaternion.canonical(*matrix.to_quaternion(*turn, floats), floats)
     return [list(numbers[at : at + 4]) for at in (0, 4, 8, 12)], (*position, *back)

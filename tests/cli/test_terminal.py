@@ -1,0 +1,109 @@
+"""On a terminal: colours mark frames and trouble, notes fit its width; in pipes the same bytes as ever."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from console import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CODES = re.compile(r"\x1b\[[\d;]*m")
+LATE = (
+    "{frames: [{name: b, parent: a, samples: [{stamp: 0}, {stamp: 1}, {stamp: 2}, {stamp: 3}, {stamp: 4, xyz: [9, 0, 0]}, {stamp: 5, xyz: [9, 0, 0]}]}, "
+    "{name: c, parent: b, samples: [{stamp: 7}, {stamp: 8}]}]}"
+)
+TABLE = "frame,x,y,z,yaw_deg\nlidar,1,2,3,90\n"
+
+
+def seen(folder: Path, *arguments: str, **environment: str) -> str:
+    """Return what a command shows on a terminal of 80 columns, stdout and stderr together."""
+    kept = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "COLUMNS")}
+    outer, inner = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "frametool", *arguments], stdin=subprocess.DEVNULL, stdout=inner, stderr=inner, cwd=folder,
+        env=kept | {"PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "80"} | environment,
+    )  # fmt: skip
+    os.close(inner)
+    data = b""
+    try:
+        while piece := os.read(outer, 65536):
+            data += piece
+    except OSError:  # nobody writes any more
+        pass
+    os.close(outer)
+    process.wait()
+    return data.decode().replace("\r\n", "\n")
+
+
+def green(text: str) -> str:
+    return f"\x1b[32m{text}\x1b[0m"
+
+
+def cyan(text: str) -> str:
+    return f"\x1b[36m{text}\x1b[0m"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / "table.csv").write_text(TABLE)
+    return tmp_path
+
+
+COLOURED = [
+    (("lookup", "examples/robot.yaml", "map", "tool"), f"{green('tool')} seen from {cyan('map')}  (maps points in {green('tool')} to points in {cyan('map')})\n"),
+    (("lookup", "examples/drive.yaml", "map", "box", "--at", "1"), f"{green('box')} seen from {cyan('map')} at 1.000000000  (maps points in {green('box')} to points in {cyan('map')})\n"),
+    (("lookup", "{name: seen, parent: from, xyz: [1, 2, 3]}", "from", "seen"), f"{green('seen')} seen from {cyan('from')}  (maps points in {green('seen')} to points in {cyan('from')})\n"),
+    (("lookup", "examples/drive.yaml", "map", "base_link", "--times", "0,1", "-f", "text"), f"{green('base_link')} seen from {cyan('map')} at 1.000000000\n  (maps points in {green('base_link')} to points in {cyan('map')})\n"),
+    (("check", "table.csv"), "table.csv:1: \x1b[31merror\x1b[0m: no column name nor stamp among frame, x, y, z, yaw_deg;\n"),
+    (("monitor", LATE), "\x1b[31ma       b"),
+    (("monitor", LATE, "a", "c"), "its edges \x1b[31mshare no time\x1b[0m: "),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "expected"), COLOURED, ids=[" ".join(row[0])[:60] for row in COLOURED])
+def test_colour_marks_frames_and_trouble_on_a_terminal_and_nowhere_else(folder: Path, arguments: tuple[str, ...], expected: str) -> None:
+    text = seen(folder, *arguments)
+    assert expected in text
+    assert "\x1b" not in seen(folder, *arguments, NO_COLOR="1")
+    assert "\x1b" not in seen(folder, *arguments, TERM="dumb")
+    assert CODES.sub("", text) == seen(folder, *arguments, NO_COLOR="1")
+    piped = subprocess.run([sys.executable, "-m", "frametool", *arguments], cwd=folder, capture_output=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert b"\x1b" not in piped.stdout + piped.stderr
+
+
+def test_what_is_in_order_has_no_colour_of_trouble(folder: Path) -> None:
+    assert "\x1b" not in seen(folder, "monitor", "examples/drive.yaml")
+    assert "\x1b" not in seen(folder, "check", "examples/drive.yaml")
+
+
+NOTES = [
+    ("tree", "examples/robot.yaml", "-f", "camchain"), ("convert", "-i", "table.csv", "-f", "tum"), ("tree", "examples/camchain.yaml"),
+    ("mean", "examples/tag_seen.csv", "--robust"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("arguments", NOTES, ids=[" ".join(row) for row in NOTES])
+def test_notes_and_warnings_fit_the_terminal_and_are_one_line_in_a_pipe(folder: Path, arguments: tuple[str, ...]) -> None:
+    shown = seen(folder, *arguments, "-o", "out.txt", *(["-f", "yaml"] if "-f" not in arguments else []))
+    piped = subprocess.run(
+        [sys.executable, "-m", "frametool", *arguments, "-o", "again.txt", *(["-f", "yaml"] if "-f" not in arguments else [])],
+        cwd=folder, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert [line for line in shown.split("\n") if len(line) > 80] == []
+    assert all(line.startswith(("frametool: ", "  ")) for line in shown.split("\n") if line)
+    assert all(line.startswith("frametool: ") for line in piped.stderr.splitlines())
+    assert shown.split() == piped.stderr.split()
+    assert any(len(line) > 80 for line in piped.stderr.splitlines()) == any(line.startswith("  ") for line in shown.split("\n"))
+
+
+def test_an_error_stays_one_line(folder: Path) -> None:
+    assert seen(folder, "tree", "table.csv").count("\n") == 1
