@@ -18,9 +18,10 @@ import click
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
+from frametool.grammar.readers import INDICES, NotARotation, Reading
 from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
 from frametool.stream.faults import Misused
+from frametool.text.numbers import parse_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -152,8 +153,10 @@ def _is_counted(rows: list[list[str]]) -> bool:
 
 def _is_long(head: str) -> bool:
     """Tell a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other from other lists."""
+    from frametool.grammar.pasted import ABB
+
     found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    return (found is not None and found[1].count(",") in (8, 11, 15)) or re.match(_LISTED_ROWS, head) is not None
+    return (found is not None and found[1].count(",") in (8, 11, 15)) or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None
 
 
 def _only_a_matrix(lines: list[str], request: Request) -> bool:
@@ -438,7 +441,7 @@ def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
             return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in form.counts:
             raise click.UsageError(f"{form.counted}; found {len(texts)}")
-        x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
+        x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 

@@ -28,8 +28,8 @@ LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotati
 # the same of columns, and of keys that hold one number each: behind the affixes that they may have as all columns
 COLUMN_WORDS = {
     **{f"rvec_{axis}": f"rotvec_{axis}" for axis in "xyz"},
-    **{f"{word}_{axis}": f"t{axis}" for word in ("tvec", "trans") for axis in "xyz"},
-    **{f"{word}_{axis}": f"q{axis}" for word in ("qvec", "quat", "rot") for axis in "xyzw"},
+    **{f"{word}_{axis}": f"t{axis}" for word in ("tvec", "trans", "pos", "translation") for axis in "xyz"},
+    **{f"{word}_{axis}": f"q{axis}" for word in ("qvec", "quat", "rot", "q") for axis in "xyzw"},
 }
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them

@@ -258,6 +258,8 @@ def _list_or_map(notation: Notation, value: Any) -> Spelled:
     row = notation.representation
     is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
     columns = row.whole.columns if row.whole and is_whole else row.columns
+    if type(value) is dict and value.keys() == {*row.names}:
+        columns = row.names
     texts = read_texts(value, columns, partial=bool(row.angles))
     return notation, texts, places_in(value) if type(value) is list else [(name,) for name in columns]
 
