@@ -156,7 +156,8 @@ def _is_long(head: str) -> bool:
     from frametool.grammar.pasted import ABB
 
     found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    return (found is not None and found[1].count(",") in (8, 11, 15)) or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None
+    is_long = found is not None and found[1].count(",") in (8, 11, 15)
+    return is_long or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None
 
 
 def _only_a_matrix(lines: list[str], request: Request) -> bool:
@@ -376,7 +377,8 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
         [_only(each.only_poses(timed=timed is not None), each.source) for each in side if each]
         for side in (given[:at], given[at + 1 :])
     )
-    return Rows(at, rows.source if rows else "inv(-)" if without_inverse(arguments[at])[1] else "-", before, behind, timed)
+    streamed = "inv(-)" if without_inverse(arguments[at])[1] else "-"
+    return Rows(at, rows.source if rows else streamed, before, behind, timed)
 
 
 def _tell_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | None]) -> None:

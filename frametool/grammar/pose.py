@@ -235,7 +235,7 @@ def read_position(value: Any, unit: float) -> Vector:
 
 
 def length_reader(parts: float) -> Callable[[Any], float]:
-    """Return what reads a number of a position, in metres or so many parts of one; metres may say another unit: 10cm."""
+    """Return what reads a number of a position in so many parts of a metre; metres may say another unit, 10cm."""
 
     def read(text: Any) -> float:
         return parse_length(text) if type(text) is str and parts == 1.0 else read_number(text)

@@ -175,13 +175,13 @@ def read_number(value: Any) -> float:
     return parse_number(value)
 
 
-def places_in(value: list[Any]) -> Sequence[Path]:
-    """Return where the numbers of a list stand, also of one written as a column or a row of a matrix: [[x], [y], ..]."""
+def places_in(value: list[Any]) -> Sequence[tuple[int, ...]]:
+    """Return where the numbers of a list stand, also of one written as a column or a row of a matrix: [[x], ..]."""
     if value and all(type(each) is list and len(each) == 1 for each in value):
         return [(at, 0) for at in range(len(value))]
     if len(value) == 1 and type(value[0]) is list:
         return [(0, at) for at in range(len(value[0]))]
-    return INDICES[: len(value)]
+    return [(at,) for at in range(len(value))]
 
 
 def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> list[Any]:
@@ -190,11 +190,12 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
     partial: names missing in a mapping count as 0.
     """
     if type(value) is list:
+        texts: list[Any] = value
         if value and type(value[0]) is list:
-            value = [value[path[0]][path[1]] if len(path) > 1 else value[path[0]] for path in places_in(value)]
-        if len(value) != len(names):
-            raise Misfit(f"expected {len(names)} numbers ({' '.join(names)}), found {len(value)}")
-        return value
+            texts = [value[path[0]][path[1]] if len(path) > 1 else value[path[0]] for path in places_in(value)]
+        if len(texts) != len(names):
+            raise Misfit(f"expected {len(names)} numbers ({' '.join(names)}), found {len(texts)}")
+        return texts
     if type(value) is not dict:
         raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
     if (*value,) == names:  # most mappings, and in their order
@@ -227,7 +228,7 @@ def read_numbers(
 def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: Callable[[Any], Any]) -> Misfit:
     """Find which of several values does not fit, and name its place."""
     for index, text in enumerate(texts):
-        place = (names[index],) if type(value) is dict else places_in(value)[index]
+        place: Path = (names[index],) if type(value) is dict else places_in(value)[index]
         try:
             read(text)
         except Misfit as error:

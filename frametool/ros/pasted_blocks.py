@@ -42,7 +42,10 @@ _ROTATIONS = (
 _TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
 _GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
 _ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
-_POSITIONAL = rf"\s*(?:{NUMBER}\s+){{6,7}}(?:[A-Za-z_/][\w./-]*\s+){{2}}(?:\d+\s*)?"  # arguments alone
+_FRAME = r"[A-Za-z_/][\w./-]*"
+_ARGUMENTS_ALONE = (
+    rf"\s*--(?:[a-z]+-)*[a-z]+[ =]|\s*(?:{NUMBER}\s+){{6,7}}{_FRAME}\s+{_FRAME}(?:\s+\d+)?\s*\Z"
+)  # fmt: skip
 _BEGIN = re.compile(
     rf"""(?x)\s*+(?:
     (?:[A-Za-z_]\w*+\s*+=\s*+)?[pP]\[ | (?:\w+\s+)*:?(?:robtarget|pose)\s+\w+\s*:=    # Universal Robots, ABB
@@ -167,8 +170,7 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
     calls = [match[2] for match in _ARGS.finditer(text)]
     if not calls:
         lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
-        lines = [f"{line} " for line in lines]
-        calls = [line for line in lines if CALL in line or re.fullmatch(_POSITIONAL, line) or re.match(r"\s*--(?:[a-z]+-)*[a-z]+[ =]", line)]
+        calls = [line for line in lines if CALL in line or re.match(_ARGUMENTS_ALONE, line)]
         if len(calls) < len(lines):
             return []
     values = []

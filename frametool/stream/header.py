@@ -191,7 +191,7 @@ def find_positions(header: Header) -> list[Columns]:
     for at, match in enumerate(match for row in ROTATIONS.values() for match in header.match(row.columns)):
         for place in match.places:
             turns.setdefault(place, set()).add(at)
-    found = []
+    found: list[Columns] = []
     for base in POSITIONS:
         for match in header.match(base, range(3)):
             in_rotation = set.intersection(*(turns.get(place, set()) for place in match.places))
