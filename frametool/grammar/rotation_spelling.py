@@ -65,7 +65,8 @@ def own_key(key: str, value: Any) -> str:
 
     Raises Misfit for three or four numbers under a word that does not say what they are.
     """
-    if (meant := ROTATION_WORDS.get(key, key)) or key == AXES_KEY:
+    is_short = key == "R" and len(value) in (3, 4) and not _is_rows(value)
+    if (meant := ROTATION_WORDS.get(key, key)) and not is_short:
         return meant
     if type(value) is dict:
         return "rpy" if not {"roll", "pitch", "yaw"}.isdisjoint(value) else "quaternion"

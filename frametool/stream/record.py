@@ -760,7 +760,7 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
             hint = f"leave {key} out or quote the name"
             raise Misfit(f"{key} must be a frame's name, found nothing; {hint}", (*path, key))
         if text and found.text and text != found.text:
-            where = ".".join(map(str, found.paths[0][-2:]))
+            where = ".".join(map(str, found.paths[0][1:][-2:]))  # without the count of the document
             raise Misfit(f"{key} says {shown(text)} and {where} says {shown(found.text)}; keep one", (*path, key))
         found = Name(found.text or text or None, (*found.paths, (*path, key)))
     return found
