@@ -367,7 +367,7 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
     given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(given) if each and each.beside]
     at = [0, *says_more, *_several(given)][-1] if stream is None else stream
-    _tell_of_twins(arguments, given)
+    _tell_of_twins(bare, given)
     rows, timed = given[at], None
     if rows is not None and len(rows.poses) == 1:
         from frametool.grammar.pose_algebra import shared_stamp

@@ -9,23 +9,16 @@ import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
+from frametool.grammar.readers import NAME_KEYS as NAME_KEYS  # noqa: PLC0414 - also from here
+from frametool.grammar.readers import PARENT_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 HEADER_FRAME = "header.frame_id"
-PARENT_KEYS = ("parent", "parent_frame_id", "parent_frame", "frame_id", "frame")  # what something is given in
+PARENT_KEYS = (*PARENT_NAMES, "frame")  # what something is given in
 PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is said best
-NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # what a pose is the pose of
-# what others call a position in metres, and a rotation (OpenCV, COLMAP): ours that it means, "" where the shape of its
-# value says so.  Only a list or mapping under these words is meant; `t` may be a time, and `T` is a 4x4 matrix too
-POSITION_WORDS = ("tvec", "trans", "pos", "t", "T")
-ROTATION_WORDS = {
-    "rvec": "rotvec_rad", "qvec": "wxyz", "R": "matrix", "T": "matrix", "rotation_matrix": "matrix",
-    "rot": "", "quat": "", "rotation": "", "orientation": "",
-}  # fmt: skip
-LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotation", "orientation"))
-# the same of columns, and of keys that hold one number each: behind the affixes that they may have as all columns
+# the words of others in columns, and in keys that hold one number each
 COLUMN_WORDS = {
     **{f"rvec_{axis}": f"rotvec_{axis}" for axis in "xyz"},
     **{f"{word}_{axis}": f"t{axis}" for word in ("tvec", "trans", "pos", "translation") for axis in "xyz"},

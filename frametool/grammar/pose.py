@@ -13,11 +13,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import ROTATIONS
-from frametool.grammar.names import LISTED_WORDS, NAME_KEYS, PARENT_KEYS, POSITION_WORDS, may_be_on_earth
-from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers
+from frametool.grammar.readers import (
+    NAME_KEYS,
+    PARENT_NAMES,
+    Misfit,
+    NotARotation,
+    Reading,
+    kind,
+    read_number,
+    read_numbers,
+)
 from frametool.grammar.rotation_spelling import (
     AGREEMENT,
     AXES_KEY,
+    LISTED_WORDS,
+    POSITION_WORDS,
     ROTATION_KEYS,
     XYZ,
     agreeing_rotation,
@@ -41,8 +51,7 @@ SPREAD = ("count", "used", "distance_rms", "distance_max", "angle_rms", "angle_r
           "std_x", "std_y", "std_z", "std_angle", "std_angle_deg")  # fmt: skip
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
-NAMES = frozenset((*NAME_KEYS, *PARENT_KEYS)).difference(("frame",))  # `frame` is what a point is given in
-PARENT_NAMES = tuple(key for key in PARENT_KEYS if key in NAMES)
+NAMES = frozenset((*NAME_KEYS, *PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit into
 MOST_CHARACTERS = 80
@@ -111,6 +120,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     Raises Misfit with the path of what is wrong below this mapping.
     """
     if not POSE_KEYS.issuperset(mapping):
+        from frametool.grammar.names import may_be_on_earth
+
         if any(map(may_be_on_earth, mapping)):
             from frametool.grammar.place import EARTH_KEYS, placed_by, without_place
 

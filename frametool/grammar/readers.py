@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     Quaternion = tuple[float, float, float, float]
 
 
+NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # what a pose is the pose of
+PARENT_NAMES = ("parent", "parent_frame_id", "parent_frame", "frame_id")  # what it is given in
 INDICES: tuple[Path, ...] = tuple((index,) for index in range(16))
 
 

@@ -9,7 +9,6 @@ from frametool.errors import ValueInvalid, bare, overheard, shown
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, ROTATIONS, ROWS, Notation, axes_name
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.names import LISTED_WORDS, ROTATION_WORDS
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_texts, within
 from frametool.text.numbers import NotFinite, half_unit, parse_angle, parse_number
 
@@ -20,6 +19,14 @@ if TYPE_CHECKING:
 
     Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
 
+# what others call a position in metres, and a rotation (OpenCV, COLMAP): ours that it means, "" where the shape of its
+# value says so.  Only a list or mapping under these words is meant; `t` may be a time, and `T` is a 4x4 matrix too
+POSITION_WORDS = ("tvec", "trans", "pos", "t", "T")
+ROTATION_WORDS = {
+    "rvec": "rotvec_rad", "qvec": "wxyz", "R": "matrix", "T": "matrix", "rotation_matrix": "matrix",
+    "rot": "", "quat": "", "rotation": "", "orientation": "",
+}  # fmt: skip
+LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotation", "orientation"))
 XYZ = ("x", "y", "z")
 AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi

@@ -168,7 +168,8 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
     """Read the arguments of static_transform_publisher: `args=".."` of launch files, or a whole call."""
     text = source.text
     calls = [match[2] for match in _ARGS.finditer(text)]
-    if not calls:
+    is_bare = not calls
+    if is_bare:
         lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
         calls = [line for line in lines if CALL in line or re.match(_ARGUMENTS_ALONE, line)]
         if len(calls) < len(lines):
@@ -177,7 +178,7 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
     for call in calls:
         reading = Reading(source, normalize=normalize)
         pose = read_call(call, reading)
-        if re.fullmatch(rf"\s*(?:{NUMBER}\s+){{6}}[A-Za-z_/].*", call):
+        if is_bare and re.match(rf"\s*(?:{NUMBER}\s+){{6}}{_FRAME}\s", call):
             warn(f"{source.name}: taken for arguments of {CALL}: x y z yaw pitch roll PARENT CHILD")
         for note in reading.notes:
             warn(f"{source.name}: {note.message}", rule=note.rule)

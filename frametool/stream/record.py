@@ -16,7 +16,6 @@ from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import ROTATIONS, notation
 from frametool.grammar.names import (
     EARTH_FRAMES,
-    LISTED_WORDS,
     NAME_KEYS,
     PARENT_KEYS,
     may_be_on_earth,
@@ -36,6 +35,7 @@ from frametool.grammar.pose import (
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
 from frametool.grammar.rotation_spelling import (
     AXES_KEY,
+    LISTED_WORDS,
     ROTATION_KEYS,
     as_meant,
     is_position,

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import quoted
 from frametool.geometry.representations import ROTATIONS
-from frametool.grammar.names import EARTH_FRAMES, LISTED_WORDS, PLACE_KEYS
+from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, with_entries
-from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
+from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
 from frametool.stream.text_parts import Const, IfLocked, Out, Word

@@ -15,9 +15,9 @@ from frametool.documents.document import Aliased, Document, Node, parse_document
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
-from frametool.grammar.names import LISTED_WORDS, NAME_KEYS, PARENT_KEYS, may_be_uncertain
+from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import POSE_KEYS
-from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
+from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS

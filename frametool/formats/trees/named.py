@@ -22,10 +22,10 @@ from frametool.formats.trees.tree_reader import Unclear, document_edges, named
 from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.names import COLUMN_WORDS, POSITION_WORDS, ROTATION_WORDS
+from frametool.grammar.names import COLUMN_WORDS
 from frametool.grammar.pose import POSE_KEYS, read_angle_unit, read_pose
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind
-from frametool.grammar.rotation_spelling import is_position
+from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
