@@ -84,7 +84,7 @@ def parse_length(text: str) -> float:
     if match := re.fullmatch(_LENGTH, text):
         return parse_number(match[1]) / LENGTHS[match[2]]  # dividing rounds once: 0.02 from 2cm
     reason = _reason(text)
-    if not re.match(r"[-+.]*\d", text):
+    if not any(map(str.isdigit, text)):
         raise _refusal(text, explain_number(text))
     raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT, _ANGLE} else reason}")
 
