@@ -235,11 +235,11 @@ def _mount(text: str) -> Any:
     """Read the mount: auto, a pose, or FILE:BODY:POINT, the pose of a point on a body of a tree."""
     if text == "auto":
         return text
-    from frametool.cli.poses import is_inline, one_pose
+    from frametool.cli.poses import is_pasted, one_pose
     from frametool.geometry.transform import Transform
     from frametool.stream.request import Request
 
-    if is_inline(text):
+    if is_pasted(text):
         return Transform.of(*one_pose(text, Request()).components)
     from frametool.cli.trees import load_tree
     from frametool.stream.trajectories import split_name

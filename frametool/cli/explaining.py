@@ -11,7 +11,7 @@ import click
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL, pose_reading_options, together
 from frametool.cli.output import Output
-from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of
+from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of, without_inverse
 from frametool.cli.streaming import OPTIONS, Stream, stream_options
 from frametool.errors import FormatError, heard_by, warn
 
@@ -102,8 +102,10 @@ class PoseTask:
 
         timed: the stamp of a single result, {} for none, where it is not that of its record
         """
-        if isinstance(argument, str) and (self.stream.is_wanted(argument) or self.has_table(argument)):
-            return self.stream.run(request, self.output)
+        if isinstance(argument, str):
+            bare, is_inverse = without_inverse(argument)
+            if self.stream.is_wanted(bare) or self.has_table(bare):
+                return self.stream.run(request.of_inverses() if is_inverse else request, self.output)
         self.only_arguments([argument])
         values = values_of([argument], request, self.output)
         if timed is not None:
@@ -128,6 +130,10 @@ class PoseTask:
 
         warned: its warnings are on stderr already
         """
+        if isinstance(argument, str):
+            argument, is_inverse = without_inverse(argument)
+            if is_inverse:
+                return self.written(argument, warned=warned).turned()
         from frametool.explain.given import given_poses
 
         request = self.request()

@@ -52,6 +52,8 @@ class Command(WithHelp, Reused):
         if any(map(_is_negative, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
+        if "inv" in args:
+            args = _joined(args, ctx, always=self.name in OF_POSES)
         for option in {*OPTIONAL}.intersection(args):
             args = _with_value(args, option, *OPTIONAL[option])
         rest = super().parse_args(ctx, args)
@@ -74,6 +76,23 @@ class Command(WithHelp, Reused):
 
 # options that may stand bare, and their values: the first is what they mean then
 OPTIONAL = {"--explain": ("text", "markdown", "latex"), "--rows": ("ate", "rpe", "kitti")}
+
+
+OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
+
+
+def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
+    """Write the word `inv` before a pose as inv(POSE); before what may be no pose it is a name, unless `always`."""
+    joined: list[str] = []
+    for each in reversed(args):
+        is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))
+        if each == "inv" and is_pose and not joined[-1].startswith("--"):
+            joined.append(f"inv({joined.pop()})")
+        elif each == "inv" and always:
+            raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
+        else:
+            joined.append(each)
+    return joined[::-1]
 
 
 def _is_negative(argument: str) -> bool:

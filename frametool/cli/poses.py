@@ -18,9 +18,10 @@ import click
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import INDICES, NotARotation, Reading, read_number
+from frametool.grammar.readers import INDICES, NotARotation, Reading
 from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
 from frametool.stream.faults import Misused
+from frametool.text.numbers import parse_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -42,7 +43,9 @@ _LISTED_ROWS = rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)"
 
 
 def is_inline(text: str) -> bool:
-    """Tell a mapping or list written on the command line from a file's name."""
+    """Tell a mapping or list written on the command line, or the inverse of one, from a file's name."""
+    while found := _inverted(text):
+        text = (found[1] or found[2]).strip()
     return text.startswith(("{", "["))
 
 
@@ -55,6 +58,8 @@ def is_pasted(text: str, given: Notation | None = None) -> bool:
         return is_inline(text)
     if os.path.exists(text):
         return False
+    if _inverted(text):
+        return True
     has_key = "\n" in text or re.match(r"\w+: *[\[{]", text) is not None
     return has_key or rewritten(Source(INLINE, text), given) is not None
 
@@ -148,8 +153,11 @@ def _is_counted(rows: list[list[str]]) -> bool:
 
 def _is_long(head: str) -> bool:
     """Tell a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other from other lists."""
+    from frametool.grammar.pasted import ABB
+
     found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    return (found is not None and found[1].count(",") in (8, 11, 15)) or re.match(_LISTED_ROWS, head) is not None
+    is_long = found is not None and found[1].count(",") in (8, 11, 15)
+    return is_long or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None
 
 
 def _only_a_matrix(lines: list[str], request: Request) -> bool:
@@ -166,8 +174,45 @@ def _only_a_matrix(lines: list[str], request: Request) -> bool:
     raise Misused("three rows of three numbers may be a rotation or positions; give --from matrix, or --in columns")
 
 
-INVERSE = "inv"
 ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
+
+
+def _inverted(text: str) -> re.Match[str] | None:
+    """Match `inv(POSE)` and `~POSE`; `~/` begins the name of a file."""
+    text = text.strip()
+    return re.fullmatch(r"~(?!/)(.*)|inv\((.*)\)", text, re.DOTALL) if text.startswith(("~", "inv(")) else None
+
+
+def without_inverse(argument: str) -> tuple[str, bool]:
+    """Return an argument without `inv(..)` and `~`, and whether its inverse is meant; twice is not at all.
+
+    Raises click.UsageError where no pose is left.
+    """
+    bare, is_inverse = argument, False
+    while (found := _inverted(bare)) and not os.path.exists(bare):
+        bare, is_inverse = (found[1] or found[2]).strip(), not is_inverse
+        if not bare:
+            raise click.UsageError(f"{shown(argument)}: there is no pose whose inverse is meant")
+    return bare, is_inverse
+
+
+def _inverses(source: Source, request: Request) -> Source:
+    """Return a text with the inverse of each pose of another one: what `invert -f json` writes of it."""
+    from frametool.documents.json import dump
+    from frametool.documents.source import Pasted
+    from frametool.geometry.representations import notation
+    from frametool.grammar.result import Style
+    from frametool.stream.record_values import results
+    from frametool.stream.request import Operation, Request
+
+    own = request.operation
+    asked = Request(
+        Operation(similar=own.similar, multiples=own.multiples), degrees=request.degrees,
+        normalize=request.normalize, earth=request.earth, kind="pose",
+    ).of_inverses()  # fmt: skip
+    style = Style("json", (notation("quaternion"),), keep_sign=True)
+    found: Iterable[Any] = results(source, asked, style)
+    return Pasted(source.name, "\n".join(dump(each.mapping(style)) for each in found))
 
 
 def source_of(argument: str | Source) -> Source:
@@ -175,7 +220,12 @@ def source_of(argument: str | Source) -> Source:
     if isinstance(argument, Source):
         return argument
     if is_inline(argument):
-        return Source(INLINE, argument)
+        bare, is_inverse = without_inverse(argument)
+        if not is_inverse:
+            return Source(INLINE, bare)
+        from frametool.stream.request import Request
+
+        return _inverses(Source(INLINE, bare), Request())
     if argument != "-":
         try:
             return Source(argument, read_text(argument))
@@ -193,8 +243,11 @@ def pose_source(argument: str | Source, request: Request) -> Source:
 
     Where the request moves records, three numbers are a point.
     """
-    if not isinstance(argument, Source) and is_pasted(argument, request.given):
-        argument = Source(INLINE, argument)
+    if not isinstance(argument, Source):
+        bare, is_inverse = without_inverse(argument)
+        if is_inverse:
+            return _inverses(pose_source(bare, request), request)
+        argument = Source(INLINE, bare) if is_pasted(bare, request.given) else bare
     source = source_of(argument)
     if request.offset_ns:
         from frametool.stream.stamp_source import at_other_times
@@ -246,45 +299,6 @@ def usage_if_inline(error: FormatError) -> FormatError:
     if error.source == INLINE and not isinstance(error.__cause__, NotARotation):
         error.exit_code = 2
     return error
-
-
-class Factor(NamedTuple):
-    """An argument of a product, and whether its inverse is meant."""
-
-    argument: str
-    is_inverse: bool = False
-
-    def of(self, pose: Pose) -> Pose:
-        """Return a pose of the argument, or its inverse."""
-        if not self.is_inverse:
-            return pose
-        from frametool.grammar.pose_algebra import inverse
-
-        return inverse(pose)
-
-
-def factors_of(arguments: Iterable[str]) -> list[Factor]:
-    """Read `inv(POSE)`, `~POSE`, and the word `inv` before one; twice is not at all."""
-    factors, is_inverse = [], False
-    for argument in arguments:
-        if argument == INVERSE:
-            is_inverse = not is_inverse
-            continue
-        factors.append(_factor(argument, is_inverse=is_inverse))
-        is_inverse = False
-    if is_inverse:
-        raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it")
-    return factors
-
-
-def _factor(text: str, *, is_inverse: bool) -> Factor:
-    bare = text.strip()
-    while found := re.fullmatch(rf"~(.+)|{INVERSE}\((.*)\)", bare, re.DOTALL):
-        bare = (found[1] or found[2]).strip()
-        if not bare:
-            raise click.UsageError(f"{shown(text)}: there is no pose whose inverse is meant")
-        is_inverse = not is_inverse
-    return Factor(bare if bare != text.strip() else text, is_inverse)
 
 
 class ArgumentPoses(NamedTuple):
@@ -346,13 +360,14 @@ class Rows(NamedTuple):
 
 def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[str], bool]) -> Rows:
     """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
-    if arguments.count("-") > 1:
+    bare = [without_inverse(each)[0] for each in arguments]
+    if bare.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    stream = next((at for at, each in enumerate(arguments) if each == "-" or has_table(each)), None)
+    stream = next((at for at, each in enumerate(bare) if each == "-" or has_table(each)), None)
     given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(given) if each and each.beside]
     at = [0, *says_more, *_several(given)][-1] if stream is None else stream
-    _tell_of_twins(arguments, given)
+    _tell_of_twins(bare, given)
     rows, timed = given[at], None
     if rows is not None and len(rows.poses) == 1:
         from frametool.grammar.pose_algebra import shared_stamp
@@ -362,7 +377,8 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
         [_only(each.only_poses(timed=timed is not None), each.source) for each in side if each]
         for side in (given[:at], given[at + 1 :])
     )
-    return Rows(at, rows.source if rows else "-", before, behind, timed)
+    streamed = "inv(-)" if without_inverse(arguments[at])[1] else "-"
+    return Rows(at, rows.source if rows else streamed, before, behind, timed)
 
 
 def _tell_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | None]) -> None:
@@ -427,7 +443,7 @@ def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
             return Pose(*read_spelled(form, texts, INDICES, reading))
         if len(texts) not in form.counts:
             raise click.UsageError(f"{form.counted}; found {len(texts)}")
-        x, y, z = map(read_number, texts[:-size] or ("0", "0", "0"))
+        x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 

@@ -147,6 +147,18 @@ def noting_files() -> Iterator[dict[str, list[FileState]]]:
         _noted.pop()
 
 
+def _instead_of_a_file(name: str) -> str:
+    """Say what a text that was taken for a file's name may be, if it looks like a pose."""
+    for pattern, remedy in (
+        (r"\s*(?:inv\(|~\s*[\[{])", "the inverse of a pose is inv(POSE), in quotes, with all its brackets"),
+        (r"\s*[pP]\[", "a pose of Universal Robots is p[x, y, z, rx, ry, rz], with its bracket"),
+        (r".*(?:^|\s)[-+]?[\d.]+[\s,]+[-+]?[\d.]+[\s,]", "numbers say what they are by --from REP"),
+    ):
+        if re.match(pattern, name):
+            return f"; taken for a file's name: {remedy}"
+    return ""
+
+
 def opened(path: str | PathLike[str]) -> BinaryIO:
     """Open a file, or standard input for `-`, with a buffer that can be looked into.
 
@@ -164,7 +176,7 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
         return open(path, "rb", buffering=HEAD)
     except OSError as error:
         told = name if len(name) <= LONGEST_NAME else bare(name)
-        raise FileProblem(f"{told}: {(error.strerror or str(error)).lower()}") from None
+        raise FileProblem(f"{told}: {(error.strerror or str(error)).lower()}{_instead_of_a_file(name)}") from None
     except ValueError as error:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 

@@ -128,7 +128,7 @@ _MESSAGE_KEYS = (
 _POSE_WORDS = (
     r"[xyz](?:_mm|_cm)?|[pt][xyz]|xyz\w*|(?:trans|translation|pos|position|location)(?:_[xyz])?|t|tvec|value|pose|"
     r"(?:rot|rotation|q|quat|quaternion)(?:_?[xyzw])?|orientation|(?:roll|pitch|yaw|rpy|euler|axis_angle|rotvec)\w*|"
-    r"xyzw|wxyz|matrix|a[xyz]|theta"
+    r"xyzw|wxyz|matrix|a[xyz]|theta|[RT]|rotation_matrix|[rq]vec(?:_[wxyz])?|tvec_[xyz]"
 )
 _SRDF = (
     "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"

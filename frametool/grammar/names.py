@@ -10,14 +10,21 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import representations
+from frametool.grammar.readers import NAME_KEYS as NAME_KEYS  # noqa: PLC0414 - also from here
+from frametool.grammar.readers import PARENT_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 HEADER_FRAME = "header.frame_id"
-PARENT_KEYS = ("parent", "parent_frame_id", "frame_id", "frame")  # the frame that something is given in
+PARENT_KEYS = (*PARENT_NAMES, "frame")  # what something is given in
 PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is said best
-NAME_KEYS = ("child_frame_id", "name")  # what a pose is the pose of
+# the words of others in columns, and in keys that hold one number each
+COLUMN_WORDS = {
+    **{f"rvec_{axis}": f"rotvec_{axis}" for axis in "xyz"},
+    **{f"{word}_{axis}": f"t{axis}" for word in ("tvec", "trans", "pos", "translation") for axis in "xyz"},
+    **{f"{word}_{axis}": f"q{axis}" for word in ("qvec", "quat", "rot", "q") for axis in "xyzw"},
+}
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
 # compiled when first needed, not at start-up

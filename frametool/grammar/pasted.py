@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry.representations import notation
 from frametool.grammar.rotation_spelling import spelled
 from frametool.text.numbers import parse_angle, parse_number
@@ -164,15 +164,48 @@ _MOVED = "t|p|T|trans|translation|tvec"
 _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|np\.|array|Rot|{NUMBER})")
 
 
-def named_values(text: str) -> list[Any] | None:
+def named_values(text: str, given: Notation | None = None) -> list[Any] | None:
     """Return what a print of objects stands for, as documents give it; None for no such text.
 
     Raises ValueInvalid for a print that is known and cannot be taken.
     """
+    robots = [_robot(line, given) for line in text.strip().splitlines() if line.strip()]
+    if robots and None not in robots:
+        return [*robots]
     for read in (_algebra, _scalar_first, _members, _lists, _euler, _one_line, _parts):
         if (found := read(text)) is not None:
             return [found]
     return _origins(text) if re.match(r"\s*<(?!Matrix\b)", text) else None
+
+
+ABB = r"\[\s*\[([^\[\]]*)\]\s*,\s*\[([^\[\]]*)\]\s*((?:,\s*\[[^\[\]]*\]\s*){2})?\]"
+_DECLARED = r"(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(?:robtarget|pose)\s+\w+\s*:=\s*"
+
+
+def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
+    """Read `p[x, y, z, rx, ry, rz]` of Universal Robots, and ABB's [[x, y, z], [q1, q2, q3, q4], ..].
+
+    The one has metres and a rotation vector in radians, the other millimetres and w first; a robtarget has the
+    robot's configuration and external axes behind it, which are no part of the pose.  given: what numbers are
+    Raises ValueInvalid for p[..] with another count of numbers.
+    """
+    bare = re.sub(rf"\A(?:{LABEL})?(?={_UR}\[)|\A{_DECLARED}", "", text.strip().rstrip(";").strip())
+    if found := re.fullmatch(rf"{_UR}\[([^\[\]]*)\]", bare):
+        cells = [cell.strip() for cell in found[1].split(",")]
+        if len(cells) != 6:
+            raise ValueInvalid(f"p[..] of Universal Robots has six numbers (x, y, z, rx, ry, rz); found {len(cells)}")
+        return {"xyz": cells[:3], "rotvec_rad": cells[3:]}
+    if (found := re.fullmatch(ABB, bare)) is None or (given is not None and not found[3]):
+        return None
+    xyz, turn = ([cell.strip() for cell in found[at].split(",")] for at in (1, 2))
+    if (len(xyz), len(turn)) != (3, 4):
+        return None
+    if not found[3] and ":=" not in text:
+        warn("taken for a pose of ABB: millimetres, w first; --from xyzw or wxyz reads metres in that order")
+    return {"xyz_mm": xyz, "wxyz": turn}
+
+
+_UR = "[pP]"
 
 
 def _algebra(text: str) -> dict[str, Any] | None:
@@ -317,7 +350,7 @@ def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
     given: the notation of numbers that do not say theirs.
     Raises ValueInvalid for what is known and cannot be taken.
     """
-    if (found := named_values(text)) is not None:
+    if (found := named_values(text, given)) is not None:
         return found
     rows = number_rows(text, any_text=given is not None)
     return None if rows is None else _meant(rows, given)

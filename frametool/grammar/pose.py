@@ -13,24 +13,46 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import ROTATIONS
-from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_numbers
-from frametool.grammar.rotation_spelling import AGREEMENT, AXES_KEY, ROTATION_KEYS, agreeing_rotation, read_rotation
-from frametool.text.numbers import parse_number
+from frametool.grammar.readers import (
+    NAME_KEYS,
+    PARENT_NAMES,
+    Misfit,
+    NotARotation,
+    Reading,
+    kind,
+    read_number,
+    read_numbers,
+)
+from frametool.grammar.rotation_spelling import (
+    AGREEMENT,
+    AXES_KEY,
+    LISTED_WORDS,
+    POSITION_WORDS,
+    ROTATION_KEYS,
+    XYZ,
+    agreeing_rotation,
+    is_position,
+    is_rotation,
+    read_rotation,
+)
+from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Quaternion, Vector
 
 POSITION_KEYS = {"xyz": 1.0, "translation": 1.0, "position": 1.0, "xyz_mm": 0.001, "xyz_cm": 0.01}
+POSITION_KEYS |= dict.fromkeys(POSITION_WORDS, 1.0)
 TIMES = ("stamp_ns", "source_stamp_ns", "fixed")
 SPREAD = ("count", "used", "distance_rms", "distance_max", "angle_rms", "angle_rms_deg", "angle_max", "angle_max_deg",
           "std_x", "std_y", "std_z", "std_angle", "std_angle_deg")  # fmt: skip
 VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angular_z")  # m/s, rad/s
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
-NAMES = frozenset(("name", "parent"))
+NAMES = frozenset((*NAME_KEYS, *PARENT_NAMES))
+OTHER_NAMES = NAMES.difference(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit into
 MOST_CHARACTERS = 80
 SCALE = "scale"
@@ -120,8 +142,10 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
             uncertain = read_covariance(mapping, reading)
         for key, value in mapping.items():
-            if key in POSITION_KEYS:
+            if key in POSITION_KEYS and is_position(key, value):
                 position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
+            elif key in LISTED_WORDS and not is_rotation(key, value):
+                raise Misfit(f"expected the numbers of {'a position' if key in POSITION_WORDS else 'a rotation'}")
             elif key in ROTATION_KEYS or key == AXES_KEY:
                 moved, turned = read_rotation(key, value, reading)
                 rotation = turned if rotation is None else agreeing_rotation(rotation, turned)
@@ -134,8 +158,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     finally:
         reading.degrees = outer_degrees
     name, parent = mapping.get("name", ""), mapping.get("parent", "")
-    if not (name and parent and type(name) is type(parent) is str):
-        name, parent = read_name(mapping, "name"), read_name(mapping, "parent")
+    if not (name and parent and type(name) is type(parent) is str) or not OTHER_NAMES.isdisjoint(mapping):
+        name, parent = _agreeing_name(mapping, NAME_KEYS), _agreeing_name(mapping, PARENT_NAMES)
     pose = Pose(position, rotation, name, parent, None, uncertain)
     return inverted(pose) if "inverse" in mapping and _read_flag(mapping["inverse"]) else pose
 
@@ -162,6 +186,15 @@ def read_name(mapping: dict[str, Any], key: str) -> str | None:
         found = "nothing" if value in (None, "") else kind(value)
         raise Misfit(f"{key} must be a frame's name, found {found}; leave {key} out or quote the name", (key,))
     return value
+
+
+def _agreeing_name(mapping: dict[str, Any], keys: Sequence[str]) -> str | None:
+    """Read a frame's name under any of its keys; raises Misfit where two of them differ."""
+    found = [(key, name) for key in keys if (name := read_name(mapping, key)) is not None]
+    for key, name in found[1:]:
+        if name != found[0][1]:
+            raise Misfit(f"{key} says {shown(name)} and {found[0][0]} says {shown(found[0][1])}; keep one", (key,))
+    return found[0][1] if found else None
 
 
 def read_angle_unit(value: Any) -> bool:
@@ -207,9 +240,18 @@ def refuse_scale(value: Any) -> None:
 
 def read_position(value: Any, unit: float) -> Vector:
     """Read [x, y, z] or {x, y, z}, in metres or in `unit` = 0.001 of them."""
-    x, y, z = read_numbers(value, ("x", "y", "z"), partial=True)
     parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
+    x, y, z = read_numbers(value, XYZ, partial=True, each=length_reader(parts))
     return (x, y, z) if parts == 1 else (x / parts, y / parts, z / parts)
+
+
+def length_reader(parts: float) -> Callable[[Any], float]:
+    """Return what reads a number of a position in so many parts of a metre; metres may say another unit, 10cm."""
+
+    def read(text: Any) -> float:
+        return parse_length(text) if type(text) is str and parts == 1.0 else read_number(text)
+
+    return read
 
 
 def _only_position(given: Vector | None, moved: Vector) -> Vector:
@@ -245,6 +287,7 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     """Name every unknown key of an entry, each with its nearest known one."""
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
+    known -= LISTED_WORDS
     if unknown:
         named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
         choices = ", ".join(ROTATIONS)

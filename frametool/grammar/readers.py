@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     Quaternion = tuple[float, float, float, float]
 
 
+NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # what a pose is the pose of
+PARENT_NAMES = ("parent", "parent_frame_id", "parent_frame", "frame_id")  # what it is given in
 INDICES: tuple[Path, ...] = tuple((index,) for index in range(16))
 
 
@@ -176,15 +178,27 @@ def read_number(value: Any) -> float:
     return parse_number(value)
 
 
+def places_in(value: list[Any]) -> Sequence[tuple[int, ...]]:
+    """Return where the numbers of a list stand, also of one written as a column or a row of a matrix: [[x], ..]."""
+    if value and all(type(each) is list and len(each) == 1 for each in value):
+        return [(at, 0) for at in range(len(value))]
+    if len(value) == 1 and type(value[0]) is list:
+        return [(0, at) for at in range(len(value[0]))]
+    return [(at,) for at in range(len(value))]
+
+
 def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> list[Any]:
     """Return the values of a list of fixed length, or of a mapping by these names, in their order.
 
     partial: names missing in a mapping count as 0.
     """
     if type(value) is list:
-        if len(value) != len(names):
-            raise Misfit(f"expected {len(names)} numbers ({' '.join(names)}), found {len(value)}")
-        return value
+        texts: list[Any] = value
+        if value and type(value[0]) is list:
+            texts = [value[path[0]][path[1]] if len(path) > 1 else value[path[0]] for path in places_in(value)]
+        if len(texts) != len(names):
+            raise Misfit(f"expected {len(names)} numbers ({' '.join(names)}), found {len(texts)}")
+        return texts
     if type(value) is not dict:
         raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
     if (*value,) == names:  # most mappings, and in their order
@@ -196,23 +210,33 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
     return [value.get(name, "0") for name in names]
 
 
-def read_numbers(value: Any, names: Sequence[str], *, partial: bool = False) -> tuple[float, ...]:
-    """Read a list of fixed length, or a mapping by these names, as floats."""
+def read_numbers(
+    value: Any, names: Sequence[str], *, partial: bool = False, each: Callable[[Any], float] = read_number
+) -> tuple[float, ...]:
+    """Read a list of fixed length, or a mapping by these names, as floats.
+
+    each: reads one that is no plain number
+    """
     texts = read_texts(value, names, partial=partial)
     try:
         return tuple(map(parse_number, texts))
     except (ValueInvalid, TypeError):
-        raise misfit_among(texts, value, names, read_number) from None
+        pass
+    try:
+        return tuple(map(each, texts))
+    except (ValueInvalid, TypeError):
+        raise misfit_among(texts, value, names, each) from None
 
 
 def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: Callable[[Any], Any]) -> Misfit:
     """Find which of several values does not fit, and name its place."""
     for index, text in enumerate(texts):
+        place: Path = (names[index],) if type(value) is dict else places_in(value)[index]
         try:
             read(text)
         except Misfit as error:
-            return error.below(names[index] if type(value) is dict else index)
+            return error.below(*place)
         except ValueInvalid as error:
             misfit = NotARotation if isinstance(error, NotFinite) else Misfit
-            return misfit(str(error), (names[index] if type(value) is dict else index,), rule=error.rule)
+            return misfit(str(error), place, rule=error.rule)
     return Misfit("expected numbers")

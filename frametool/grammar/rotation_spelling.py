@@ -9,7 +9,7 @@ from frametool.errors import ValueInvalid, bare, overheard, shown
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, ROTATIONS, ROWS, Notation, axes_name
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_texts, within
+from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_texts, within
 from frametool.text.numbers import NotFinite, half_unit, parse_angle, parse_number
 
 if TYPE_CHECKING:
@@ -19,7 +19,15 @@ if TYPE_CHECKING:
 
     Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
 
-ALIASES = {"rotation": "quaternion", "orientation": "quaternion"}  # as ROS messages name it
+# what others call a position in metres, and a rotation (OpenCV, COLMAP): ours that it means, "" where the shape of its
+# value says so.  Only a list or mapping under these words is meant; `t` may be a time, and `T` is a 4x4 matrix too
+POSITION_WORDS = ("tvec", "trans", "pos", "t", "T")
+ROTATION_WORDS = {
+    "rvec": "rotvec_rad", "qvec": "wxyz", "R": "matrix", "T": "matrix", "rotation_matrix": "matrix",
+    "rot": "", "quat": "", "rotation": "", "orientation": "",
+}  # fmt: skip
+LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotation", "orientation"))
+XYZ = ("x", "y", "z")
 AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi
 AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
@@ -31,10 +39,50 @@ def _rotation_keys() -> dict[str, Notation]:
     for name, row in ROTATIONS.items():
         for spelled in (name, f"{name}_deg", f"{name}_rad") if row.angles else (name,):
             keys[spelled] = parse_notation(spelled)
-    return keys | {alias: keys[name] for alias, name in ALIASES.items()}
+    return keys | {word: keys[name or "quaternion"] for word, name in ROTATION_WORDS.items()}
 
 
 ROTATION_KEYS = _rotation_keys()
+
+
+def is_position(key: str, value: Any) -> bool:
+    """Tell whether a key of a position says one with this value: of the words of others a list or mapping does."""
+    if key in ("t", "T"):
+        return type(value) is list and len(value) in (1, 3) and len(places_in(value)) == len(XYZ)
+    return key not in LISTED_WORDS or type(value) in (list, dict)
+
+
+def is_rotation(key: str, value: Any) -> bool:
+    """Tell whether a key says a rotation with this value; raises nothing, what is wrong with it reading says."""
+    if key not in LISTED_WORDS:
+        return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
+    if key not in ROTATION_WORDS or type(value) not in (list, dict):
+        return False
+    if key in ("R", "T"):
+        return type(value) is list and (key == "R" or len(value) == 16 or (len(value) in (3, 4) and _is_rows(value)))
+    return True
+
+
+def _is_rows(value: list[Any]) -> bool:
+    return all(type(row) is list and len(row) > 1 for row in value)
+
+
+def own_key(key: str, value: Any) -> str:
+    """Return the key of ours that a key of a rotation means with its value.
+
+    Raises Misfit for three or four numbers under a word that does not say what they are.
+    """
+    is_short = key == "R" and len(value) in (3, 4) and not _is_rows(value)
+    if (meant := ROTATION_WORDS.get(key, key)) and not is_short:
+        return meant
+    if type(value) is dict:
+        return "rpy" if not {"roll", "pitch", "yaw"}.isdisjoint(value) else "quaternion"
+    if type(value) is list and (len(value) == 9 or (value and _is_rows(value))):
+        return "matrix"
+    if type(value) is list and len(value) == 3:
+        numbers = bare(", ".join(map(str, value)))
+        raise Misfit(f"{key} [{numbers}] does not say what it is; write rpy: [..], rpy_deg: [..] or rotvec: [..]")
+    return "quaternion"
 
 
 def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None, Quaternion]:
@@ -76,8 +124,10 @@ def shape_of(key: str, value: Any) -> Spelled:
     if _is_several(key, value):
         bound, texts, places = shape_of(key, value[0])
         return bound, texts, [("", *place) for place in places]
-    notation = ROTATION_KEYS[key]
+    notation = ROTATION_KEYS[own_key(key, value)]
     shape = notation.representation.shape
+    if shape == NAMED and type(value) is list:
+        raise _without_order(key, notation, value)
     return _take_parts(notation, value, shape) if isinstance(shape, dict) else SHAPES[shape](notation, value)
 
 
@@ -216,24 +266,25 @@ def _list_or_map(notation: Notation, value: Any) -> Spelled:
     row = notation.representation
     is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
     columns = row.whole.columns if row.whole and is_whole else row.columns
+    if type(value) is dict and value.keys() == {*row.names}:
+        columns = row.names
     texts = read_texts(value, columns, partial=bool(row.angles))
-    return notation, texts, INDICES if type(value) is list else [(name,) for name in columns]
+    return notation, texts, places_in(value) if type(value) is list else [(name,) for name in columns]
 
 
 def _take_named(notation: Notation, value: Any) -> Spelled:
-    """Take a mapping by short names; a list would not say its order."""
-    names = notation.names
-    if type(value) is list:
-        numbers = bare(", ".join(map(str, value)))
-        others = [
-            f"{name}: [..]" for name, row in ROTATIONS.items()
-            if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
-        ]  # fmt: skip
-        named = ", ".join(f"{name}:" for name in names)
-        raise Misfit(
-            f"{notation.representation.name} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}"
-        )
-    return notation, read_texts(value, names), [(name,) for name in names]
+    """Take a mapping by short names."""
+    return notation, read_texts(value, notation.names), [(name,) for name in notation.names]
+
+
+def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
+    """Build the error for a list where only names would say the order."""
+    others = [
+        f"{name}: [..]" for name, row in ROTATIONS.items()
+        if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
+    ]  # fmt: skip
+    numbers, named = bare(", ".join(map(str, value))), ", ".join(f"{name}:" for name in notation.names)
+    return Misfit(f"{key} [{numbers}] has no order; write {', '.join(others)} or {{{named}}}")
 
 
 def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:

@@ -42,9 +42,14 @@ _ROTATIONS = (
 _TRIPLE = rf"\[({NUMBER}(?:[ |]+{NUMBER}){{2}})\]"
 _GAZEBO = re.compile(rf"Pose \[ XYZ \(m\) \] \[ RPY \(rad\) \]:\s*{_TRIPLE}\s*{_TRIPLE}")
 _ARGS = re.compile(r"\bargs\s*[=:]\s*([\"'])(.*?)\1", re.DOTALL)
+_FRAME = r"[A-Za-z_/][\w./-]*"
+_ARGUMENTS_ALONE = (
+    rf"\s*--(?:[a-z]+-)*[a-z]+[ =]|\s*(?:{NUMBER}\s+){{6,7}}{_FRAME}\s+{_FRAME}(?:\s+\d+)?\s*\Z"
+)  # fmt: skip
 _BEGIN = re.compile(
     rf"""(?x)\s*+(?:
-    (?:[A-Za-z_]\w*+\s*+=\s*+)?                               # T =
+    (?:[A-Za-z_]\w*+\s*+=\s*+)?[pP]\[ | (?:\w+\s+)*:?(?:robtarget|pose)\s+\w+\s*:=    # Universal Robots, ABB
+    | (?:[A-Za-z_]\w*+\s*+=\s*+)?                               # T =
     (?: [A-Za-z_][\w.]*+\(\s*+[-+.\d\[({{A-Za-z_]             # array([[.., Quaternion(x=..
       | [\[({{][\[({{\s]*+(?:{NUMBER}|nan|-?inf)(?:[\s;`*]|[,\])}}])   # [[1. 0., [1 0; 0 1], [0, 0, 0.7, 0.7]
       | [\[({{][\[({{\s]*+(?:np\.|array|Array|Float)
@@ -163,15 +168,18 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
     """Read the arguments of static_transform_publisher: `args=".."` of launch files, or a whole call."""
     text = source.text
     calls = [match[2] for match in _ARGS.finditer(text)]
-    if not calls:
+    is_bare = not calls
+    if is_bare:
         lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
-        calls = [line for line in lines if CALL in line or re.match(r"\s*--(?:[a-z]+-)*[a-z]+[ =]", line)]
+        calls = [line for line in lines if CALL in line or re.match(_ARGUMENTS_ALONE, line)]
         if len(calls) < len(lines):
             return []
     values = []
     for call in calls:
         reading = Reading(source, normalize=normalize)
         pose = read_call(call, reading)
+        if is_bare and re.match(rf"\s*(?:{NUMBER}\s+){{6}}{_FRAME}\s", call):
+            warn(f"{source.name}: taken for arguments of {CALL}: x y z yaw pitch roll PARENT CHILD")
         for note in reading.notes:
             warn(f"{source.name}: {note.message}", rule=note.rule)
         numbers = [repr(each) for each in pose.components]

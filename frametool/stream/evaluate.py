@@ -36,7 +36,7 @@ from frametool.stream.stamp_columns import (
     weights_of,
 )
 from frametool.stream.text_parts import Const, In, Instead, Out, Word
-from frametool.text.numbers import read_number_or_angle
+from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Spans
 
@@ -186,7 +186,7 @@ class Run:
         """Read what is no plain number: an angle with its unit, or one with marks where it may have them."""
         if column in self.plan.marked:
             return self.plan.marked[column](text)
-        return read_number_or_angle(text, self._unit_of(column))
+        return self._with_unit(text, column)
 
     def _check_covariances(self, numbers: Floats) -> None:
         """Refuse rows whose covariance is none; sigmas cannot be negative."""
@@ -226,13 +226,13 @@ class Run:
                 if told := uncertainty.doubt([float(entry[row]) for entry in entries]):
                     self.rounded.append(RowNote(self.block.line_of(row), uncertainty.WIDE_RULE, told))
 
-    def _unit_of(self, column: int) -> bool | None:
-        """Tell whether a number is in degrees; None if it is no angle."""
+    def _with_unit(self, text: str, column: int) -> float:
+        """Read an angle, or a length where metres are wanted, which may say its own unit."""
         for shape in self.plan.shapes:
             if column < shape.size:
-                return shape.in_degrees(column)
+                return read_number_or_angle(text, shape.in_degrees(column), metres=shape.in_metres(column))
             column -= shape.size
-        return None
+        return parse_number(text)
 
     def _movers(self) -> list[Rigid | None]:
         """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, listing, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
+from frametool.grammar.names import COLUMN_WORDS
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 POSITIONS = (XYZ, ("tx", "ty", "tz"), ("px", "py", "pz"))
+TURNED = ("rvec_", "qvec_", "quat_", "rot_")  # x, y and z behind these are no position
 TELLING = ("position", "translation", "point", "vector")
 LETTERS = {TWIST: ("vx vy vz wx wy wz",), WRENCH: ("fx fy fz tx ty tz", "fx fy fz mx my mz")}
 NO_UNIT = ("", "-", "1")
@@ -126,8 +128,8 @@ class Header:
                 behind = said.end() if said else end
                 key = folded[: token.start()], folded[behind:]
                 self.affixes.setdefault(key, (bare[: token.start()], bare[behind:]))
-                unit = bracket[1] if bracket else (said[1] or said[2]) if said else ""
-                self.found[word].setdefault(key, []).append((place, unit))
+                unit = bracket[1] if bracket else (said[1] or said[2]) if said else "rad" * word.startswith("rvec_")
+                self.found[COLUMN_WORDS.get(word, word)].setdefault(key, []).append((place, unit))
 
     def match(self, base: Sequence[str], alike: Sequence[int] = ()) -> Iterator[Match]:
         """Yield the columns that have all words of a base under common affixes.
@@ -175,7 +177,7 @@ WORDS = {word for row in ROTATIONS.values() for word in (*row.columns, *row.name
     *POSITIONS, *(row.whole.columns for row in ROTATIONS.values() if row.whole)
 )
 BY_TOKEN: dict[str, list[str]] = {}
-for _word in sorted(WORDS):
+for _word in sorted(WORDS.union(COLUMN_WORDS)):
     BY_TOKEN.setdefault(_word.split("_")[0], []).append(_word)
 
 
@@ -191,11 +193,13 @@ def find_positions(header: Header) -> list[Columns]:
     for at, match in enumerate(match for row in ROTATIONS.values() for match in header.match(row.columns)):
         for place in match.places:
             turns.setdefault(place, set()).add(at)
-    found = []
+    found: list[Columns] = []
     for base in POSITIONS:
         for match in header.match(base, range(3)):
             in_rotation = set.intersection(*(turns.get(place, set()) for place in match.places))
             if in_rotation or (match.prefix, match.suffix) in named or not {*ANGLES, "s"}.isdisjoint(match.units):
+                continue
+            if match.prefix.lower().endswith(TURNED) or match.places in [each.places for each in found]:
                 continue
             found.append(_position(header, match))
     telling = [each for each in found if any(word in each.prefix.lower() for word in TELLING)]
@@ -225,6 +229,7 @@ def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> lis
         for row in rows if row.shape == NAMED
         for match in _named_maps(header, bare=given is not None)
     ]  # fmt: skip
+    found = [*{frozenset(each.places): each for each in found}.values()]  # qvec_w .. are found by either of two names
     return _without_strays(found) or [each for row in rows for each in _standing_alone(row, header, given)]
 
 
@@ -327,7 +332,7 @@ def plain_pose(names: Sequence[str]) -> PoseColumns:
         raise ValueInvalid(f"expected one {what}, found {shown}")
     rotation = rotations[0] if rotations else None
     if rotation is None and (half := _half_rotation(header, None)):
-        raise ValueInvalid(half.replace("columns", "keys").replace("choose with --columns", "leave it out"))
+        raise ValueInvalid(half.replace("choose with --columns", "leave it out").replace("columns", "keys"))
     position = positions[0] if positions and not (rotation and rotation.whole) else None
     if position is None and rotation and not rotation.whole:
         position = _half_position(header, rotation)
@@ -371,6 +376,10 @@ def _half_rotation(header: Header, given: Notation | None) -> str:
     if given is None and (match := next(_named_maps(header, bare=True), None)):
         shown = header.columns(match).shown
         return f"{shown} may be a quaternion or a point and a number; add --from xyzw, or --columns with the three"
+    for match in header.match(XYZ) if given is None else ():
+        if match.prefix.lower().endswith("rot_"):
+            shown, axes = header.columns(match).shown, "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
+            return f"columns {shown} do not say what they are; {axes}"
     for row in _searched(given):
         for match in header.match_partly(row.columns):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):

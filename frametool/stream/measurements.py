@@ -214,7 +214,7 @@ def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
         for at, result, given in zip(block.lines.tolist(), results, rows.given.T.tolist(), strict=True):
             pose, cells = result.pose, result.extras
             try:
-                child = _one_child(cells.get(CHILD), pose.name)
+                child = _one_child(pose.name, cells.get("name"))
                 inverse = _read_flag(cells.get("inverse"))
             except ValueInvalid as error:
                 raise FormatError(str(error), source=file.name, line=line + at) from None

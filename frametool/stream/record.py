@@ -14,22 +14,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, first_of, shown
 from frametool.geometry.representations import ROTATIONS, notation
-from frametool.grammar.names import EARTH_FRAMES, NAME_KEYS, PARENT_KEYS, may_be_on_earth, may_be_uncertain
+from frametool.grammar.names import (
+    EARTH_FRAMES,
+    NAME_KEYS,
+    PARENT_KEYS,
+    may_be_on_earth,
+    may_be_uncertain,
+)
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
     POSE_KEYS,
     POSITION_KEYS,
     SCALE,
     Pose,
+    length_reader,
     read_angle_unit,
     read_position,
     unknown_keys,
 )
-from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, read_numbers, within
+from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_numbers, within
 from frametool.grammar.rotation_spelling import (
     AXES_KEY,
+    LISTED_WORDS,
     ROTATION_KEYS,
     as_meant,
+    is_position,
+    is_rotation,
     read_components,
     read_rotation,
     shape_of,
@@ -39,7 +49,7 @@ from frametool.stream.stamp_source import key_path
 from frametool.text.numbers import NotFinite, parse_number, read_number_or_angle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from frametool.documents.source import Source
     from frametool.errors import FormatError
@@ -52,7 +62,8 @@ POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a uni
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message")
 LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
 COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
-NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS))  # a mapping with no other keys may be the identity
+# a mapping with no other keys may be the identity
+NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTED_WORDS)
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
@@ -78,7 +89,7 @@ class Record(NamedTuple):
     numbers: the path of each; None for a number that is not written and counts as 0
     values: the numbers, in the order of `shape`
     key: the key of the position; "" where each of its numbers is a member of the record, whose keys are `members`
-    rotation: the key of the rotation; others: further keys that say the same rotation
+    rotation: the key of the rotation; others: further keys that say the same rotation or position
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
     covariances: the keys of those whose numbers come last, or of a scale
     known: where each of them begins, which -1 would make one of those
@@ -157,7 +168,7 @@ def _nothing_in(document: Any) -> Misfit:
         if type(document) is list and document:
             return _bare_numbers(document)
         return Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(document)}")
-    wanted = (*POINT_KEYS, *ROTATION_KEYS)
+    wanted = {*POINT_KEYS, *ROTATION_KEYS} - LISTED_WORDS
     near = [(key, found) for key in document if key not in POSE_KEYS and (found := did_you_mean(key, wanted))]
     if near:
         return _unknown(near)
@@ -279,7 +290,15 @@ def _holds_numbers(value: dict[str, Any]) -> bool:
 
 
 def _is_holder(value: dict[str, Any]) -> bool:
-    return any(_holds(key, each) for key, each in value.items())
+    return bool(_rotations(value)) or any(_holds_position(key, each) for key, each in value.items())
+
+
+def _rotations(value: dict[str, Any]) -> list[str]:
+    """Return the keys of a mapping that hold a rotation; the R of a CameraInfo rectifies pictures."""
+    return [
+        key for key, each in value.items()
+        if is_rotation(key, each) and not (key == "R" and not {"K", "P"}.isdisjoint(value))
+    ]  # fmt: skip
 
 
 def _parts_of(value: dict[str, Any]) -> str | None:
@@ -296,12 +315,8 @@ def _refuse_several(value: dict[str, Any], found: list[str], path: Path) -> None
         raise Misfit(f"expected one point or pose in a record, found several: {', '.join([*found, *more])}", path)
 
 
-def _holds(key: str, value: Any) -> bool:
-    return (_is_rotation(key, value) or key in POINT_KEYS) and not (key == "point" and type(value) is str)
-
-
-def _is_rotation(key: str, value: Any) -> bool:
-    return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
+def _holds_position(key: str, value: Any) -> bool:
+    return key in POINT_KEYS and is_position(key, value) and not (key == "point" and type(value) is str)
 
 
 def _record(document: Any, place: RecordPlace, request: Request, reading: Reading, above: Path) -> Record:
@@ -425,7 +440,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     """Read what a mapping says: its position, then its rotation; or the two vectors of a twist or a wrench."""
     if (parts := _parts_of(value)) is not None and not _is_holder(value):
         return _two_vectors(value, ACCEL if path[-1:] == (ACCEL,) else parts, path, request)
-    positions = [key for key in value if key in POINT_KEYS and _holds(key, value[key])]
+    positions = [key for key in value if _holds_position(key, value[key])]
     if any(map(may_be_on_earth, value)):
         from frametool.stream.earth_records import placed_record
 
@@ -434,12 +449,15 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
 
         if (found := placed_record(value, positions, inner, reading, request)) is not None:
             return _placed(found, path)
-    rotations = [key for key, each in value.items() if _is_rotation(key, each)]
+    rotations = _rotations(value)
     flat = _flat_pose(value, rotations)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
     # the grammar of poses allows that several say the same thing twice
     if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
         raise Misfit(f"expected one position, found {' and '.join(positions)}", (positions[1],), key=True)
+    if positions and flat and flat.position and not flat.position.absent:
+        shown_both = f"{positions[0]} and {flat.position.shown}"
+        raise Misfit(f"expected one position, found {shown_both}", (flat.position.names[0],), key=True)
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
     kind = _kind(key, turned or (not request.operation.moves and _turns_in_doubt(value)), request)
@@ -455,7 +473,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         if not (request.operation.multiples and _is_matrix(rotations[0])):
             within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
-        record = record._replace(others=tuple(rotations[1:]))
+    record = record._replace(others=(*rotations[1:], *positions[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
     record = record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
     return _given_on_earth(record, request) if request.given_place else record
@@ -484,8 +502,8 @@ def _beside_place(rest: dict[str, Any], path: Path, reading: Reading, request: R
 
         covariance = read_covariance(rest, reading)
     bare = {key: each for key, each in rest.items() if key not in COVARIANCE_KEYS}
-    rotations = [key for key, each in bare.items() if _is_rotation(key, each)]
-    positions = [key for key in bare if key in POINT_KEYS and _holds(key, bare[key])]
+    rotations = _rotations(bare)
+    positions = [key for key in bare if _holds_position(key, bare[key])]
     if not (rotations or positions or _flat_pose(bare, rotations)):
         return Pose(covariance=covariance), []
     record = _mapping(bare, path, reading, request._replace(kind=POSE))
@@ -539,20 +557,20 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     """Stop at a key that is nearly that of a rotation or a position, where no other says it."""
     if (rotations and position) or KNOWN.issuperset(value):
         return
-    wanted = [*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)]
+    wanted = {*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)} - LISTED_WORDS
     unknown = islice((key for key in value if key not in KNOWN), MOST_COMPARED)
     if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record
-OTHER_WORDS = dict.fromkeys(("q", "quat", "quats", "quaternions", "orient", "rot", "so3"), "quaternion") | {
-    "pos": "xyz", "trans": "xyz", "tvec": "xyz", "loc": "xyz", "location": "xyz", "xzy": "xyz",
-    "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "rvec": "rotvec", "angle_axis": "axis_angle",
+OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "quaternion") | {
+    "loc": "xyz", "location": "xyz", "xzy": "xyz",
+    "rpi": "rpy", "ypr": "rpy", "eul": "rpy", "euler_angles": "rpy", "angle_axis": "axis_angle",
 }  # fmt: skip
 
 
-def _meant(key: str, value: Any, wanted: Sequence[str]) -> str:
+def _meant(key: str, value: Any, wanted: Collection[str]) -> str:
     """Return `; did you mean ..` for a key that is nearly a wanted one, or another word for it; "" for any other."""
     word = OTHER_WORDS.get(key.lower(), "") if type(value) in (list, dict) else ""
     return f"; did you mean {shown(word)}?" if word in wanted else did_you_mean(key, wanted, cutoff=0.75)
@@ -600,7 +618,7 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
 
 def _with_members(record: Record, value: dict[str, Any], columns: Columns) -> Record:
     """Add a position whose numbers are members of the record itself."""
-    values = tuple(_number(value, name, None) for name in columns.names)
+    values = tuple(_number(value, name, None, metres=columns.unit == 1.0) for name in columns.names)
     paths = tuple((*record.path, name) for name in columns.names)
     shape = record.shape._replace(unit=columns.unit, absent=columns.absent)
     return record._replace(shape=shape, numbers=paths, values=values, members=columns.names)
@@ -632,12 +650,14 @@ def _with_flat_rotation(
     )
 
 
-def _number(value: dict[str, Any], key: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
-    """Read a member that is a number or an angle."""
+def _number(
+    value: dict[str, Any], key: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: no angle
+) -> float:
+    """Read a member that is a number, an angle, or a length."""
     if type(value[key]) is not str:
         raise Misfit(f"expected a number, found {kind(value[key])}", (key,))
     try:
-        return read_number_or_angle(value[key], degrees)
+        return read_number_or_angle(value[key], degrees, metres=metres)
     except ValueInvalid as error:
         raise (NotARotation if isinstance(error, NotFinite) else Misfit)(str(error), (key,)) from None
 
@@ -677,10 +697,11 @@ def _kind(key: str, rotations: object, request: Request) -> str:
 def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:
     """Add the position: a list, or a map in which, if it may be partial, what is missing is 0."""
     below = (*record.path, record.key)
-    x, y, z = within((record.key,), read_numbers, value, XYZ, partial=partial)
-    steps = INDICES[:3] if type(value) is list else tuple((name,) for name in XYZ)
+    parts = round(1.0 / metre, 6)
+    x, y, z = within((record.key,), read_numbers, value, XYZ, partial=partial, each=length_reader(parts))
+    steps = places_in(value) if type(value) is list else tuple((name,) for name in XYZ)
     paths = tuple((*below, *step) if type(value) is list or step[0] in value else None for step in steps)
-    return record._replace(shape=record.shape._replace(unit=round(1.0 / metre, 6)), numbers=paths, values=(x, y, z))
+    return record._replace(shape=record.shape._replace(unit=parts), numbers=paths, values=(x, y, z))
 
 
 def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
@@ -750,7 +771,7 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
             hint = f"leave {key} out or quote the name"
             raise Misfit(f"{key} must be a frame's name, found nothing; {hint}", (*path, key))
         if text and found.text and text != found.text:
-            where = ".".join(map(str, found.paths[0][-2:]))
+            where = ".".join(map(str, found.paths[0][1:][-2:]))  # without the count of the document
             raise Misfit(f"{key} says {shown(text)} and {where} says {shown(found.text)}; keep one", (*path, key))
         found = Name(found.text or text or None, (*found.paths, (*path, key)))
     return found

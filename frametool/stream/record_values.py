@@ -457,12 +457,12 @@ def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) ->
     if type(node.value) is list:
         return [plain(item, number) for item in node.value]
     refuse_alias(node)
+    if node.value is not None and (found := number(node.value)) is not None:
+        return found
     if node.quote or node.value is None:
         return node.value
     if node.value in ("null", "~", ""):
         return None
-    if (found := number(node.value)) is not None:
-        return found
     is_plain = node.value in ("true", "false") or re.fullmatch(JSON_NUMBER, node.value)
     return Verbatim(node.value) if is_plain else node.value
 

@@ -166,7 +166,7 @@ class Operation(NamedTuple):
     @property
     def keeps_position(self) -> bool:
         """Tell whether positions stay as they are written."""
-        return self.changes_nothing or (self.turns and self.left is None and not self.mirrors)
+        return self.changes_nothing or (self.turns and self.left is None and not (self.mirrors or self.inverse))
 
     def move(self, shape: Shape, own: Components, beside: Components, edge: Components | None) -> Components:
         """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes beside it stays."""
@@ -345,6 +345,15 @@ class Request(NamedTuple):
     earth: Earth | None = None
     offset_ns: int = 0
     window: tuple[int, int] | None = None
+
+    def of_inverses(self) -> Request:
+        """Return what is done with the inverse of each row; its frames have changed places."""
+        rename, operation = self.rename, self.operation
+
+        def renamed(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
+            return rename(name, parent) if rename else (name, parent)
+
+        return self._replace(operation=operation._replace(inverse=not operation.inverse), rename=renamed)
 
     @property
     def in_order(self) -> bool:

@@ -136,6 +136,13 @@ class Shape(NamedTuple):
             return None
         return self.degrees and index not in self.radians_at
 
+    def in_metres(self, place: int) -> bool:
+        """Tell whether a row's number is a length in metres, of a point, a vector or a position."""
+        if self.place is not None or place >= self.position_size:
+            return False
+        there = [each for each in range(3) if each not in self.absent]
+        return bool(_each(self.unit or 1.0)[there[place]] == 1.0)
+
     def position(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in metres; 0 where there is no position."""
         if self.joined:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import quoted
 from frametool.geometry.representations import ROTATIONS
-from frametool.grammar.names import EARTH_FRAMES, PARENT_KEYS, PLACE_KEYS
+from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, with_entries
-from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
+from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
 from frametool.stream.text_parts import Const, IfLocked, Out, Word
@@ -60,7 +60,7 @@ def null_edits(node: Node) -> list[Edit]:
         return []
     found = []
     for key, (_, value) in node.value.items():
-        if key in OURS or key in PLACE_KEYS:
+        if (key in OURS and (key not in LISTED_WORDS or type(value.value) in (list, dict))) or key in PLACE_KEYS:
             found.append(Edit(value.start, value.end, (Const(b"null"),)))
         else:
             found += null_edits(value)
@@ -284,7 +284,7 @@ class Splicer:
         if not old.paths and self.record.shape.kind not in SIX:  # a bare Twist or Wrench has no field for it
             self._insert_before(self._first_key(), self._member({key: new}, 0))
         for path in old.paths:
-            if new is None and path[:-1] == self.record.path and path[-1] in ("name", *PARENT_KEYS):
+            if new is None and path[:-1] == self.record.path and path[-1] != "child_frame_id":
                 self.dropped.add(str(path[-1]))
             else:
                 node = self.root.at(path)

@@ -17,7 +17,7 @@ from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import POSE_KEYS
-from frametool.grammar.rotation_spelling import AXES_KEY, ROTATION_KEYS
+from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS
@@ -53,8 +53,10 @@ NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance b
 # scalars under these keys decide what a record is, wherever in it they stand ..
 OF_PLACES = ("no-alt", "band-s", "stays", "left-out")  # the rules of notes on places, which rows do not tell
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
-# .. and these in the mappings that hold the record
-_WORDS = frozenset(word.partition("_deg")[0].partition("_rad")[0] for word in (*OURS, *POSE_KEYS, "theta"))
+# .. and these in the mappings that hold the record; a number alone under a word of others is none
+_WORDS = frozenset(
+    word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
+)  # fmt: skip
 
 
 MOST_LEAVES = 2000
@@ -215,6 +217,8 @@ class Template:
                 yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
             elif "sigma" in path or may_be_uncertain(key) or any(path[: len(each)] == each for each in placed):
                 continue  # they say a covariance or a place, and are no numbers of ours
+            elif key in LISTED_WORDS and depth == len(path):
+                yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue
             else:

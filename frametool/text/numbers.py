@@ -84,16 +84,20 @@ def parse_length(text: str) -> float:
     if match := re.fullmatch(_LENGTH, text):
         return parse_number(match[1]) / LENGTHS[match[2]]  # dividing rounds once: 0.02 from 2cm
     reason = _reason(text)
+    if not any(map(str.isdigit, text)):
+        raise _refusal(text, explain_number(text))
     raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT, _ANGLE} else reason}")
 
 
-def read_number_or_angle(text: str, degrees: bool | None) -> float:  # noqa: FBT001 - None: it is no angle
-    """Read a cell: a plain number, or an angle, which may say its own unit, in degrees or radians.
+def read_number_or_angle(
+    text: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: it is no angle
+) -> float:
+    """Read a cell: a plain number, or what may say its own unit, an angle in degrees or radians, a length in metres.
 
     Raises ValueInvalid.
     """
     if degrees is None:
-        return parse_number(text)
+        return parse_length(text) if metres else parse_number(text)
     value, unit = parse_angle(text)
     if unit is None or (unit == "deg") == degrees:
         return value
@@ -140,7 +144,7 @@ def half_unit(text: str) -> float:
     return 0.5 * 10.0 ** min(int(exponent or 0) - len(decimals), 300) if point and decimals.isdigit() else 0.0
 
 
-_UNIT = "has a unit; lengths are in metres (or use xyz_mm)"
+_UNIT = "has a unit where a bare number is expected"
 _ANGLE = "is an angle with a unit where a bare number is expected"
 
 

@@ -309,7 +309,7 @@ def test_a_pipe_named_as_a_file_is_read_once(text: str, place: list[float]) -> N
     assert json.loads(done.stdout)["xyz"] == place
 
 
-@pytest.mark.parametrize(("key", "value", "meant"), [("quat", "[0, 0, 1, 0]", "quaternion"), ("rpi", "[0, 0, 1]", "rpy"), ("rvec", "[0, 0, 1]", "rotvec")])
+@pytest.mark.parametrize(("key", "value", "meant"), [("quats", "[0, 0, 1, 0]", "quaternion"), ("rpi", "[0, 0, 1]", "rpy"), ("eul", "[0, 0, 1]", "rpy")])
 @pytest.mark.parametrize("command", ["convert", "invert"])
 def test_another_word_for_a_rotation_is_refused_with_ours(run: Run, command: str, key: str, value: str, meant: str) -> None:
     done = run(command, f"{{xyz: [1, 2, 3], {key}: {value}}}")

@@ -34,7 +34,7 @@ from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose_algebra import looked_up
-from frametool.text.numbers import NotFinite, parse_number
+from frametool.text.numbers import NotFinite, parse_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -358,7 +358,7 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Source]:
     if kind not in (None, "point", "vector"):
         raise click.UsageError(f"a {kind} is a mapping, e.g. '{{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}'")
     try:
-        numbers = [parse_number(text) for text in texts]
+        numbers = [parse_length(text) for text in texts]
     except NotFinite:
         raise
     except ValueInvalid as error:

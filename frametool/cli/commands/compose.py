@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
 from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
-from frametool.cli.poses import factors_of, rows_among
+from frametool.cli.poses import rows_among, without_inverse
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 
@@ -34,30 +34,23 @@ def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
     inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
     task = PoseTask(options)
-    factors = factors_of(poses)
-    given = [each.argument for each in factors]
     if task.derives:
         plan = task.plan()
         from frametool.explain import derive
 
-        written = [task.written(each) for each in given]
-        turned = [each.turned() if factor.is_inverse else each for each, factor in zip(written, factors, strict=True)]
-        return task.write(derive.compose(plan, *turned))
-    if task.stream.path and "-" not in given:
+        return task.write(derive.compose(plan, *map(task.written, poses)))
+    if task.stream.path and not any(without_inverse(each)[0] == "-" for each in poses):
         raise click.UsageError("-i FILE is read where - stands among the poses")
     from frametool.stream.request import Operation
 
     request = task.request(operation=Operation(similar=True, multiples=scale))
-    rows = rows_among(given, request, task.has_table)
-    left = [factor.of(pose) for factor, pose in zip(factors, rows.before, strict=False)]
-    right = [factor.of(pose) for factor, pose in zip(factors[rows.at + 1 :], rows.behind, strict=True)]
-    row = factors[rows.at]
-    before = reduce(product, left) if left else None
+    rows = rows_among(poses, request, task.has_table)
+    before = reduce(product, rows.before) if rows.before else None
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
-        result = reduce(product, [*filter(None, [before]), row.of(Pose(name=name, parent=parent)), *right])
+        result = reduce(product, [*filter(None, [before]), Pose(name=name, parent=parent), *rows.behind])
         return result.parent, result.name
 
-    behind = tuple(each.placed for each in right)
-    operation = Operation(before and before.placed, behind, inverse=row.is_inverse, similar=True, multiples=scale)
+    behind = tuple(each.placed for each in rows.behind)
+    operation = Operation(before and before.placed, behind, similar=True, multiples=scale)
     return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)

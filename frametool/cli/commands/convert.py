@@ -19,7 +19,15 @@ from frametool.cli.options import (
     pose_result_options,
     window_of,
 )
-from frametool.cli.poses import is_inline, pose_from_numbers, pose_source, rejoined, source_from_numbers, values_of
+from frametool.cli.poses import (
+    is_inline,
+    pose_from_numbers,
+    pose_source,
+    rejoined,
+    source_from_numbers,
+    values_of,
+    without_inverse,
+)
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
@@ -120,10 +128,11 @@ def command(
         from frametool.cli.earth import mapping_of
 
         values, is_numbers = (mapping_of(values, request.given_place),), False
-    if len(values) == 1 and not (is_numbers or stream.path) and task.has_table(values[0]):
+    bare, is_inverse = without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
+    if bare == "-" or (bare and not stream.path and task.has_table(bare)):
         if task.derives:
             raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
-        values = ()
+        values, request = ("-",), request.of_inverses() if is_inverse else request
     is_alone = operation.turns and not values and (task.derives or not stream.has_input())
     if values == ("-",) or not (values or is_alone):
         refuse_unused("is about one rotation that is an argument", "find")

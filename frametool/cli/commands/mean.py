@@ -9,7 +9,7 @@ import click
 
 from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
-from frametool.cli.poses import is_inline, is_pasted, poses_from
+from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
 from frametool.errors import ValueInvalid, warn
 from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
@@ -55,9 +55,11 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
     gathered = Gathered(named=robust)
     request = task.request(extra_column=weights, gathered=gathered)
     status, given = 0, None
-    if len(poses) == 1 and poses[0] != "-" and not stream.path and not is_pasted(poses[0], stream.given):
-        stream.path, poses = poses[0], ()
-    if poses in ((), ("-",)):
+    bare, is_inverse = without_inverse(poses[0]) if len(poses) == 1 else ("", False)
+    if bare == "-" or (bare and not stream.path and not is_pasted(bare, stream.given)):
+        stream.path, poses = stream.path if bare == "-" else bare, ()
+        request = request.of_inverses() if is_inverse else request
+    if not poses:
         status = stream.run(request, task.output)
     else:
         task.only_arguments(poses)

@@ -9,7 +9,7 @@ import click
 from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
 from frametool.cli.group import settings
 from frametool.cli.options import TEXT, ColumnNames, Command, limit_options, pose_result_options, window_of
-from frametool.cli.poses import rows_among
+from frametool.cli.poses import rows_among, without_inverse
 from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative_names
@@ -94,9 +94,10 @@ def command(
         if a not in (None, "-"):
             raise click.UsageError("name A and B; one of them may be - for standard input")
         return task.answer("-", task.request(operation=Operation(of="pair"), poses=2, window=window))
-    if given == ["-", "-"]:
+    bare = [without_inverse(each)[0] for each in given]
+    if bare == ["-", "-"]:
         raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
-    if task.stream.path and "-" not in given:
+    if task.stream.path and "-" not in bare:
         raise click.UsageError("-i FILE is read where - stands for A or B")
     request = task.request(window=window)
     rows = rows_among(given, request, task.has_table)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -48,6 +50,8 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
     """
     flags = {name: value for name in FLAGS if (value := options.pop(name.replace("-", "_"))) is not None}
     form = options.pop("format_name")
+    if len(arguments) == 1 and re.match(r"\s*[-+.\d]+\s", arguments[0]) and not os.path.exists(arguments[0]):
+        arguments = arguments[0].split()  # in quotes
     if not flags and len(arguments) == 1:
         output = Output("tree", format_name=form or "static2", deg=deg, **options)
         tree = load_tree(arguments[0])

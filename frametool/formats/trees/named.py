@@ -22,8 +22,10 @@ from frametool.formats.trees.tree_reader import Unclear, document_edges, named
 from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.edges import Edge, Options
+from frametool.grammar.names import COLUMN_WORDS
 from frametool.grammar.pose import POSE_KEYS, read_angle_unit, read_pose
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind
+from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,13 +39,15 @@ if TYPE_CHECKING:
 NAME = "named"
 WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is none of the names
 PARENTS, CHILDREN = (tuple(dict.fromkeys(keys[at] for keys in FRAME_KEYS[:4])) for at in (0, 1))
-_POSITIONS = ("trans", "pos", "t", "tvec", "translation", "position", "location")
-_TURNS = ("rot", "quat", "q", "rotation", "orientation", "quaternion")
+_POSITIONS = (*POSITION_WORDS, "translation", "position", "location")
+_TURNS = (*(word for word, meant in ROTATION_WORDS.items() if not meant), "q", "quaternion")
+_SPELLED = {"t": "xyz", "q": "quaternion", "r": "rotvec_rad"}  # by the first letter of a column's own name
 _WHOLE = ("value", "pose")  # seven numbers
 # the names of single numbers -> the key of the grammar under which they stand together
 _FLAT = {
-    **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t", "trans_", "translation_", "pos_")},
-    **{f"{word}{axis}": ("quaternion", axis) for axis in "xyzw" for word in ("q", "q_", "rot_", "quat_")},
+    **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t")},
+    **{f"q{axis}": ("quaternion", axis) for axis in "xyzw"},
+    **{word: (_SPELLED[name[0]], word[-1]) for word, name in COLUMN_WORDS.items()},
     **{f"{axis}_{unit}": (f"xyz_{unit}", axis) for axis in "xyz" for unit in ("mm", "cm")},
     **{f"{name}{unit}": (f"rpy{unit}", name) for name in ("roll", "pitch", "yaw") for unit in ("", "_deg", "_rad")},
     **{f"a{axis}": ("axis", axis) for axis in "xyz"},
@@ -165,7 +169,7 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
                 raise Misfit(f"expected 7 numbers, found {found_here}", (key,))
             _put(found, "xyz", value[:3], key)
             _put(found, _ordered(value[3:], order, key), value[3:], key)
-        elif key in _POSITIONS:
+        elif key in _POSITIONS and is_position(key, value):
             _put(found, "xyz", value, key)
         elif key in _TURNS:
             _put(found, *_turn(value, order, key), key)

@@ -21,7 +21,7 @@ from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
-from frametool.grammar.pose import COVARIANCE_KEYS, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
+from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
 from frametool.ros import messages
@@ -81,7 +81,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
         yield from _tree(value, reading)
     elif messages.is_message(value):
         yield from _messages(value, (), reading)
-    elif "name" in value or "parent" in value:
+    elif not NAMES.isdisjoint(value):
         yield from _entry(value, (), reading)
     else:
         raise Misfit(
@@ -154,8 +154,8 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
                 "a root has no pose, its keys are its children",
                 key=True,
             )
-        for key in ("name", "parent"):
-            if key in as_mapping(entry, f"the pose of frame {shown(child)}"):
+        for key in as_mapping(entry, f"the pose of frame {shown(child)}"):
+            if key in NAMES:
                 raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
         pose = _pose(entry, reading, CHILDREN)
         yield from _edges(entry, pose, _above(pose, parent, entry), child, path, reading)
