@@ -19,6 +19,7 @@ from frametool.formats.table import FORMATS, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
+from frametool.grammar.names import EARTH_FRAMES
 from frametool.stream.array_writer import ArrayWriter
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
@@ -68,6 +69,7 @@ class FormatConverter:
         self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
         self.style = style.in_form(style.form)
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
+        self.looks_up_places = request.place is not None and not request.poses  # whose TARGET each row was checked for
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.form].writes)), "points" in writes
         if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.form in LEARNED)):
@@ -147,6 +149,8 @@ class FormatConverter:
         for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
             before, mended = rows.rows, rows.mended
             poses = rows.of_block(text)
+            if self.looks_up_places:
+                poses = poses._replace(parents=EARTH_FRAMES[:1])
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
             if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):

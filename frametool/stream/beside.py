@@ -158,6 +158,9 @@ def covariance_columns(
     """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
     kinds = [shape.kind for shape in shapes]
     passes = request.operation.keeps_frames and request.gathered is None
+    own = shapes[0].place if shapes else None
+    if passes and own is not None and request.place is not None and own.axes != request.place.axes:
+        _refuse_beside(table, own.axes, request.place.axes, source)
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     try:
@@ -181,6 +184,14 @@ def covariance_columns(
     if request.degrees:
         sigma = tuple((at, unit or "deg" * (axis > 2)) for axis, (at, unit) in enumerate(sigma))
     return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
+
+
+def _refuse_beside(table: Table, axes: str, others: str, source: str) -> None:
+    """Raise FormatError for the columns of a covariance that would stay along axes which a result does not have."""
+    if any(find_columns(table.names or (), size)[0] for size in (9, 36)):
+        given = f"along {axes}" if axes else "along the axes there"
+        message = f"the covariance is {given}, the result along {others}; leave its columns out, or --local-axes"
+        raise FormatError(message, source=source, line=1)
 
 
 def with_entries_at(beside: Sequence[int], columns: Sequence[Column], count: int) -> list[Column]:

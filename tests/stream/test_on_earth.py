@@ -578,3 +578,20 @@ def test_the_snippets_of_the_docstrings_run() -> None:
     tree.add("ecef", "map", frametool.earth_pose(48.1, 11.5, 520.0))
     tree.add("ecef", "site", frametool.earth_pose(48.1, 11.5, 530.0, axes="ned"))
     assert tree.lookup("map", "site").xyz == pytest.approx([0.0, 0.0, 10.0], abs=5e-9)
+
+
+def test_columns_of_a_covariance_stay_only_where_their_axes_do(run: Callable[..., Any]) -> None:
+    text = "lat,lon,alt,sigma_x,sigma_y,sigma_z\n48,11,5,1,1,2\n"
+    kept = run("convert", "--to", "utm", "--local-axes", "enu", stdin=text)
+    assert kept.out.splitlines()[1].endswith(",1,1,2")
+    refused = run("convert", "--to", "ecef", "--local-axes", "enu", stdin=text)
+    assert (refused.status, refused.out) == (1, "")
+    assert "the covariance is along enu, the result along ecef; leave its columns out, or --local-axes" in refused.err
+
+
+def test_rows_of_lookups_say_places_in_json_too(run: Callable[..., Any]) -> None:
+    site = "frames: [{name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}]"
+    asked = ("lookup", "site.yaml", "ecef", "--source-column", "f", "-i", "rows.csv", "--to", "lla", "-f", "json")
+    done = run(*asked, files={"site.yaml": site, "rows.csv": "t,f\n1,map\n"})
+    row = json.loads(done.out)
+    assert (row["parent"], row["axes"], row["f"], round(row["lat"], 9)) == ("ecef", "enu", "map", 48.1)
