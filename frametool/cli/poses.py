@@ -45,7 +45,7 @@ _LISTED_ROWS = rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)"
 def is_inline(text: str) -> bool:
     """Tell a mapping or list written on the command line, or the inverse of one, from a file's name."""
     while found := _inverted(text):
-        text = (found[1] or found[2]).strip()
+        text = (found[1] or found[2] or "").strip()
     return text.startswith(("{", "["))
 
 
@@ -190,7 +190,7 @@ def without_inverse(argument: str) -> tuple[str, bool]:
     """
     bare, is_inverse = argument, False
     while (found := _inverted(bare)) and not os.path.exists(bare):
-        bare, is_inverse = (found[1] or found[2]).strip(), not is_inverse
+        bare, is_inverse = (found[1] or found[2] or "").strip(), not is_inverse
         if not bare:
             raise click.UsageError(f"{shown(argument)}: there is no pose whose inverse is meant")
     return bare, is_inverse

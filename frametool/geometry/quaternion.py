@@ -213,8 +213,10 @@ def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
 
 def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -> Condition:
     """Tell whether numbers within so much of these have norm 1: then only the digits they are written with are off."""
-    least = sum((xp.maximum(abs(part) - half, 0.0 * half) ** 2 for part, half in zip(parts, halves, strict=True)), 0.0)
-    most = sum(((abs(part) + half) ** 2 for part, half in zip(parts, halves, strict=True)), 0.0)
+    pairs = [*zip(map(abs, parts), halves, strict=True)]
+    nearest = [xp.maximum(size - half, 0.0 * half) for size, half in pairs]
+    least = sum((size * size for size in nearest), 0.0)
+    most = sum(((size + half) * (size + half) for size, half in pairs), 0.0)
     found: Condition = (least <= 1.0) & (most >= 1.0)
     return found
 
