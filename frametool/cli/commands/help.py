@@ -156,7 +156,7 @@ def described(name: str, command: click.Command, ctx: click.Context) -> dict[str
         "help": "\n".join(lines).strip(),
         "examples": [line for line in lines if re.match(r"(frametool|printf|sed) .*", line)],
         "arguments": [
-            {"name": each.make_metavar(ctx), "required": each.required, "repeated": each.nargs == -1}
+            {"name": each.get_usage_pieces(ctx)[0], "required": each.required, "repeated": each.nargs == -1}
             for each in command.params if isinstance(each, click.Argument)
         ],
         "options": [_option(each, title.partition(" (")[0], ctx) for title, options in groups for each in options],
