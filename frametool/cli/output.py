@@ -105,7 +105,7 @@ class Output:
             self.take_axes(tree.camera_axes.get(source, ""))
 
     def mark_frames(self, target: str, source: str) -> None:
-        """Give target and source a colour each, in what says which is seen from which."""
+        """Colour target and source, in what says which is seen from which."""
         target, source = re.escape(printable(target)), re.escape(printable(source))
         seen = rf"(?m)^(?P<green>{source})(?: at \S+)? seen from (?P<cyan>{target})(?= |$)"
         self.marks = seen, rf"\(maps points in (?P<green>{source}) to points in (?P<cyan>{target})\)"

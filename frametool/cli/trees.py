@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from frametool.documents.source import FileState
-    from frametool.formats.load import Place, Recording, Rules
+    from frametool.formats.load import EdgePlace, Recording, Rules
     from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
@@ -112,7 +112,7 @@ def load_tree(
 
 def load_sides(
     a: Sequence[str], b: Sequence[str], *, normalize: bool
-) -> list[tuple[FrameTree | TransformBuffer, dict[str, Place]]]:
+) -> list[tuple[FrameTree | TransformBuffer, dict[str, EdgePlace]]]:
     """Read two trees that will be compared, each of several files, as `load_tree` does; with each frame's place."""
     from frametool.formats.load import Rules
 
@@ -122,12 +122,12 @@ def load_sides(
 
     def side(
         arguments: Sequence[str], behind: int, earth: str
-    ) -> tuple[FrameTree | TransformBuffer, dict[str, Place]]:
-        where: dict[str, Place] = {}
+    ) -> tuple[FrameTree | TransformBuffer, dict[str, EdgePlace]]:
+        where: dict[str, EdgePlace] = {}
         every.extend(files := opened(arguments, behind=behind, of=count))
         return _loaded(files, Rules(normalize=normalize, earth=earth), where), where
 
-    sides: list[tuple[FrameTree | TransformBuffer, dict[str, Place]]] = []
+    sides: list[tuple[FrameTree | TransformBuffer, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
         options = f"{normalize} {behind} of {count} {earth}"
@@ -138,7 +138,7 @@ def load_sides(
 
 
 def _loaded(
-    files: Sequence[Recording], rules: Rules | None, places: dict[str, Place] | None = None
+    files: Sequence[Recording], rules: Rules | None, places: dict[str, EdgePlace] | None = None
 ) -> FrameTree | TransformBuffer:
     """Merge files that are open, and say what they were taken for."""
     from frametool.formats.load import load_sources  # not every command that may read trees does

@@ -239,8 +239,8 @@ class Replaced(NamedTuple):
     parent: str
     child: str
     stamp_ns: int
-    earlier: Place
-    later: Place
+    earlier: EdgePlace
+    later: EdgePlace
 
 
 class Assembly:
@@ -253,8 +253,8 @@ class Assembly:
         self.earth, self._one_earth = self.rules.earth, False  # its name, and whether an edge to itself was told
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
-        self._first: dict[str, tuple[str, Rigid, Place]] = {}  # child -> what was said first
-        self._places: dict[str, dict[int, Place]] = {}  # child -> stamp -> where that sample stood
+        self._first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> what was said first
+        self._places: dict[str, dict[int, EdgePlace]] = {}  # child -> stamp -> where that sample stood
         self._replaced: list[Replaced] = []
         self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
         self._moves: set[str] = set()
@@ -264,7 +264,7 @@ class Assembly:
         self.drawn: dict[str, str] = {}  # child -> what a drawing says of its edge
 
     @property
-    def places(self) -> dict[str, Place]:
+    def places(self) -> dict[str, EdgePlace]:
         """Return where each frame that has a parent was first said to hang from it."""
         return {child: place for child, (_, _, place) in self._first.items()}
 
@@ -282,7 +282,7 @@ class Assembly:
         """Return a name, the Earth's as it is here."""
         return self.earth if frame in EARTH_FRAMES else frame
 
-    def add_edge(self, edge: Edge, place: Place) -> None:
+    def add_edge(self, edge: Edge, place: EdgePlace) -> None:
         """Add an edge, or a root; one between the two names of the Earth's frame must be nothing."""
         parent, child = edge.parent, edge.child
         if (parent in EARTH_FRAMES or child in EARTH_FRAMES) and self.renames(parent, child):
@@ -305,7 +305,7 @@ class Assembly:
         """Return the name under which the buffer keeps a frame: tf2 strips one slash."""
         return name if self.rules.policy == "frametool" else name.removeprefix("/")
 
-    def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place) -> None:
+    def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: EdgePlace) -> None:
         """Add one edge, or one sample of it.
 
         Raises BadTopology and FormatError with the place; where tf2 would log and drop, that is a warning in its words.
@@ -327,7 +327,7 @@ class Assembly:
         if place.edge.covariance is not None or child in self.covariances:
             self._keep_covariance(parent, self._kept(child), place)
 
-    def _keep_covariance(self, parent: str, child: str, place: Place) -> None:
+    def _keep_covariance(self, parent: str, child: str, place: EdgePlace) -> None:
         """Keep the covariance of an edge; raises BadTopology with both places where it is not the one said before."""
         first = self._first[child][2]
         if place.edge.covariance != first.edge.covariance:
@@ -369,7 +369,7 @@ class Assembly:
             self.add_samples(SamplesOfFile(file, samples))
         for pair, edge in zip(pairs, columns.edges(), strict=True) if len(whole) < len(found) else ():
             if pair not in whole:
-                self.add(*pair, edge.components, edge.stamp_ns, Place(file, edge))
+                self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
         """Tell whether a frame is known to move, now in this parent."""
@@ -389,7 +389,7 @@ class Assembly:
             follows = goes_on and track.last_ns < samples.stamps_ns[0]  # type: ignore[union-attr]
         return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
 
-    def _place_before(self, child: str, stamp_ns: int) -> Place | None:
+    def _place_before(self, child: str, stamp_ns: int) -> EdgePlace | None:
         """Find where the sample of a stamp stood among those taken in one piece."""
         for placed in self._whole.get(child, ()):
             at = bisect_left(placed.samples.stamps_ns, stamp_ns)
@@ -428,7 +428,8 @@ class Assembly:
         return self.buffer
 
     def _record(
-        self, buffer: TransformBuffer, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: Place
+        self, buffer: TransformBuffer, parent: str, child: str, components: Rigid, stamp_ns: int | None,
+        place: EdgePlace,
     ) -> None:
         """Add a sample, or a standing edge beside samples."""
         received, child = child, self._kept(child)
@@ -477,7 +478,7 @@ class Assembly:
                     raise self._first[track.child][2].error(str(error), BadTopology) from None
         return tree
 
-    def _placed(self, error: BadTopology, parent: str, child: str, place: Place) -> FormatError:
+    def _placed(self, error: BadTopology, parent: str, child: str, place: EdgePlace) -> FormatError:
         """Make the error for a place; where it contradicts what was said before, both places are named."""
         message = str(error)
         known = self._first.get(child)
@@ -493,7 +494,7 @@ class Assembly:
         return place.error(message, BadTopology)
 
 
-class Place(NamedTuple):
+class EdgePlace(NamedTuple):
     """Where an edge was read."""
 
     file: Recording
@@ -505,7 +506,7 @@ class Place(NamedTuple):
             return format_error(self.file.source, self.edge.path, message, error=kind)
         return kind(message, source=self.file.name, line=self.edge.line)
 
-    def seen_from(self, other: Place) -> str:
+    def seen_from(self, other: EdgePlace) -> str:
         """Name this place beside another one: `line 7`, or `other.yaml:7` in another file."""
         line = locate(self.file.text, self.edge.path)[0] if self.edge.path else self.edge.line
         return f"line {line}" if other.file.name == self.file.name else f"{self.file.name}:{line}"
@@ -517,10 +518,10 @@ class SamplesOfFile(NamedTuple):
     file: Recording
     samples: Samples
 
-    def place(self, at: int) -> Place:
+    def place(self, at: int) -> EdgePlace:
         """Return where one of them was read."""
         parent, child, stamps_ns, _, lines = self.samples
-        return Place(self.file, Edge(parent, child, IDENTITY, stamps_ns[at], lines[at]))
+        return EdgePlace(self.file, Edge(parent, child, IDENTITY, stamps_ns[at], lines[at]))
 
 
 def load(
@@ -565,7 +566,7 @@ def load(
 
 
 def load_sources(
-    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, Place] | None = None
+    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, EdgePlace] | None = None
 ) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts and files; otherwise as `load`.
 
@@ -586,7 +587,7 @@ def load_sources(
     return tree
 
 
-def lines_of(places: Sequence[Place]) -> list[tuple[str, int]]:
+def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
     """Return file and line of many places, each file walked once; 0 where a line says nothing."""
     lines: dict[int, int] = {}
     for file in {id(each.file): each.file for each in places}.values():
@@ -606,7 +607,7 @@ def _add(assembly: Assembly, file: Recording) -> None:
             assembly.add_columns(file, piece)
         else:
             for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
-                assembly.add_edge(edge, Place(file, edge))
+                assembly.add_edge(edge, EdgePlace(file, edge))
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
     assembly.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}

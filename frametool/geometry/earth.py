@@ -105,16 +105,15 @@ def ecef_from_enu(lat: N, lon: N, xp: Functions[N]) -> Four[N]:
     return quaternion.settled(back * down, ahead * down, ahead * up, back * up)
 
 
-def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Seven[N]:
-    """Return ecef_from_axes at a place: x, y, z and the quaternion with the canonical sign.
+def ecef_from_axes(lat: N, lon: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Four[N]:
+    """Return the quaternion of axes at a place, with the canonical sign.
 
     axes: one of `AXES`
     convergence_deg: of grid axes, how far grid north lies clockwise of true north there
     """
-    tx, ty, tz = ecef(lat, lon, alt, xp)
     if axes == "ecef":
-        zero = 0.0 * tx
-        return tx, ty, tz, zero, zero, zero, zero + 1.0
+        zero = 0.0 * lat + 0.0
+        return zero, zero, zero, zero + 1.0
     x, y, z, w = ecef_from_enu(lat, lon, xp)
     if axes == "ned":  # the product with enu_from_ned
         x, y, z, w = SQRT_HALF * x, SQRT_HALF * y, SQRT_HALF * z, SQRT_HALF * w
@@ -122,7 +121,13 @@ def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N
     elif convergence_deg is not None:  # with enu_from_grid, a turn about z by minus the convergence
         s, c = half_sincos_deg(convergence_deg, xp)
         x, y, z, w = quaternion.settled(x * c - y * s, y * c + x * s, z * c - w * s, w * c + z * s)
-    x, y, z, w = xp.canonical_sign(x + 0.0, y + 0.0, z + 0.0, w + 0.0)
+    return xp.canonical_sign(x + 0.0, y + 0.0, z + 0.0, w + 0.0)
+
+
+def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Seven[N]:
+    """Return ecef_from_axes at a place, of `ecef` and `ecef_from_axes`: x, y, z and the quaternion."""
+    tx, ty, tz = ecef(lat, lon, alt, xp)
+    x, y, z, w = ecef_from_axes(lat, lon, axes, xp, convergence_deg)
     return tx, ty, tz, x, y, z, w
 
 

@@ -183,7 +183,7 @@ class Place(NamedTuple):
             return self._by_row(numbers, rotation)
         if self.axes == ECEF:
             return tuple(rotation)
-        return quaternion.compose(*self.base(numbers)[3:], *self.levelled(rotation))
+        return quaternion.compose(*self._axes_at(numbers), *self.levelled(rotation))
 
     def levelled(self, rotation: Components) -> Components:
         """Return a rotation in the axes there: of a heading, a turn about down, yaw = 90 degrees - it where z is up."""
@@ -207,20 +207,23 @@ class Place(NamedTuple):
 
     def base(self, numbers: Sequence[Any]) -> Components:
         """Return ecef_from_axes at the place that numbers say."""
+        return (*self.ecef(numbers), *self._axes_at(numbers))
+
+    def _axes_at(self, numbers: Sequence[Any]) -> Components:
+        """Return the rotation of `base`."""
         if self.name in LOCAL and self.axes == self.name and self.origin is not None:
-            return (*self.ecef(numbers), *self.origin.pose(self.name)[3:])
-        lat, lon, alt = self.lla(numbers)
-        xp = namespace(numbers)
-        return earth.pose(lat, lon, alt, self.axes, xp, self._convergence(lat, lon, self._zone_of(numbers), xp))
+            return self.origin.pose(self.name)[3:]
+        lat, lon, _ = self.lla(numbers)
+        return self._turn_at(lat, lon, self._zone_of(numbers), namespace(numbers))
+
+    def _turn_at(self, lat: Any, lon: Any, zone: Any, xp: Namespace) -> Components:
+        """Return the rotation of its axes at a latitude and longitude."""
+        convergence = mercator.utm(_held(zone, lat, lon, xp), lat, lon, xp)[2] if self.axes == GRID else None
+        return earth.ecef_from_axes(lat, lon, self.axes, xp, convergence)
 
     def _zone_of(self, numbers: Sequence[Any]) -> Any:
         given = dict(zip(self.fields, numbers, strict=True))
         return given.get(ZONE, self.zone)
-
-    def _convergence(self, lat: Any, lon: Any, zone: Any, xp: Namespace) -> Any:
-        if self.axes != GRID:
-            return None
-        return mercator.utm(_held(zone, lat, lon, xp), lat, lon, xp)[2]
 
     def check(self, numbers: Sequence[float]) -> None:
         """Raise ValueInvalid unless floats are a place."""
@@ -272,8 +275,8 @@ class Place(NamedTuple):
             base = self.origin.pose(self.axes)[3:]
         else:
             xp = namespace((x, y, z))
-            lat, lon, alt = earth.lla(x, y, z, xp)
-            base = earth.pose(lat, lon, alt, self.axes, xp, self._convergence(lat, lon, self.zone, xp))[3:]
+            lat, lon, _ = earth.lla(x, y, z, xp)
+            base = self._turn_at(lat, lon, self.zone, xp)
         return quaternion.compose(*quaternion.conjugate(*base), *rotation)
 
     def check_result(self, x: float, y: float, z: float) -> None:

@@ -109,15 +109,9 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
         place.check(numbers)
     except ValueInvalid as error:
         raise Misfit(str(error), (next(iter(own)),)) from None
-    base = _base(place, numbers)
-    made = placed.compose(base, inner._replace(rotation=rotation, scale=1.0).placed)
+    made = placed.compose(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
     return found if rotation is not None or stands else found._replace(rotation=None)
-
-
-def _base(place: Place, numbers: tuple[float, ...]) -> tuple[float, ...]:
-    rotation = (0.0, 0.0, 0.0, 1.0) if place.axes == ECEF else place.base(numbers)[3:]
-    return (*place.ecef(numbers), *rotation)
 
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
@@ -400,23 +394,33 @@ def check_in_ecef(parent: str | None, place: Place) -> None:
     raise ValueInvalid(NOT_IN_ECEF.format(names, found))
 
 
+def _numbers_of(frame: str | None, position: Sequence[float], place: Place) -> list[float]:
+    """Return the numbers of a position in ecef; raises ValueInvalid of another frame, or one that cannot be written."""
+    check_in_ecef(frame, place)
+    x, y, z = position
+    place.settle(x, y, z)
+    place.check_result(x, y, z)
+    return [number + 0.0 for number in place.numbers(x, y, z)]
+
+
+def _seen_there(pose: Pose, place: Place) -> Pose:
+    """Return a pose of ecef without its position, its rotation in the axes of a place."""
+    if pose.rotation is None:
+        return pose._replace(position=None)
+    x, y, z, w = place.local(*pose.components[:3], pose.rotation)
+    return pose._replace(position=None, rotation=(x, y, z, w))
+
+
 def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
     """Return the position of a pose in ecef as a mapping has it, with the axes of its rotation; and the pose in these.
 
     Raises ValueInvalid for a pose in another frame, and for a position that cannot be written so.
     """
-    check_in_ecef(pose.parent, place)
-    x, y, z = pose.components[:3]
-    place.settle(x, y, z)
-    place.check_result(x, y, z)
-    entry = place.entry([number + 0.0 for number in place.numbers(x, y, z)])
+    entry = place.entry(_numbers_of(pose.parent, pose.components[:3], place))
     if place.name == ECEF:
         entry = {"xyz": entry.pop(ECEF)} | entry
-    if pose.rotation is None:
-        return entry, pose._replace(position=None)
-    local = place.local(x, y, z, pose.rotation)
-    axes = {} if place.name == ECEF else {AXES_KEY: place.axes}
-    return entry | axes, pose._replace(position=None, rotation=(local[0], local[1], local[2], local[3]))
+    axes = {} if pose.rotation is None or place.name == ECEF else {AXES_KEY: place.axes}
+    return entry | axes, _seen_there(pose, place)
 
 
 def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
@@ -424,15 +428,13 @@ def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
     Raises as `placed_entry`.
     """
-    entry, local = placed_entry(pose, place)
-    x, y, z = pose.components[:3]
-    numbers = place.numbers(x, y, z)
+    numbers = _numbers_of(pose.parent, pose.components[:3], place)
     cells = {
-        name: place.words[at][int(number)] if at in place.words else number + 0.0
+        name: place.words[at][int(number)] if at in place.words else number
         for at, (name, number) in enumerate(zip(place.columns, numbers, strict=True))
     }
-    axes = {} if pose.rotation is None else {AXES_KEY: entry.get(AXES_KEY, ECEF)}
-    return cells | axes, local
+    axes = {} if pose.rotation is None else {AXES_KEY: place.axes}
+    return cells | axes, _seen_there(pose, place)
 
 
 def overview(pose: Pose) -> list[tuple[str, str]]:
@@ -495,10 +497,6 @@ def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict
 
     Raises ValueInvalid for a point of another frame, and for one that cannot be written so.
     """
-    check_in_ecef(frame, place)
-    x, y, z = point
-    place.settle(x, y, z)
-    place.check_result(x, y, z)
-    entry = place.entry([number + 0.0 for number in place.numbers(x, y, z)])
+    entry = place.entry(_numbers_of(frame, point, place))
     in_metres = entry.pop(ECEF, None)
     return ({"frame": frame, "point": in_metres} if in_metres else {}) | entry

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, Unanswered, first_of, listing
-from frametool.ros.bags import TYPES, opened_bag
+from frametool.ros.bags import TYPES, check_count, opened_bag
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 
@@ -71,14 +71,25 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
 
 
 def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[bytes]:
-    """Yield each message as a line."""
+    """Yield each message as a line; there must be as many as the bag says."""
     connections = [each for each in reader.connections if each.topic in topics]
-    for number, (connection, _, data) in enumerate(reader.messages(connections=connections), 1):
-        try:
-            message = reader.deserialize(data, connection.msgtype)
-        except Exception as error:  # noqa: BLE001 - a broken message makes the library raise anything
-            raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=path) from None
+    number = 0
+    messages = reader.messages(connections=connections)
+    while (message := _next(reader, messages, number + 1, path)) is not None:
+        number += 1
         yield dump(_plain(message)).encode() + b"\n"
+    check_count(reader, connections, number, path)
+
+
+def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> Any:
+    """Return the next message; None behind the last."""
+    try:
+        if (found := next(messages, None)) is None:
+            return None
+        connection, _, data = found
+        return reader.deserialize(data, connection.msgtype)
+    except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything
+        raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=path) from None
 
 
 def _plain(value: Any) -> Any:

@@ -120,12 +120,17 @@ def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
             if problem := options.topics.conflict(name, edge.child):
                 options.report(FormatError(problem, source=path, rule="two-topics"))
             yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns, topic=name)
+    check_count(reader, topics, number, path)
+    if not number:
+        raise FormatError(f"no messages on {', '.join(topic.topic for topic in topics)}", source=path)
+
+
+def check_count(reader: Any, topics: list[Any], number: int, path: str) -> None:
+    """Raise FormatError unless as many messages were there on some topics as the bag says."""
     expected = _expected(reader, topics)
     if number != expected:
         names = ", ".join(sorted({topic.topic for topic in topics}))
         raise FormatError(f"the bag is damaged: {number} of {expected} messages on {names} are there", source=path)
-    if not number:
-        raise FormatError(f"no messages on {', '.join(topic.topic for topic in topics)}", source=path)
 
 
 def _expected(reader: Any, topics: list[Any]) -> int:

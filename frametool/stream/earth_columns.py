@@ -61,7 +61,7 @@ FIX_ENTRY = re.compile(rf"(?:.*[./_])?{FIX}\[?_?([0-8])\]?")
 DEGREES = {"": False, "deg": False, "degrees": False, "°": False, "rad": True, "radians": True}
 
 
-class Spot(NamedTuple):
+class NamedColumn(NamedTuple):
     """A column: its place, its name, and the unit that this says."""
 
     place: int
@@ -75,14 +75,14 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
     given: the representation that --from names.
     Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
     """
-    groups: dict[str, dict[str, Spot]] = {}
+    groups: dict[str, dict[str, NamedColumn]] = {}
     for at, name in enumerate(names):
         if name and (match := PATTERN.fullmatch(name)):
             unit = (match[4] if match[4] is not None else match[3] or "").lower()
             prefix, field = match[1].lower(), FIELDS[match[2].lower()]
             if field == STATUS:  # of a NavSatFix: another may be anything
                 prefix = prefix.removesuffix("status.") if prefix.endswith("status.") else "another status"
-            groups.setdefault(prefix, {}).setdefault(field, Spot(at, name, unit))
+            groups.setdefault(prefix, {}).setdefault(field, NamedColumn(at, name, unit))
     found = [
         (prefix, columns)
         for prefix, spots in groups.items()
@@ -100,7 +100,7 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
 
 
 def _position(
-    kind: str, spots: dict[str, Spot], groups: dict[str, dict[str, Spot]], earth: Earth
+    kind: str, spots: dict[str, NamedColumn], groups: dict[str, dict[str, NamedColumn]], earth: Earth
 ) -> Columns | None:
     """Return the columns of a position of one kind, if they are there."""
     if kind == ECEF:
@@ -108,7 +108,7 @@ def _position(
         return _columns(kind, axes, spots, earth) if len(axes) == 3 else None
     if kind in LOCAL:
         return _local(kind, spots, earth)
-    fields: list[tuple[str, Spot]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
+    fields: list[tuple[str, NamedColumn]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
     if kind == UTM:
         zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE) or spots.get(EPSG)
         spots = {name: spot for name, spot in spots.items() if spot is not zone}
@@ -123,7 +123,7 @@ def _position(
     return None if len(fields) < size else _columns(kind, [*fields, *_height(spots)], spots, earth)
 
 
-def _local(kind: str, spots: dict[str, Spot], earth: Earth) -> Columns | None:
+def _local(kind: str, spots: dict[str, NamedColumn], earth: Earth) -> Columns | None:
     """Return the columns of local axes, where an origin says of which; without one they are other data."""
     wanted = REPRESENTATIONS[kind].names
     if earth.origin is None or wanted[2] not in spots:
@@ -132,7 +132,7 @@ def _local(kind: str, spots: dict[str, Spot], earth: Earth) -> Columns | None:
     return _columns(kind, there, spots, earth) if len(there) == len(wanted) else None
 
 
-def _height(spots: dict[str, Spot]) -> list[tuple[str, Spot]]:
+def _height(spots: dict[str, NamedColumn]) -> list[tuple[str, NamedColumn]]:
     """Return the height above the ellipsoid, or that above the sea and the geoid's; raise ValueInvalid without it."""
     if "alt" in spots:
         return [("alt", spots["alt"])]
@@ -142,7 +142,9 @@ def _height(spots: dict[str, Spot]) -> list[tuple[str, Spot]]:
     return [("msl", spots[name]), ("undulation", spots["undulation"])] if name else []
 
 
-def _columns(kind: str, fields: Sequence[tuple[str, Spot]], spots: dict[str, Spot], earth: Earth) -> Columns:
+def _columns(
+    kind: str, fields: Sequence[tuple[str, NamedColumn]], spots: dict[str, NamedColumn], earth: Earth
+) -> Columns:
     """Put the columns together, with that of the axes."""
     for field, spot in fields:
         if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
@@ -158,14 +160,14 @@ def _columns(kind: str, fields: Sequence[tuple[str, Spot]], spots: dict[str, Spo
     return Columns(places, names, unit=place, staying=len(staying))
 
 
-def _in_radians(spot: Spot) -> bool:
+def _in_radians(spot: NamedColumn) -> bool:
     if spot.unit not in DEGREES:
         unknown = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)}"
         raise ValueInvalid(f"{unknown}; lat and lon are degrees, or rad")
     return DEGREES[spot.unit]
 
 
-def _heading(spots: dict[str, Spot], position: Columns) -> Columns | None:
+def _heading(spots: dict[str, NamedColumn], position: Columns) -> Columns | None:
     """Return the rotation that a heading with its unit says."""
     spot = spots.get("heading")
     if spot is None or spot.unit == "" or position.unit is None:
@@ -186,8 +188,8 @@ def chosen(places: Sequence[int], names: Sequence[str], kind: str, earth: Earth)
         fields, least = fields[1:], 2
     if not least <= len(places) <= len(fields):
         raise ValueInvalid(f"{kind} has {len(fields)} numbers ({' '.join(fields)}); found {len(places)}")
-    spots = [(field, Spot(place, names[at], "")) for at, (field, place) in enumerate(zip(fields, places, strict=False))]
-    return _columns(kind, spots, {}, earth)
+    spots = [NamedColumn(place, names[at], "") for at, place in enumerate(places)]
+    return _columns(kind, [*zip(fields, spots, strict=False)], {}, earth)
 
 
 def unsaid_heading(names: Iterable[str]) -> str:

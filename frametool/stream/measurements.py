@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
-from frametool.formats.load import Place, close_all, lines_of
+from frametool.formats.load import EdgePlace, close_all, lines_of
 from frametool.formats.trees.tree_reader import read_edges, shown_keys
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -185,7 +185,7 @@ def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str
 def _of_edges(file: Recording, request: Request) -> Iterator[MeasuredRow]:
     """Yield the edges of a file that holds a tree; what recordings say again at one time they say once."""
     edges = [edge for edge in file.edges(normalize=request.normalize) if edge.parent is not None]
-    lines = lines_of([Place(file, edge) for edge in edges])
+    lines = lines_of([EdgePlace(file, edge) for edge in edges])
     said = {edge[:4] if edge.stamp_ns is not None else at: at for at, edge in reversed([*enumerate(edges)])}
     for at in sorted(said.values()):
         edge, (_, line) = edges[at], lines[at]

@@ -74,7 +74,7 @@ def _ground(tree: Frames) -> Ground | None:
     lat, lon, alt = wgs84.lla(x, y, z, floats)
     if not isfinite(alt):
         return None
-    return Ground(f"enu at {there[0].child}", (x, y, z, *wgs84.pose(lat, lon, alt, ENU, floats)[3:]))
+    return Ground(f"enu at {there[0].child}", (x, y, z, *wgs84.ecef_from_axes(lat, lon, ENU, floats)))
 
 
 def _on(tree: Frames, ground: Ground) -> Frames:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
+from contextlib import closing
+from sqlite3 import connect
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,3 +100,19 @@ def test_a_topic_without_records_says_which_there_are(bag: Path, run: Run) -> No
     done = run("convert", "-i", str(bag), "--topic", "/scan")
     assert (done.status, done.out) == (1, "")
     assert f"no points, poses or fixes on /scan; topics: /fix ({FIX}), /pose ({POSE})" in done.err
+
+
+def test_a_bag_that_is_damaged_midway_is_one_error_behind_its_whole_messages(bag: Path, run: Run) -> None:
+    if bag.is_dir():
+        with closing(connect(next(bag.glob("*.db3")))) as database, database:
+            database.execute("DELETE FROM messages WHERE id = 2")
+        said = "the bag is damaged: 4 of 5 messages on /fix are there"
+    else:
+        whole = bag.read_bytes()
+        third = [found.start() for found in re.finditer(b"op=\x02", whole)][2]
+        bag.write_bytes(whole[: third - 4] + bytes(40) + whole[third + 36 :])
+        said = "message 3: cannot be read"
+    done = run("convert", "-i", str(bag), "--topic", "/fix", "--to", "lla", "--on-error", "skip")
+    assert done.status == 1
+    assert done.err.splitlines()[-1].startswith(f"frametool: {bag}: {said}")
+    assert json.loads(done.out.splitlines()[0])["lat"] == pytest.approx(48.137, abs=1e-9)

@@ -18,7 +18,7 @@ from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.formats.load import Place
+    from frametool.formats.load import EdgePlace
     from frametool.lint.tree_diff import TreeComparison
 
 DIFFERENT, TROUBLE = 1, 2
@@ -80,7 +80,7 @@ def command(
     return DIFFERENT if comparison.differences else 0
 
 
-def _annotations(found: TreeComparison, places: Sequence[Mapping[str, Place]]) -> str:
+def _annotations(found: TreeComparison, places: Sequence[Mapping[str, EdgePlace]]) -> str:
     """Return workflow commands, each at the line where B says where the frame is, or else A."""
     in_a, in_b = places
     known = {each.frame: in_b.get(each.frame) or in_a.get(each.frame) for each in found.differences}
