@@ -405,9 +405,43 @@ def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
     return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
 
 
+class Messages(Text):
+    """Kinds of messages, with commas between them."""
+
+    name = "messages"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse unknown ones."""
+        kinds = tuple(dict.fromkeys(value.split(","))) if isinstance(value, str) else tuple(value or ())
+        if unknown := [each for each in kinds if each not in MESSAGES]:
+            near = did_you_mean(unknown[0], MESSAGES)
+            self.fail(f"{shown(unknown[0])} is none of {', '.join(MESSAGES)}{near}", param, ctx)
+        return kinds
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
+        """Offer the kinds behind the last comma."""
+        done, comma, _ = incomplete.rpartition(",")
+        return dict.fromkeys((done + comma + name for name in MESSAGES), "")
+
+
+MESSAGES = ("pose", "tf", "path", "point", "fix")
+_RECORDING = (
+    _setting("--messages", "messages", type=Messages(), metavar="KIND,..", default=(),
+             help=f"messages of a recording: {', '.join(MESSAGES)}  [default: as the rows are]"),
+    _setting("--topic-out", "topic_out", type=TEXT, metavar="NAME", help="the topic of a recording with one"),
+)  # fmt: skip
+# of commands that have no --frames for what they read
+frames_out_option = _setting(
+    "--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+    help="what the frames of poses in a recording are called; adds /tf",
+)  # fmt: skip
+
+
 def result_options(*what: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
-    return together(_form_option(writers(*what), "form of the result"), _PRECISION, *_PLACE)
+    forms = writers(*what)
+    recording = [] if set(forms).isdisjoint(writers("recording")) else _RECORDING
+    return together(_form_option(forms, "form of the result"), _PRECISION, *recording, *_PLACE)
 
 
 def list_options(*more: str) -> Callable[[Function], Function]:

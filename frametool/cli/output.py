@@ -20,23 +20,24 @@ from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
-from frametool.formats.table import FORMATS, by_name, holds_arrays, is_trajectory, writers
+from frametool.formats.table import FORMATS, by_name, holds_arrays, is_folder, is_recording, is_trajectory, writers
 from frametool.geometry.representations import EARTH_FRAMES, notation
-from frametool.grammar.result import Result, Style, is_locked, sample_results
+from frametool.grammar.result import Recorded, Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
+    from contextlib import AbstractContextManager
 
+    from frametool.cli.sink import Write
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
-    from frametool.stream.array_writer import ArrayWriter
     from frametool.stream.request import Operation
-    from frametool.stream.writers import TextWriter
     from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
+RECORDINGS = writers("recording")
 BLOCK = 1 << 13  # poses of a trajectory
 
 
@@ -73,7 +74,8 @@ class Output:
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
         self._holds_arrays = holds_arrays(form)
         self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
-        self.holds_all = self.is_trajectory or self._holds_arrays or form == "csv"  # rows, of which there may be many
+        self._in_blocks = self.is_trajectory or self._holds_arrays or is_recording(form)
+        self.holds_all = self._in_blocks or form == "csv"  # rows, of which there may be many
         if self._holds_arrays:
             refuse_unused(f"is not used: {form} holds numbers, not their text", "precision")
         if self._holds_arrays and output is None and sys.stdout.isatty():
@@ -84,6 +86,7 @@ class Output:
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
         self.style.put_at(place)
+        self.style.recording = recorded(form, output)
 
     def check_target(self, target: str) -> None:
         """Stop where places are asked for of what is seen from another frame than the Earth's."""
@@ -112,14 +115,14 @@ class Output:
 
     def _refuse_place(self) -> None:
         """Stop where a form has no place for latitude and longitude."""
-        if self.style.place is not None and self.style.form not in ("text", "yaml", "json", "csv"):
+        if self.style.place is not None and self.style.form not in ("text", "yaml", "json", "csv", *RECORDINGS):
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.form} has no place for {names}; write csv, json, yaml or text")
 
     def poses(self, results: Iterable[Result]) -> None:
         """Write poses."""
         self._refuse_place()
-        if self._holds_arrays or self.is_trajectory:
+        if self._in_blocks:
             self.pieces(self._blocks(iter(results)))
         else:
             found = list(results)
@@ -140,7 +143,7 @@ class Output:
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self._refuse_place()
-        self.pieces(self._blocks(results) if self._holds_arrays or self.is_trajectory else self._batches(results))
+        self.pieces(self._blocks(results) if self._in_blocks else self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
@@ -160,24 +163,15 @@ class Output:
         """Yield the poses of a trajectory, or columns of numbers, block after block."""
         from frametool.stream.row_layout import POSE
         from frametool.stream.row_poses import block_of
+        from frametool.stream.writers import writer_for
 
         batch = list(islice(results, BLOCK))
         placed = not (self._holds_arrays and all(each.pose.position is None for each in batch))
-        writer = self._writer(POSE, placed=placed)
+        writer = writer_for(self.style, POSE, placed=placed)
         while batch:
             yield writer.of_block(block_of(batch, placed=placed))
             batch = list(islice(results, BLOCK))
         yield from writer.end()
-
-    def _writer(self, kind: str, *, placed: bool = True) -> TextWriter | ArrayWriter:
-        """Return what writes blocks in the form."""
-        if self._holds_arrays:
-            from frametool.stream.array_writer import ArrayWriter
-
-            return ArrayWriter(self.style, kind, placed=placed)
-        from frametool.stream.writers import TextWriter
-
-        return TextWriter(self.style, kind)
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
@@ -203,6 +197,9 @@ class Output:
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.form}; -f text shows its frames")
         if tree.covariances and self.style.form not in ("yaml", "json", "text"):
             warn(f"{self.style.form}: covariances left out")
+        if is_recording(self.style.form):
+            self.pieces(self._module("").tree_pieces(tree, self.style))
+            return
         if self.style.form not in ("yaml", "json") and (
             "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
         ):
@@ -232,11 +229,12 @@ class Output:
         found = list(records)
         if self.style.form in FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
-        if self._holds_arrays:
+        if self._in_blocks:
             from frametool.stream.row_poses import block_of_points
+            from frametool.stream.writers import writer_for
 
             kind, block = block_of_points(found)
-            writer = self._writer(kind)
+            writer = writer_for(self.style, kind)
             self.pieces([writer.of_block(block), *writer.end()])
             return
         placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
@@ -265,13 +263,17 @@ class Output:
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
         is_plain = self.style.form == "text"
-        with writing(self.path, force=self.force) as write:
+        with self.opened() as write:
             for piece in pieces:
                 for_people = is_plain and isinstance(piece, str)
                 text = "\n".join(map(printable, str(piece).split("\n"))) if for_people else piece
                 marked = self.marks and for_people and self.path is None and sys.stdout.isatty()
                 write(in_colour(str(text), self.marks) if marked else text)
         self._tell_of_suffix()
+
+    def opened(self) -> AbstractContextManager[Write]:
+        """Open the place where results go."""
+        return writing(self.path, force=self.force, folder=is_folder(self.style.form))
 
     def _tell_of_suffix(self) -> None:
         """Say what a file holds whose suffix stands for no form, where none was told."""
@@ -283,6 +285,25 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
+
+
+def recorded(form: str, output: str | None) -> Recorded:
+    """Return what of results a recording holds, as options say; elsewhere they are not used."""
+    chosen = settings()
+    if not is_recording(form):
+        refuse_unused(f"is about recordings, {form} is none; -f {'|'.join(RECORDINGS)}", "messages", "topic_out")
+        return Recorded()
+    if output in (None, "-"):
+        raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
+    if is_folder(form) and output.endswith(FORMATS[form].suffixes):
+        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
+    frames = tuple(chosen.named_frames[0].split(",")) if chosen.named_frames else ()
+    if frames:
+        if len(frames) != 2 or not all(frames):
+            raise UsageError(f"--frames takes WORLD,BODY; found {shown(chosen.named_frames[0])}")
+        chosen.inputs = (*chosen.inputs, ("", ("frames",)))
+    folder = os.path.dirname(os.path.abspath(output)) if os.path.isdir(os.path.dirname(os.path.abspath(output))) else ""
+    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder)
 
 
 def in_colour(text: str, marks: Sequence[str]) -> str:

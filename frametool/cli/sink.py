@@ -7,8 +7,9 @@ import re
 import stat
 import sys
 from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import count
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from frametool.cli.signals import clean_up, whole_lines
 from frametool.errors import FileProblem, ValueInvalid, printable, shown
@@ -18,21 +19,27 @@ if TYPE_CHECKING:
 
     Write = Callable[[str | bytes | memoryview], None]
 
+OPEN_FILES = "/proc/self/fd"  # where Linux has the files of a process by their numbers
+BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # what a folder may hold that is replaced
 LONGEST_NAME = 255  # bytes, on nearly every file system
 
 
 @contextmanager
-def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
+def writing(path: str | None, *, force: bool = False, folder: bool = False) -> Iterator[Write]:
     """Open a place for results and yield what writes to it; each piece of text is out when the call returns.
 
     path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to as it
-    is.  Anything else is written to `NAME.PID.part` beside the file (the file itself, if the path is a link), which
-    takes the file's place, mode and owner when the block ends without an error and is removed otherwise; only
-    `kill -9` leaves it behind.
+    is.  Anything else is written to a file without a name in the same folder, which takes the file's place, mode and
+    owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
+    system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
+    folder: the path is that of a folder; each file in it begins with a piece that has a name
     Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
     of a pipe is gone.
     """
-    if path is None or path == "-":
+    if folder and path is not None:
+        with _filling(path, force=force) as fill:
+            yield fill
+    elif path is None or path == "-":
         yield _writer(sys.stdout.buffer, "standard output")
     elif (number := _own_stream(path)) is not None or is_special(path):
         with _problems_of(path):
@@ -96,33 +103,117 @@ def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
     place = os.path.realpath(path)
     refuse_existing(path, force=force)
     clean_up()
+    mode = 0o600 if os.path.exists(place) else 0o666
+    part = ""
     with _problems_of(path):
-        stream = _part_beside(place, 0o600 if os.path.exists(place) else 0o666)
+        stream = _unnamed_beside(place, mode)
+        if stream is None:
+            part, stream = _created(place, partial(_new_file, mode))
     try:
         with stream:
             yield stream
+            with _problems_of(path):
+                part = part or _created(place, partial(_name, stream))[0]
         refuse_existing(path, force=force)  # it may have come meanwhile
         with _problems_of(path):
-            _take_over(stream.name, place)
+            _take_over(part, place)
     except BaseException:
         with suppress(OSError):
-            os.unlink(stream.name)
+            os.unlink(part)
         raise
 
 
-def _part_beside(place: str, mode: int) -> BinaryIO:
-    """Create a part file that nobody else uses; its name is cut where the system's longest name would not hold it."""
+def _unnamed_beside(place: str, mode: int) -> BinaryIO | None:
+    """Open a file without a name in the folder of a place, which is gone with its process; None where none can be."""
+    if not (hasattr(os, "O_TMPFILE") and os.path.isdir(OPEN_FILES)):
+        return None
+    with suppress(OSError):  # not every file system has them
+        return open(os.open(os.path.dirname(place), os.O_TMPFILE | os.O_RDWR, mode), "wb", buffering=0)
+    return None
 
-    def opener(path: str, flags: int) -> int:
-        return os.open(path, flags, mode)
 
+def _name(stream: BinaryIO, name: str) -> None:
+    """Give a file that has none a name; raises FileExistsError for one that is taken."""
+    number = stream.fileno()
+    os.link(f"{OPEN_FILES}/{number}", name, src_dir_fd=number)  # any descriptor makes it follow that link
+
+
+def _new_file(mode: int, path: str) -> BinaryIO:
+    """Open a file that is not there yet."""
+    return open(path, "xb", buffering=0, opener=lambda path, flags: os.open(path, flags, mode))
+
+
+def _created(place: str, create: Callable[[str], Any]) -> tuple[str, Any]:
+    """Create a part beside a place that nobody else uses, and return its name, cut where the system's is too long."""
     folder, name = os.path.split(place)
     for attempt in count():
         suffix = f".{os.getpid()}{f'-{attempt}' if attempt else ''}.part"
         begin = os.fsencode(name)[: LONGEST_NAME - len(suffix)].decode(errors="ignore")
+        part = os.path.join(folder, begin + suffix)
         with suppress(FileExistsError):
-            return open(os.path.join(folder, begin + suffix), "xb", buffering=0, opener=opener)
+            return part, create(part)
     raise AssertionError(place)
+
+
+@contextmanager
+def _filling(path: str, *, force: bool) -> Iterator[Write]:
+    """Yield what fills a new folder, each file begun by a piece that has its name; it is there whole or not at all."""
+    place = os.path.realpath(path)
+    _refuse_folder(path, force=force)
+    clean_up()
+    files: dict[str, BinaryIO] = {}
+    part = ""
+
+    def fill(piece: str | bytes | memoryview) -> None:
+        nonlocal part
+        with _problems_of(path):
+            if name := getattr(piece, "name", ""):
+                stream = _unnamed_beside(place, 0o666)
+                if stream is None:
+                    part = part or _created(place, os.mkdir)[0]
+                    stream = open(os.path.join(part, name), "xb", buffering=0)  # noqa: SIM115 - closed below
+                files[name] = stream
+            _writer(files[next(reversed(files))], path)(piece)
+
+    try:
+        yield fill
+        with _problems_of(path):
+            part = part or _created(place, os.mkdir)[0]
+            for name, stream in files.items():
+                if isinstance(stream.name, int):
+                    _name(stream, os.path.join(part, name))
+            _refuse_folder(path, force=force)  # it may have come meanwhile
+            before = _created(place, partial(os.rename, place))[0] if os.path.isdir(place) else ""
+            os.rename(part, place)
+            _remove(before)
+    except BaseException:
+        _remove(part)
+        raise
+    finally:
+        for stream in files.values():
+            stream.close()
+
+
+def _remove(folder: str) -> None:
+    """Remove a folder, if there is one."""
+    if folder:
+        from shutil import rmtree
+
+        rmtree(folder, ignore_errors=True)
+
+
+def _refuse_folder(path: str, *, force: bool) -> None:
+    """Raise FileProblem for a folder that may not be replaced: without --force, or of other files than a bag's."""
+    refuse_existing(path, force=force)
+    if not os.path.lexists(path):
+        return
+    if not os.path.isdir(path):
+        raise FileProblem(f"{printable(path)}: is a file; a folder is to be written there")
+    if not force:
+        raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
+    others = sorted(name for name in os.listdir(path) if name != BAG_FILE and not name.endswith(BAG_DATA))
+    if others:
+        raise FileProblem(f"{printable(path)}: holds more than a bag ({shown(others[0])}); it is not replaced")
 
 
 def _take_over(part: str, place: str) -> None:

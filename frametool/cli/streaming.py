@@ -389,12 +389,11 @@ class Stream:
         """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
         from contextlib import closing, nullcontext
 
-        from frametool.cli.sink import writing
         from frametool.stream.run import run
         from frametool.view.progress import ProgressBar
 
         with (
-            nullcontext(lambda _: None) if gathers else writing(output.path, force=output.force) as write,
+            nullcontext(lambda _: None) if gathers else output.opened() as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
             closing(outcomes),  # ends the processes of --jobs
         ):

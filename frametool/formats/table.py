@@ -32,7 +32,8 @@ class Format(NamedTuple):
         holds one frame that moves; a `drawing`: who hangs under whom without poses, by `read`, for `tree` alone
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
-        are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`
+        are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`; as messages of a
+        `recording`, whose trees `tree_pieces` of `writer` yields
     signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
@@ -114,6 +115,7 @@ _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
 BAG = "frametool.ros.bags"
+_RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.ros.recordings"}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
@@ -261,15 +263,21 @@ FORMATS = {
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
-    "bag1": _read_tree("ROS 1 bag", BAG, suffixes=(".bag",), asks=("frames",),
-                       signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),)),
+    "bag1": _read_tree(
+        "ROS 1 bag", BAG, **_RECORDING, suffixes=(".bag",), asks=("frames",),
+        signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),),
+    ),
     "bag2": _read_tree(
         "ROS 2 bag: sqlite3, or a folder",
         BAG,
+        **_RECORDING,
         suffixes=(".db3",), asks=("frames",),
         signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
-    "mcap": _read_tree("MCAP file", BAG, suffixes=(".mcap",), asks=("frames",), signs=(("magic", rb"\x89MCAP0\r\n"),)),
+    "mcap": _read_tree(
+        "MCAP file", BAG, **_RECORDING, suffixes=(".mcap",), asks=("frames",),
+        signs=(("magic", rb"\x89MCAP0\r\n"),),
+    ),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
     "foxglove": Format("FrameTransform as JSON, one a line", writes=("poses", "tree"), writer="frametool.ros.foxglove"),
@@ -638,6 +646,16 @@ def is_trajectory(name: str) -> bool:
 def holds_arrays(name: str) -> bool:
     """Tell whether a form holds columns of numbers and no text."""
     return name in FORMATS and "arrays" in (*FORMATS[name].reads, *FORMATS[name].writes)
+
+
+def is_recording(name: str) -> bool:
+    """Tell whether a form is written as a recording of messages."""
+    return name in FORMATS and "recording" in FORMATS[name].writes
+
+
+def is_folder(name: str) -> bool:
+    """Tell whether a form is written as a folder of files."""
+    return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].signs)
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

@@ -5,7 +5,7 @@ In drawings an edge is a few words: millimetres and hundredths of a degree are e
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry import euler, floats, quaternion
@@ -25,6 +25,21 @@ if TYPE_CHECKING:
 INFINITE = float("inf")
 
 
+class Recorded(NamedTuple):
+    """What of results a recording holds.
+
+    kinds: the messages, by their names in `ros.recordings`; () as results are
+    topic: of all of them; "" the usual ones
+    frames: which frame poses are seen from and which is theirs, where they do not say it
+    folder: where there is room for it while it is written
+    """
+
+    kinds: tuple[str, ...] = ()
+    topic: str = ""
+    frames: tuple[str, ...] = ()
+    folder: str = ""
+
+
 class Style:
     """How results are written: format, notations, unit of bare angles, digits, sign of quaternions.
 
@@ -34,10 +49,12 @@ class Style:
     in_camera: whether they are seen from the same camera at another time
     place: how positions on the Earth are written, None where x, y, z are
     in_cm: whether positions are xyz_cm, for axes whose users count so
+    recording: what of results goes into a recording
     """
 
     __slots__ = (
         "axes", "degrees", "form", "full", "in_camera", "in_cm", "keep_sign", "notations", "place", "precision",
+        "recording",
     )  # fmt: skip
 
     def __init__(
@@ -55,6 +72,7 @@ class Style:
         self.axes = ""
         self.in_camera = self.in_cm = False
         self.place: Place | None = None
+        self.recording = Recorded()
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
@@ -68,6 +86,7 @@ class Style:
             keep_sign=self.keep_sign,
         )  # fmt: skip
         style.axes, style.in_camera, style.in_cm = self.axes, self.in_camera, self.in_cm
+        style.recording = self.recording
         style.put_at(self.place)
         return style
 

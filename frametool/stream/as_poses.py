@@ -15,12 +15,11 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER
 from frametool.formats.rows.trajectory import StampFile, blocks, describe
-from frametool.formats.table import FORMATS, is_trajectory
+from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.stream.array_writer import ArrayWriter
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
@@ -31,7 +30,7 @@ from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
-from frametool.stream.writers import LEARNED, TextWriter
+from frametool.stream.writers import LEARNED, writer_for
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -43,6 +42,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.request import Request
+    from frametool.stream.writers import BlockWriter
 
 QUATERNION = notation("quaternion")
 
@@ -78,7 +78,7 @@ class FormatConverter:
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
         """Yield the text of the results, block by block, and what comes behind the last."""
-        writer: TextWriter | ArrayWriter | None = None
+        writer: BlockWriter | None = None
         for step in self.steps(stream, header=header):
             poses, outcome = step
             if self.request.gathered is not None:
@@ -104,15 +104,14 @@ class FormatConverter:
             return self._rows(stream, header=header)
         return self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
 
-    def _writer(self) -> TextWriter | ArrayWriter:
+    def _writer(self) -> BlockWriter:
         """Choose what writes the results, by what they are."""
         operation = self.request.operation
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in self.request.extras(self.shape)]
         if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
             raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
-        writer = ArrayWriter if self.to_arrays else TextWriter
-        return writer(self.style, kind, extras, placed=self.placed)
+        return writer_for(self.style, kind, extras, placed=self.placed)
 
     def _zones(self, poses: RowPoses) -> list[RowNote]:
         """Return what there is to tell about the zones of results in UTM."""
@@ -180,7 +179,8 @@ class FormatConverter:
         """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""
         rows = getattr(import_module(FORMATS[self.style.form].writer), "ROWS", None)
         counts = bool(form.counted) and self.stamps is None
-        return None if counts and "stamps" not in getattr(rows, "holds", ("stamps",)) else stamps_ns
+        has_room = not is_recording(self.style.form) and "stamps" in getattr(rows, "holds", ("stamps",))
+        return stamps_ns if has_room or not counts else None
 
     # --- columns of numbers ---
 

@@ -15,6 +15,7 @@ from frametool.cli.options import (
     ColumnNames,
     Command,
     Number,
+    frames_out_option,
     limit_options,
     pose_result_options,
     window_of,
@@ -78,6 +79,7 @@ class ConvertCommand(Command):
     "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
 )
 @pose_result_options("poses", "points")
+@frames_out_option
 @explain_options
 @click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
 @click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of stamps, for the next three")

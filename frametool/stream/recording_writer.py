@@ -1,0 +1,171 @@
+"""Blocks of poses and points on their way into a recording: which messages they become, and what these cannot hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frametool.errors import ValueInvalid, first_of, listing, warn
+from frametool.formats.rows.pose_rows import MOST_NAMED
+from frametool.geometry import arrays, earth, quaternion
+from frametool.grammar.names import EARTH_FRAMES
+from frametool.ros.recordings import KINDS, RecordingFile, Template, check_stamps, serialised
+from frametool.stream.row_layout import POINT, POSE
+from frametool.stream.writers import refuse_scale_in
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Any
+
+    from frametool.grammar.result import Style
+    from frametool.stream.row_poses import RowPoses
+    from frametool.text.spans import Floats, Ints
+
+KINDS_OF = {POSE: ("pose", "tf", "path", "fix"), POINT: ("point", "fix")}  # what rows can become
+FRAMES = "world", "body"  # where nothing says them
+LLA = "lla"
+NO_STAMPS = "{}: the rows have no stamps, and messages need them; --stamps FILE says them, one a line"
+
+
+class RecordingWriter:
+    """Write blocks of poses or points as messages of one topic, or of several that go side by side."""
+
+    def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
+        """Choose the messages; kind: what a row is; extras: the numbers beside each; placed: poses have a position.
+
+        Raises ValueInvalid for rows and notations that no message holds, FileProblem without the extra.
+        """
+        self.style = style
+        self.kind = kind
+        self.placed = placed
+        asked = style.recording
+        if kind not in KINDS_OF:
+            raise ValueInvalid(f"{style.form} is not written of rows of a {kind}; write csv, json or yaml")
+        for name in asked.kinds:
+            if name not in KINDS_OF[kind]:
+                raise ValueInvalid(f"--messages {name} is not made of {kind}s; these are {', '.join(KINDS_OF[kind])}")
+        if style.place is not None and (style.place.name != LLA or style.place.more):
+            raise ValueInvalid(f"{style.form} holds places by lat lon alt only; leave --to {style.place.name} out")
+        if any(each.spec != "quaternion" for each in style.notations):
+            raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
+        self.kinds = asked.kinds or self._usual()
+        if asked.topic and len(self.kinds) > 1:
+            raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
+        self.file = RecordingFile(style.form, asked.folder)
+        self.channels: dict[str, Any] = {}
+        self.dropped = dict.fromkeys(extras)
+        self.templates: dict[tuple[str, str, str], Template] = {}
+        self.path: list[tuple[str, Ints, Floats]] = []
+        self.lost: dict[str, None] = {}  # names of frames that poses are of
+        self.is_named = True  # whether all rows say what they are seen from
+
+    def _usual(self) -> tuple[str, ...]:
+        """Return the messages where nobody says which; those of points depend on the frame they are given in."""
+        if self.style.place is not None:
+            return ("fix",)
+        asked = self.style.recording
+        return () if self.kind == POINT else ("pose", "tf") if asked.frames and not asked.topic else ("pose",)
+
+    def of_block(self, block: RowPoses) -> bytes:
+        """Write the messages of a block; their bytes come at the end."""
+        if not len(block.numbers):
+            return b""
+        stamps = block.stamps_ns
+        if stamps is None:
+            raise ValueInvalid(NO_STAMPS.format(self.style.form))
+        check_stamps(stamps, self.style.form)
+        self.dropped |= dict.fromkeys(block.extras)
+        refuse_scale_in(self.style.form, self.dropped)
+        if not self.kinds:
+            self.kinds = ("fix" if {*block.parents} <= {*EARTH_FRAMES} else "point",)
+        frames = self._frames(block)
+        numbers = self._numbers(block)
+        messages = [self._messages(name, frames, stamps, numbers) for name in self.kinds if name != "path"]
+        for name in self.kinds:
+            if name not in self.channels:
+                self.channels[name] = self.file.channel(KINDS[name], self.style.recording.topic)
+        channels = [self.channels[name] for name in self.kinds if name != "path"]
+        for stamp, *row in zip(stamps.tolist(), *messages, strict=True):
+            for channel, message in zip(channels, row, strict=True):
+                self.file.write(channel, stamp, message)
+        if "path" in self.kinds:
+            self.path += [(frames[0][0], stamps, numbers)]
+        return b""
+
+    def end(self) -> Iterator[bytes]:
+        """Yield the recording, and tell what was left out or made up."""
+        if self.path:
+            self._write_path()
+        form = self.style.form
+        if not self.is_named:
+            warn(f"{form}: nothing names the frame that the rows are seen from; {FRAMES[0]!r} is written")
+        if self.lost:
+            kinds = f"; --messages {self.kinds[0]},tf keeps them" if self.kind == POSE else ""
+            warn(f"{form}: names of frames left out: {first_of([*self.lost], MOST_NAMED)}{kinds}")
+        if self.dropped:
+            warn(f"{form}: {listing(self.dropped, MOST_NAMED)} left out")
+        yield from self.file.pieces()
+
+    def _frames(self, block: RowPoses) -> list[tuple[str, str]]:
+        """Return (parent, child) of each row, or one for all."""
+        said = self.style.recording.frames
+        parent, child = said or FRAMES
+        if said and any((*block.parents, *block.names)):
+            raise ValueInvalid("the rows name their frames; leave --frames out")
+        if not all(block.parents) and not said:
+            self.is_named = False
+        if "tf" in self.kinds and not all(block.names) and not said:
+            raise ValueInvalid("--messages tf needs the names of both frames; --frames A,B says them")
+        if "tf" not in self.kinds:
+            self.lost |= dict.fromkeys(filter(None, block.names))
+        size = max(len(block.parents), len(block.names))
+        parents, names = (list(each) * (size if len(each) == 1 else 1) for each in (block.parents, block.names))
+        return [(parents[at] or parent, names[at] or child) for at in range(size)]
+
+    def _numbers(self, block: RowPoses) -> Floats:
+        """Return position and quaternion, or a point, of each row as they are written."""
+        numbers = block.numbers[:, : 7 if self.kind == POSE else 3]
+        if self.kind == POSE and not self.placed:
+            numbers = np.column_stack([np.zeros((len(numbers), 3)), numbers[:, :4]])
+        if not np.isfinite(numbers).all():
+            raise ValueInvalid("a result is too large for a double")
+        if "fix" in self.kinds:
+            self.dropped |= dict.fromkeys(["rotation"] * (self.kind == POSE))
+            x, y, z = numbers[:, :3].T
+            return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
+        if self.kind == POSE and not self.style.keep_sign:
+            x, y, z, w = numbers[:, 3:].T
+            x, y, z, w = quaternion.unit(x, y, z, w, arrays)
+            numbers = np.column_stack([numbers[:, :3], *quaternion.from_quaternion(x, y, z, w, arrays)])
+        return numbers + 0.0  # none is -0.0
+
+    def _messages(
+        self, name: str, frames: Sequence[tuple[str, str]], stamps: Ints, numbers: Floats
+    ) -> Sequence[bytes]:
+        """Return the message of each row."""
+        if len(frames) == 1:
+            return self._template(name, *frames[0]).filled(stamps, numbers)
+        made: dict[int, bytes] = {}
+        rows_of: dict[tuple[str, str], list[int]] = {}
+        for row, each in enumerate(frames):
+            rows_of.setdefault(each, []).append(row)
+        for each, rows in rows_of.items():
+            made |= zip(rows, self._template(name, *each).filled(stamps[rows], numbers[rows]), strict=True)
+        return [made[row] for row in range(len(frames))]
+
+    def _template(self, name: str, parent: str, child: str) -> Template:
+        key = (name, parent, child)
+        if key not in self.templates:
+            self.templates[key] = Template(KINDS[name], self.style.form, parent, child)
+        return self.templates[key]
+
+    def _write_path(self) -> None:
+        """Write all poses in one message, at the last stamp."""
+        parents = {parent for parent, _, _ in self.path}
+        if len(parents) > 1:
+            raise ValueInvalid(f"a path is seen from one frame, the poses from {listing(parents)}")
+        stamps = [stamp for _, each, _ in self.path for stamp in each.tolist()]
+        poses = [pose for _, _, each in self.path for pose in each.tolist()]
+        message = serialised(KINDS["path"], self.style.form, [(parents.pop(), "")] * len(poses), stamps, poses)
+        self.file.write(self.channels["path"], stamps[-1], message)
