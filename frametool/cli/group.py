@@ -56,6 +56,7 @@ class CommandSettings:
     array: str | None = None
     messages: Sequence[str] = ()
     topic_out: str | None = None
+    recorded_frames: str | None = None
     origin: str | None = None
     local_axes: str | None = None
     zone: str | None = None
@@ -149,8 +150,8 @@ GROUPS = {
         "target_column", "source_column",
     ),
     "Result (help errors)": (
-        "output", "force", "precision", "covariance", "messages", "topic_out", "explain", "explain_full",
-        "explain_step", "color",
+        "output", "force", "precision", "covariance", "messages", "topic_out", "recorded_frames", "explain",
+        "explain_full", "explain_step", "color",
     ),
     "Forms that leave something open (help formats)": (
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array", "order",

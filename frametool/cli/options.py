@@ -432,7 +432,7 @@ _RECORDING = (
 )  # fmt: skip
 # of commands that have no --frames for what they read
 frames_out_option = _setting(
-    "--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+    "--frames", "recorded_frames", type=TEXT, metavar="WORLD,BODY",
     help="what the frames of poses in a recording are called; adds /tf",
 )  # fmt: skip
 

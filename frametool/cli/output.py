@@ -20,7 +20,16 @@ from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
-from frametool.formats.table import FORMATS, by_name, holds_arrays, is_folder, is_recording, is_trajectory, writers
+from frametool.formats.table import (
+    FORMATS,
+    by_name,
+    has_no_text,
+    holds_arrays,
+    is_folder,
+    is_recording,
+    is_trajectory,
+    writers,
+)
 from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.result import Recorded, Result, Style, is_locked, sample_results
 
@@ -76,7 +85,7 @@ class Output:
         self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
         self._in_blocks = self.is_trajectory or self._holds_arrays or is_recording(form)
         self.holds_all = self._in_blocks or form == "csv"  # rows, of which there may be many
-        if self._holds_arrays:
+        if has_no_text(form):
             refuse_unused(f"is not used: {form} holds numbers, not their text", "precision")
         if self._holds_arrays and output is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
@@ -291,19 +300,20 @@ def recorded(form: str, output: str | None) -> Recorded:
     """Return what of results a recording holds, as options say; elsewhere they are not used."""
     chosen = settings()
     if not is_recording(form):
-        refuse_unused(f"is about recordings, {form} is none; -f {'|'.join(RECORDINGS)}", "messages", "topic_out")
+        why = f"is about recordings, {form} is none; -f {'|'.join(RECORDINGS)}"
+        refuse_unused(why, "messages", "topic_out", "recorded_frames")
         return Recorded()
     if output in (None, "-"):
         raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
     if is_folder(form) and output.endswith(FORMATS[form].suffixes):
         raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
-    frames = tuple(chosen.named_frames[0].split(",")) if chosen.named_frames else ()
-    if frames:
-        if len(frames) != 2 or not all(frames):
-            raise UsageError(f"--frames takes WORLD,BODY; found {shown(chosen.named_frames[0])}")
-        chosen.inputs = (*chosen.inputs, ("", ("frames",)))
-    folder = os.path.dirname(os.path.abspath(output)) if os.path.isdir(os.path.dirname(os.path.abspath(output))) else ""
-    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder)
+    told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
+    frames = tuple(name.strip() for name in told.split(",")) if told else ()
+    if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
+        raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
+    chosen.inputs = (*chosen.inputs, *[("", ("frames",))] * bool(chosen.named_frames))
+    folder = os.path.dirname(os.path.abspath(output))
+    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder if os.path.isdir(folder) else "")
 
 
 def in_colour(text: str, marks: Sequence[str]) -> str:

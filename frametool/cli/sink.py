@@ -183,7 +183,9 @@ def _filling(path: str, *, force: bool) -> Iterator[Write]:
                 if isinstance(stream.name, int):
                     _name(stream, os.path.join(part, name))
             _refuse_folder(path, force=force)  # it may have come meanwhile
-            before = _created(place, partial(os.rename, place))[0] if os.path.isdir(place) else ""
+            before = f"{part}.before" if os.path.isdir(place) else ""
+            if before:
+                os.rename(place, before)
             os.rename(part, place)
             _remove(before)
     except BaseException:

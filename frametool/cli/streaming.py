@@ -27,7 +27,7 @@ from frametool.cli.options import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.table import FORMATS, ORDERS, holds_arrays, is_trajectory, readers
+from frametool.formats.table import FORMATS, ORDERS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
@@ -352,7 +352,9 @@ class Stream:
         if self.options["on_error"] == NULL and output.told not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
         bad = self.policy(self.name)
-        request = request._replace(by_default=holds_arrays(output.told or "") and not output.notations)
+        request = request._replace(by_default=has_no_text(output.told or "") and not output.notations)
+        if is_recording(output.told or ""):
+            request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
         output.values(stream_results(stream, form, request, output.style, bad))
         return ROWS_SKIPPED if bad.count else 0
 
@@ -370,7 +372,7 @@ class Stream:
             raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
         if form in RECORDS:
             refuse_unused("is for tables; a record names its own numbers", "columns", "header")
-        if holds_arrays(output.told or form) and request.gathered is None:
+        if has_no_text(output.told or form) and request.gathered is None:
             refuse_unused(f"is not used: {output.told or form} holds numbers, not their text", "precision")
         return request._replace(
             given=request.given or self.given,

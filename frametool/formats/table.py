@@ -653,6 +653,11 @@ def is_recording(name: str) -> bool:
     return name in FORMATS and "recording" in FORMATS[name].writes
 
 
+def has_no_text(name: str) -> bool:
+    """Tell whether a form holds numbers, in columns or messages, and nothing of how its input was written."""
+    return holds_arrays(name) or is_recording(name)
+
+
 def is_folder(name: str) -> bool:
     """Tell whether a form is written as a folder of files."""
     return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].signs)

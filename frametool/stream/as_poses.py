@@ -5,6 +5,7 @@ rows or listed poses -> the operation -> blocks of poses -> the text of the othe
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -24,7 +25,7 @@ from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
 from frametool.stream.header import listed
-from frametool.stream.row_layout import POINT, POSE, Shape, Target
+from frametool.stream.row_layout import AS_READ, POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
@@ -34,15 +35,17 @@ from frametool.stream.writers import LEARNED, writer_for
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator, Sequence
     from io import BufferedReader
 
+    from frametool.formats.rows.column_file import Batch
     from frametool.formats.rows.trajectory import PoseBlock
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.request import Request
     from frametool.stream.writers import BlockWriter
+    from frametool.text.spans import Floats, Ints
 
 QUATERNION = notation("quaternion")
 
@@ -150,6 +153,7 @@ class FormatConverter:
             poses = rows.of_block(text)
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
+            poses = self._with_place(poses, lambda: [*rows.given])
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
             if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
@@ -195,6 +199,8 @@ class FormatConverter:
         yield Step(rows.poses(opened.nothing()), Outcome(b""))
         for batch in opened.batches():
             poses = rows.poses(batch)
+            numbers = partial(_numbers_of, batch, rows.layout.places, poses.lines)
+            poses = self._with_place(poses, numbers)
             if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
@@ -205,6 +211,13 @@ class FormatConverter:
         if self.without:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.form} has no place for them")
+
+    def _with_place(self, poses: RowPoses, numbers: Callable[[], Sequence[Any]]) -> RowPoses:
+        """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
+        if not is_recording(self.style.form) or self.shape.place is None:
+            return poses
+        read = self.request.operation.place_as_read(self.shape, numbers())
+        return poses._replace(extras={**poses.extras, AS_READ: np.column_stack(read)}) if read else poses
 
     # --- forms that list poses ---
 
@@ -242,6 +255,11 @@ class FormatConverter:
             found = sorted(faults + run.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
             faults.clear()
+
+
+def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints) -> list[Floats]:
+    """Return some columns of a batch in some of its rows."""
+    return [batch.numbers(place).values[rows] for place in places]
 
 
 def _none() -> RowPoses:

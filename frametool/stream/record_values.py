@@ -15,16 +15,16 @@ from frametool.documents.document import NOTHING, Aliased, Node, parse_documents
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
-from frametool.formats.table import holds_arrays
+from frametool.formats.table import has_no_text, is_recording
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
-from frametool.grammar.readers import Misfit, NotARotation, Note, tell
+from frametool.grammar.readers import Misfit, NotARotation, Note, Reading, tell
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.request import Memory, Request
-from frametool.stream.row_layout import PARTS, POSE, ROTATION, checked_rotation
+from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled
@@ -288,15 +288,15 @@ def _values(
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif is_list or not _stays(node, kind, style):
-            yield _flat(node, unit, each, request, style.form)
+            yield _flat(node, unit, each, request, style.form, spliced.source)
         else:
             yield spliced.at(unit)
 
 
 def _stays(node: Node, kind: str, style: Style) -> bool:
     """Tell whether what is no pose is written as the mapping it is: in no table, and as a message only if it is one."""
-    if style.form == "csv" or holds_arrays(style.form) or kind in PARTS:
-        return kind in PARTS and style.form != "csv" and not holds_arrays(style.form)
+    if style.form == "csv" or has_no_text(style.form) or kind in PARTS:
+        return kind in PARTS and style.form != "csv" and not has_no_text(style.form)
     return style.form != "text" and (style.form not in ("ros1", "ros2") or "header" in (node.value or ()))
 
 
@@ -407,7 +407,7 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> dict[str, Any]:
+def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, source: Source) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
     entry = made.entry
     kind = entry.record.shape.kind
@@ -423,8 +423,22 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> 
         named = point_entry(entry.parent, made.parts[:3], entry.target.place)
     else:
         named[kind] = numbers
+    if is_recording(form) and request.operation.keeps_frames:
+        holder = node.at(entry.record.path[len(unit) :])
+        named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record, source)) else {}
     rest = _with_stamp_ns(_rest(node, unit, entry.record), form)
     return antenna | named | _header_stamp(entry.record) | beside | rest
+
+
+def _place_as_read(node: Node, record: Record, source: Source) -> list[float]:
+    """Return lat, lon and alt where a record says them; [] elsewhere."""
+    from frametool.grammar.place import LLA_KEYS, read_at
+
+    keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
+    if not keys:
+        return []
+    place, numbers = read_at({key: str(plain(node.at((key,)))) for key in keys}, Reading(source))
+    return [*place.lla(numbers)]
 
 
 def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Spliced) -> dict[str, Any]:

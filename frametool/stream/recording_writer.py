@@ -11,7 +11,8 @@ from frametool.formats.rows.pose_rows import MOST_NAMED
 from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.ros.recordings import KINDS, RecordingFile, Template, check_stamps, serialised
-from frametool.stream.row_layout import POINT, POSE
+from frametool.stream.row_layout import AS_READ, POINT, POSE
+from frametool.stream.row_poses import plain_cells
 from frametool.stream.writers import refuse_scale_in
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 KINDS_OF = {POSE: ("pose", "tf", "path", "fix"), POINT: ("point", "fix")}  # what rows can become
 FRAMES = "world", "body"  # where nothing says them
+NAME = "name"
+ANTENNA = "gps"  # the frame of a fix is that of its antenna
 LLA = "lla"
 NO_STAMPS = "{}: the rows have no stamps, and messages need them; --stamps FILE says them, one a line"
 
@@ -50,6 +53,8 @@ class RecordingWriter:
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
         self.kinds = asked.kinds or self._usual()
+        if "fix" in self.kinds and len(self.kinds) > 1:
+            raise ValueInvalid("--messages fix stands alone: its numbers are lat, lon, alt")
         if asked.topic and len(self.kinds) > 1:
             raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
         self.file = RecordingFile(style.form, asked.folder)
@@ -75,12 +80,13 @@ class RecordingWriter:
         if stamps is None:
             raise ValueInvalid(NO_STAMPS.format(self.style.form))
         check_stamps(stamps, self.style.form)
-        self.dropped |= dict.fromkeys(block.extras)
-        refuse_scale_in(self.style.form, self.dropped)
         if not self.kinds:
             self.kinds = ("fix" if {*block.parents} <= {*EARTH_FRAMES} else "point",)
+        used = (AS_READ, NAME) if "fix" in self.kinds else ()
+        self.dropped |= dict.fromkeys(name for name in block.extras if name not in used)
+        refuse_scale_in(self.style.form, self.dropped)
         frames = self._frames(block)
-        numbers = self._numbers(block)
+        numbers = self._places(block) if "fix" in self.kinds else self._numbers(block)
         messages = [self._messages(name, frames, stamps, numbers) for name in self.kinds if name != "path"]
         for name in self.kinds:
             if name not in self.channels:
@@ -110,9 +116,12 @@ class RecordingWriter:
     def _frames(self, block: RowPoses) -> list[tuple[str, str]]:
         """Return (parent, child) of each row, or one for all."""
         said = self.style.recording.frames
+        if self.kinds == ("fix",):
+            return [(name or ANTENNA, "") for name in self._antennas(block)]
         parent, child = said or FRAMES
-        if said and any((*block.parents, *block.names)):
-            raise ValueInvalid("the rows name their frames; leave --frames out")
+        there = {each for each in (*block.parents, *block.names) if each and each not in said}
+        if said and there:
+            raise ValueInvalid(f"the rows name other frames than --frames: {listing(there)}; leave --frames out")
         if not all(block.parents) and not said:
             self.is_named = False
         if "tf" in self.kinds and not all(block.names) and not said:
@@ -130,15 +139,28 @@ class RecordingWriter:
             numbers = np.column_stack([np.zeros((len(numbers), 3)), numbers[:, :4]])
         if not np.isfinite(numbers).all():
             raise ValueInvalid("a result is too large for a double")
-        if "fix" in self.kinds:
-            self.dropped |= dict.fromkeys(["rotation"] * (self.kind == POSE))
-            x, y, z = numbers[:, :3].T
-            return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
         if self.kind == POSE and not self.style.keep_sign:
             x, y, z, w = numbers[:, 3:].T
             x, y, z, w = quaternion.unit(x, y, z, w, arrays)
             numbers = np.column_stack([numbers[:, :3], *quaternion.from_quaternion(x, y, z, w, arrays)])
         return numbers + 0.0  # none is -0.0
+
+    @staticmethod
+    def _antennas(block: RowPoses) -> Sequence[str | None]:
+        """Return the names of what was at each place, or one for all; those of points are no more than an extra."""
+        found = plain_cells(block.extras[NAME]) if NAME in block.extras else block.names
+        return found if len({*found}) > 1 else found[:1]
+
+    def _places(self, block: RowPoses) -> Floats:
+        """Return lat, lon, alt of each row, as they were read where nothing changed them."""
+        if not {*block.parents} <= {*EARTH_FRAMES}:
+            others = listing(each or "no frame" for each in block.parents if each not in EARTH_FRAMES)
+            raise ValueInvalid(f"a fix is a place on the Earth: of rows in ecef, found {others}")
+        self.dropped |= dict.fromkeys(["rotation"] * (self.kind == POSE))
+        if (read := block.extras.get(AS_READ)) is not None:
+            return np.array([*read], np.float64) + 0.0
+        x, y, z = (np.ascontiguousarray(column) for column in block.numbers.T[:3])
+        return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
 
     def _messages(
         self, name: str, frames: Sequence[tuple[str, str]], stamps: Ints, numbers: Floats

@@ -158,6 +158,12 @@ class Operation(NamedTuple):
         changed = self.left or self.right or self.of or self.moves or self.mirrors
         return not (changed or self.inverse)
 
+    def place_as_read(self, shape: Shape, numbers: Sequence[Any]) -> Components:
+        """Return lat, lon and alt of a row's numbers where these say them and nothing changes them; () elsewhere."""
+        place = shape.place
+        is_kept = place is not None and place.name == "lla" and self.keeps_frames
+        return place.lla(numbers[: place.size]) if place is not None and is_kept else ()
+
     @property
     def keeps_frames(self) -> bool:
         """Tell whether records stay in the frames they name."""

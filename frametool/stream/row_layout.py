@@ -37,6 +37,7 @@ MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbe
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
+AS_READ = "lat lon alt as read"  # beside a point of ecef: of its row, for what is written of them again
 FLAT = 1e-9  # radians, metres: what a number without a column may be
 LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 # how many make a metre, where they differ of x, y, z each; or how positions on the Earth are written
