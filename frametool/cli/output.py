@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
     from frametool.stream.request import Operation
+    from frametool.stream.row_poses import RowPoses
     from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
@@ -168,33 +169,45 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
-    def _blocks(self, results: Iterator[Result]) -> Iterator[bytes]:
-        """Yield the poses of a trajectory, or columns of numbers, block after block."""
-        from frametool.stream.row_layout import POSE
-        from frametool.stream.row_poses import block_of
+    def _blocks(self, values: Iterator[Result | dict[str, Any]]) -> Iterator[bytes]:
+        """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
         from frametool.stream.writers import writer_for
 
-        batch = list(islice(results, BLOCK))
-        placed = not (self._holds_arrays and all(each.pose.position is None for each in batch))
-        writer = writer_for(self.style, POSE, placed=placed)
+        batch = list(islice(values, BLOCK))
+        placed = not (self._holds_arrays and all(map(_has_no_position, batch)))
+        kind, block = self._block(batch, placed=placed)
+        writer = writer_for(self.style, kind, placed=placed)
         while batch:
-            yield writer.of_block(block_of(batch, placed=placed))
-            batch = list(islice(results, BLOCK))
+            yield writer.of_block(block)
+            if batch := list(islice(values, BLOCK)):
+                known, (kind, block) = kind, self._block(batch, placed=placed)
+                if kind != known:
+                    raise ValueInvalid(f"{self.style.form} holds things of one kind, found {known} and {kind}")
         yield from writer.end()
+
+    def _block(self, batch: list[Result | dict[str, Any]], *, placed: bool) -> tuple[str, RowPoses]:
+        """Return some results as a block, and what they are: poses, or points, vectors, .."""
+        from frametool.stream.row_layout import POSE
+        from frametool.stream.row_poses import block_of, block_of_points
+
+        found = list(map(_as_pose if self.is_trajectory else _as_point, batch))
+        poses = [each for each in found if isinstance(each, Result)]
+        if len(poses) == len(found):
+            return POSE, block_of(poses, placed=placed)
+        if poses:
+            raise ValueInvalid(f"{self.style.form} holds things of one kind, found poses among others")
+        return block_of_points([each for each in found if not isinstance(each, Result)])
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
-        if self.is_trajectory:
-            self.poses(map(_as_pose, values))
+        if self._in_blocks:
+            self._refuse_place()
+            self.pieces(self._blocks(iter(values)))
             return
         found = list(values)
-        if self._holds_arrays:
-            found = [_as_point(each) for each in found]
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
             self.poses(poses)
-        elif poses and self._holds_arrays:
-            raise ValueInvalid(f"{self.style.form} holds things of one kind, found poses among others")
         else:
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
 
@@ -239,12 +252,7 @@ class Output:
         if self.style.form in FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
         if self._in_blocks:
-            from frametool.stream.row_poses import block_of_points
-            from frametool.stream.writers import writer_for
-
-            kind, block = block_of_points(found)
-            writer = writer_for(self.style, kind)
-            self.pieces([writer.of_block(block), *writer.end()])
+            self.pieces(self._blocks(iter(found)))
             return
         placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
         self._tell_dropped(key for each in placed for key in each)
@@ -323,6 +331,11 @@ def in_colour(text: str, marks: Sequence[str]) -> str:
     from frametool.view.tree_text import coloured
 
     return coloured(text, marks)
+
+
+def _has_no_position(value: Result | dict[str, Any]) -> bool:
+    """Tell a rotation without a position."""
+    return isinstance(value, Result) and value.pose.position is None
 
 
 def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:

@@ -15,7 +15,7 @@ from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeAlias
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self, TypeAlias
 from weakref import finalize
 
 import numpy as np
@@ -91,11 +91,11 @@ class RecordingFile:
         self.log_ns = 0
         self._store = typestore(form)
         self._home = Path(mkdtemp(".part", ".frametool.", folder or None))
-        self._clean = finalize(self, rmtree, self._home, ignore_errors=True)
         bag = self._home / NAME
         self._writer: Any = Writer1(bag) if form == BAG1 else Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
         self._file = (bag if form == BAG1 else bag / f"{NAME}.mcap").open("rb")
+        self._discard = finalize(self, _discarded, self._writer, self._file, self._home)
         with suppress(OSError):  # Windows does not let go of the name of an open file
             rmtree(self._home)
 
@@ -118,15 +118,21 @@ class RecordingFile:
         bag.mkdir(parents=True, exist_ok=True)
         self._writer.close()
         metadata = b"" if self.form == BAG1 else (bag / METADATA).read_bytes()
-        with self._file:
+        piece = self._file.read(PIECE)
+        if self.form == BAG2:
+            yield FirstPiece(metadata, METADATA)
+            piece = FirstPiece(piece, f"{NAME}.mcap")
+        while piece:
+            yield piece
             piece = self._file.read(PIECE)
-            if self.form == BAG2:
-                yield FirstPiece(metadata, METADATA)
-                piece = FirstPiece(piece, f"{NAME}.mcap")
-            while piece:
-                yield piece
-                piece = self._file.read(PIECE)
-        self._clean()
+        self._discard()
+
+
+def _discarded(writer: Any, file: IO[bytes], folder: Path) -> None:
+    """Close what was opened for a recording, and remove what is left of it."""
+    writer.abort()
+    file.close()
+    rmtree(folder, ignore_errors=True)
 
 
 @lru_cache
