@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
+from frametool.cli.recording import MESSAGES, parse_messages
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -405,28 +406,8 @@ def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
     return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
 
 
-class Messages(Text):
-    """Kinds of messages, with commas between them."""
-
-    name = "messages"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse unknown ones."""
-        kinds = tuple(dict.fromkeys(value.split(","))) if isinstance(value, str) else tuple(value or ())
-        if unknown := [each for each in kinds if each not in MESSAGES]:
-            near = did_you_mean(unknown[0], MESSAGES)
-            self.fail(f"{shown(unknown[0])} is none of {', '.join(MESSAGES)}{near}", param, ctx)
-        return kinds
-
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
-        """Offer the kinds behind the last comma."""
-        done, comma, _ = incomplete.rpartition(",")
-        return dict.fromkeys((done + comma + name for name in MESSAGES), "")
-
-
-MESSAGES = ("pose", "tf", "path", "point", "fix")
 _RECORDING = (
-    _setting("--messages", "messages", type=Messages(), metavar="KIND,..", default=(),
+    _setting("--messages", "messages", type=Parsed("messages", parse_messages), metavar="KIND,..", default=(),
              help=f"messages of a recording: {', '.join(MESSAGES)}  [default: as the rows are]"),
     _setting("--topic-out", "topic_out", type=TEXT, metavar="NAME", help="the topic of a recording with one"),
 )  # fmt: skip

@@ -17,6 +17,7 @@ from click import UsageError
 
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
+from frametool.cli.recording import RECORDINGS, recorded
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
@@ -31,7 +32,7 @@ from frametool.formats.table import (
     writers,
 )
 from frametool.geometry.representations import EARTH_FRAMES, notation
-from frametool.grammar.result import Recorded, Result, Style, is_locked, sample_results
+from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
     from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
-RECORDINGS = writers("recording")
 BLOCK = 1 << 13  # poses of a trajectory
 
 
@@ -171,7 +171,7 @@ class Output:
 
     def _blocks(self, values: Iterator[Result | dict[str, Any]]) -> Iterator[bytes]:
         """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
-        from frametool.stream.writers import writer_for
+        from frametool.stream.block_writer import writer_for
 
         batch = list(islice(values, BLOCK))
         placed = not (self._holds_arrays and all(map(_has_no_position, batch)))
@@ -290,7 +290,11 @@ class Output:
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
-        return writing(self.path, force=self.force, folder=is_folder(self.style.form))
+        if is_folder(self.style.form) and self.path is not None:
+            from frametool.cli.folder_sink import filling
+
+            return filling(self.path, force=self.force)
+        return writing(self.path, force=self.force)
 
     def _tell_of_suffix(self) -> None:
         """Say what a file holds whose suffix stands for no form, where none was told."""
@@ -302,26 +306,6 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
-
-
-def recorded(form: str, output: str | None) -> Recorded:
-    """Return what of results a recording holds, as options say; elsewhere they are not used."""
-    chosen = settings()
-    if not is_recording(form):
-        why = f"is about recordings, {form} is none; -f {'|'.join(RECORDINGS)}"
-        refuse_unused(why, "messages", "topic_out", "recorded_frames")
-        return Recorded()
-    if output in (None, "-"):
-        raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
-    if is_folder(form) and output.endswith(FORMATS[form].suffixes):
-        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
-    told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
-    frames = tuple(name.strip() for name in told.split(",")) if told else ()
-    if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
-        raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
-    chosen.inputs = (*chosen.inputs, *[("", ("frames",))] * bool(chosen.named_frames))
-    folder = os.path.dirname(os.path.abspath(output))
-    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder if os.path.isdir(folder) else "")
 
 
 def in_colour(text: str, marks: Sequence[str]) -> str:

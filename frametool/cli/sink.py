@@ -20,35 +20,30 @@ if TYPE_CHECKING:
     Write = Callable[[str | bytes | memoryview], None]
 
 OPEN_FILES = "/proc/self/fd"  # where Linux has the files of a process by their numbers
-BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # what a folder may hold that is replaced
 LONGEST_NAME = 255  # bytes, on nearly every file system
 
 
 @contextmanager
-def writing(path: str | None, *, force: bool = False, folder: bool = False) -> Iterator[Write]:
+def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     """Open a place for results and yield what writes to it; each piece of text is out when the call returns.
 
     path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to as it
     is.  Anything else is written to a file without a name in the same folder, which takes the file's place, mode and
     owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
     system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
-    folder: the path is that of a folder; each file in it begins with a piece that has a name
     Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
     of a pipe is gone.
     """
-    if folder and path is not None:
-        with _filling(path, force=force) as fill:
-            yield fill
-    elif path is None or path == "-":
-        yield _writer(sys.stdout.buffer, "standard output")
+    if path is None or path == "-":
+        yield writer_into(sys.stdout.buffer, "standard output")
     elif (number := _own_stream(path)) is not None or is_special(path):
-        with _problems_of(path):
+        with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
-            yield _writer(special, path)
+            yield writer_into(special, path)
     else:
         with _replacing(path, force=force) as part:
-            yield _writer(part, path)
+            yield writer_into(part, path)
 
 
 def refuse_existing(path: str | None, *, force: bool) -> None:
@@ -68,10 +63,12 @@ def _own_stream(path: str) -> int | None:
     return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(path)
 
 
-def _writer(stream: BinaryIO, name: str) -> Write:
+def writer_into(stream: BinaryIO, name: str) -> Write:
+    """Return what writes pieces into an open stream, which messages call by a name."""
+
     def write(piece: str | bytes | memoryview) -> None:
         view = memoryview(_encoded(piece) if isinstance(piece, str) else piece)
-        with _problems_of(name), whole_lines():
+        with problems_of(name), whole_lines():
             while view:  # an unbuffered stream may take a part
                 view = view[stream.write(view) :]
             stream.flush()
@@ -87,7 +84,7 @@ def _encoded(text: str) -> bytes:
 
 
 @contextmanager
-def _problems_of(name: str) -> Iterator[None]:
+def problems_of(name: str) -> Iterator[None]:
     """Name the place in what the system reports of it; a reader that is gone is no problem."""
     try:
         yield
@@ -105,17 +102,17 @@ def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
     clean_up()
     mode = 0o600 if os.path.exists(place) else 0o666
     part = ""
-    with _problems_of(path):
-        stream = _unnamed_beside(place, mode)
+    with problems_of(path):
+        stream = unnamed_beside(place, mode)
         if stream is None:
-            part, stream = _created(place, partial(_new_file, mode))
+            part, stream = created(place, partial(_new_file, mode))
     try:
         with stream:
             yield stream
-            with _problems_of(path):
-                part = part or _created(place, partial(_name, stream))[0]
+            with problems_of(path):
+                part = part or created(place, partial(give_name, stream))[0]
         refuse_existing(path, force=force)  # it may have come meanwhile
-        with _problems_of(path):
+        with problems_of(path):
             _take_over(part, place)
     except BaseException:
         with suppress(OSError):
@@ -123,7 +120,7 @@ def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
         raise
 
 
-def _unnamed_beside(place: str, mode: int) -> BinaryIO | None:
+def unnamed_beside(place: str, mode: int) -> BinaryIO | None:
     """Open a file without a name in the folder of a place, which is gone with its process; None where none can be."""
     if not (hasattr(os, "O_TMPFILE") and os.path.isdir(OPEN_FILES)):
         return None
@@ -132,7 +129,7 @@ def _unnamed_beside(place: str, mode: int) -> BinaryIO | None:
     return None
 
 
-def _name(stream: BinaryIO, name: str) -> None:
+def give_name(stream: BinaryIO, name: str) -> None:
     """Give a file that has none a name; raises FileExistsError for one that is taken."""
     number = stream.fileno()
     os.link(f"{OPEN_FILES}/{number}", name, src_dir_fd=number)  # any descriptor makes it follow that link
@@ -143,7 +140,7 @@ def _new_file(mode: int, path: str) -> BinaryIO:
     return open(path, "xb", buffering=0, opener=lambda path, flags: os.open(path, flags, mode))
 
 
-def _created(place: str, create: Callable[[str], Any]) -> tuple[str, Any]:
+def created(place: str, create: Callable[[str], Any]) -> tuple[str, Any]:
     """Create a part beside a place that nobody else uses, and return its name, cut where the system's is too long."""
     folder, name = os.path.split(place)
     for attempt in count():
@@ -153,69 +150,6 @@ def _created(place: str, create: Callable[[str], Any]) -> tuple[str, Any]:
         with suppress(FileExistsError):
             return part, create(part)
     raise AssertionError(place)
-
-
-@contextmanager
-def _filling(path: str, *, force: bool) -> Iterator[Write]:
-    """Yield what fills a new folder, each file begun by a piece that has its name; it is there whole or not at all."""
-    place = os.path.realpath(path)
-    _refuse_folder(path, force=force)
-    clean_up()
-    files: dict[str, BinaryIO] = {}
-    part = ""
-
-    def fill(piece: str | bytes | memoryview) -> None:
-        nonlocal part
-        with _problems_of(path):
-            if name := getattr(piece, "name", ""):
-                stream = _unnamed_beside(place, 0o666)
-                if stream is None:
-                    part = part or _created(place, os.mkdir)[0]
-                    stream = open(os.path.join(part, name), "xb", buffering=0)  # noqa: SIM115 - closed below
-                files[name] = stream
-            _writer(files[next(reversed(files))], path)(piece)
-
-    try:
-        yield fill
-        with _problems_of(path):
-            part = part or _created(place, os.mkdir)[0]
-            for name, stream in files.items():
-                if isinstance(stream.name, int):
-                    _name(stream, os.path.join(part, name))
-            _refuse_folder(path, force=force)  # it may have come meanwhile
-            before = f"{part}.before" if os.path.isdir(place) else ""
-            if before:
-                os.rename(place, before)
-            os.rename(part, place)
-            _remove(before)
-    except BaseException:
-        _remove(part)
-        raise
-    finally:
-        for stream in files.values():
-            stream.close()
-
-
-def _remove(folder: str) -> None:
-    """Remove a folder, if there is one."""
-    if folder:
-        from shutil import rmtree
-
-        rmtree(folder, ignore_errors=True)
-
-
-def _refuse_folder(path: str, *, force: bool) -> None:
-    """Raise FileProblem for a folder that may not be replaced: without --force, or of other files than a bag's."""
-    refuse_existing(path, force=force)
-    if not os.path.lexists(path):
-        return
-    if not os.path.isdir(path):
-        raise FileProblem(f"{printable(path)}: is a file; a folder is to be written there")
-    if not force:
-        raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
-    others = sorted(name for name in os.listdir(path) if name != BAG_FILE and not name.endswith(BAG_DATA))
-    if others:
-        raise FileProblem(f"{printable(path)}: holds more than a bag ({shown(others[0])}); it is not replaced")
 
 
 def _take_over(part: str, place: str) -> None:

@@ -21,6 +21,7 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Options, Tally, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
+from frametool.stream.block_writer import writer_for
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
@@ -31,7 +32,7 @@ from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
-from frametool.stream.writers import LEARNED, writer_for
+from frametool.stream.writers import LEARNED
 from frametool.text.spans import Spans, framed
 
 if TYPE_CHECKING:
@@ -43,8 +44,8 @@ if TYPE_CHECKING:
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
+    from frametool.stream.block_writer import BlockWriter
     from frametool.stream.request import Request
-    from frametool.stream.writers import BlockWriter
     from frametool.text.spans import Floats, Ints
 
 QUATERNION = notation("quaternion")

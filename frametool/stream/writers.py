@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,33 +77,6 @@ def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
     whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
     return Target(None if whole or not placed else place or 1.0, forms, style.keep_sign, whole)
-
-
-class BlockWriter(Protocol):
-    """Write one block of results after the other."""
-
-    def of_block(self, block: RowPoses) -> bytes:
-        """Return what is written of a block, perhaps nothing yet."""
-
-    def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last block, and tell what was left out."""
-
-
-def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
-    """Return what writes blocks in the form of a style: text, columns of numbers, or messages of a recording.
-
-    kind: pose, point, ..; extras: the numbers beside each; placed: whether poses have a position
-    """
-    writes = FORMATS[style.form].writes
-    if "arrays" in writes:
-        from frametool.stream.array_writer import ArrayWriter
-
-        return ArrayWriter(style, kind, extras, placed=placed)
-    if "recording" in writes:
-        from frametool.stream.recording_writer import RecordingWriter
-
-        return RecordingWriter(style, kind, extras, placed=placed)
-    return TextWriter(style, kind, extras, placed=placed)
 
 
 class TextWriter:

@@ -64,7 +64,7 @@ def _read_names(text: str) -> list[str]:
 @click.option("--without", type=TEXT, multiple=True, metavar="FILE:LINE",
               help="leave this row out; may be repeated")  # fmt: skip
 @click.option("--hand-eye", is_flag=True, help="where a camera sits, from poses of gripper and target")
-@click.option("--eye-to-hand", is_flag=True, help="the camera is beside the robot, the target in the hand")
+@click.option("--eye-to-hand", is_flag=True, help="the camera stands still, the target moves")
 @click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
               help="between stamps that are paired  [default: 50ms]")  # fmt: skip
 @click.option("--points", is_flag=True, help="A<-B from points that are the same in both")

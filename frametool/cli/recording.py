@@ -1,0 +1,44 @@
+"""What the options say of a recording that is written: which messages, on which topic, what frames are called."""
+
+from __future__ import annotations
+
+import os
+
+from click import UsageError
+
+from frametool.cli.group import refuse_unused, settings
+from frametool.errors import ValueInvalid, did_you_mean, shown
+from frametool.formats.table import FORMATS, is_folder, is_recording, writers
+from frametool.grammar.result import Recorded
+
+MESSAGES = ("pose", "tf", "path", "point", "fix")
+RECORDINGS = writers("recording")
+
+
+def parse_messages(text: str) -> tuple[str, ...]:
+    """Read kinds of messages with commas between them; raises ValueInvalid."""
+    kinds = tuple(dict.fromkeys(text.split(",")))
+    if unknown := [each for each in kinds if each not in MESSAGES]:
+        near = did_you_mean(unknown[0], MESSAGES)
+        raise ValueInvalid(f"{shown(unknown[0])} is none of {', '.join(MESSAGES)}{near}")
+    return kinds
+
+
+def recorded(form: str, output: str | None) -> Recorded:
+    """Return what of results a recording holds, as options say; elsewhere they are not used."""
+    chosen = settings()
+    if not is_recording(form):
+        why = f"is about recordings, {form} is none; -f {'|'.join(RECORDINGS)}"
+        refuse_unused(why, "messages", "topic_out", "recorded_frames")
+        return Recorded()
+    if output in (None, "-"):
+        raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
+    if is_folder(form) and output.endswith(FORMATS[form].suffixes):
+        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
+    told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
+    frames = tuple(name.strip() for name in told.split(",")) if told else ()
+    if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
+        raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
+    chosen.inputs = (*chosen.inputs, *[("", ("frames",))] * bool(chosen.named_frames))
+    folder = os.path.dirname(os.path.abspath(output))
+    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder if os.path.isdir(folder) else "")
