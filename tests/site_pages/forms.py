@@ -26,6 +26,7 @@ WRITTEN = {
     "trajectory": "a trajectory, the poses of one frame over time",
     "arrays": "columns of numbers",
     "report": "reports: tables of what a command found",
+    "recording": "a recording: messages with their stamps",
 }
 KNOWN = {  # kinds of signs, in words; of a pattern that is more than words only the kind is told
     "magic": "its first bytes",
