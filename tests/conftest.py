@@ -5,15 +5,16 @@ from __future__ import annotations
 import io
 import os
 import sys
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import chromium
 import pytest
 from hypothesis import settings
 
 from frametool import cli
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from oracles_of_use import Tool
@@ -62,6 +63,13 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("FRAMETOOL_TREE", raising=False)
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setitem(os.environ, "COLUMNS", "100")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Start chromium, or skip."""
+    with chromium.running() as started:
+        yield started
 
 
 @pytest.fixture

@@ -1,13 +1,12 @@
-"""Pages of the examples, and a real browser for them: chromium where it is installed, driven by playwright where that is."""
+"""Pages of the examples, and what chromium makes of them."""
 
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from typing import TYPE_CHECKING, Any
 
-import pytest
+from chromium import CHROMIUM
 from console import ROOT
 
 import frametool
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 
     MakePage = Callable[..., Path]
 
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-NEEDS_CHROMIUM = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to look at the page with")
 OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000")
 
 
@@ -43,8 +40,3 @@ def seen_in_chromium(path: Path, fragment: str = "") -> str:
     done = subprocess.run(arguments, capture_output=True, text=True, timeout=120, check=False)
     assert re.search("<html[^>]*data-ready", done.stdout), done.stderr
     return done.stdout
-
-
-def playwright() -> Any:
-    """Return playwright's entry, or skip by name."""
-    return pytest.importorskip("playwright.sync_api", reason="no playwright to click with").sync_playwright

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import browsers
 import pytest
+from chromium import NEEDS_CHROMIUM
 from console import ROOT
 
 import frametool
@@ -43,7 +44,7 @@ def test_each_joint_has_its_limits_its_value_and_the_one_it_follows(tmp_path: Pa
     assert joints["gripper_right"]["value"] == 0.01
 
 
-@browsers.NEEDS_CHROMIUM
+@NEEDS_CHROMIUM
 @pytest.mark.parametrize("source", ["tool", "right_finger"])
 def test_the_page_moves_its_joints_as_lookup_does(tmp_path: Path, source: str) -> None:
     told = ",".join(f"{name}={value}" for name, value in MOVED.items())

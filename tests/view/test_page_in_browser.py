@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import browsers
 import pytest
+from chromium import NEEDS_CHROMIUM
 from console import ROOT
 from samples import LATTICE, LOCK_GAPS, random_quaternions
 
@@ -37,17 +38,6 @@ LOOKUP = "([target, source, t]) => window.frameview.lookup(target, source, t)"
 def page_of(tmp_path: Path) -> MakePage:
     """Write the page of a tree."""
     return partial(browsers.make_page, tmp_path)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Start chromium."""
-    if browsers.CHROMIUM is None:
-        pytest.skip("no chromium to look at the page with")
-    with browsers.playwright()() as session:
-        running = session.chromium.launch(executable_path=browsers.CHROMIUM, args=["--no-sandbox"])
-        yield running
-        running.close()
 
 
 @pytest.fixture
@@ -88,7 +78,7 @@ def hostile_rotations() -> Iterator[tuple[float, float, float, float]]:
                 yield euler.to_quaternion(roll, sign * (math.pi / 2 - gap), yaw, "sxyz", floats)
 
 
-@browsers.NEEDS_CHROMIUM
+@NEEDS_CHROMIUM
 def test_the_transform_of_the_address_stands_in_the_page(page_of: MakePage) -> None:
     seen = browsers.seen_in_chromium(page_of("robot.yaml"), "target=base_link&source=tool")
     pose = json.loads(re.search('data-pose="([^"]*)"', seen)[1])  # type: ignore[index]
@@ -326,7 +316,7 @@ def test_frames_without_a_way_between_them_say_so(page_of: MakePage, visit: Visi
     assert tab.inner_text("#say") == "c seen from a: not connected"
 
 
-@browsers.NEEDS_CHROMIUM
+@NEEDS_CHROMIUM
 @pytest.mark.parametrize("asked", [1, 2, 1_699_999_999_999_999_999, 1_700_000_000_123_456_788, 1_700_000_000_123_456_789])
 def test_stamps_a_lifetime_apart_are_exact(page_of: MakePage, asked: int) -> None:
     samples = [(1, 1.0), (2, 2.0), (1_700_000_000_123_456_787, 3.0), (1_700_000_000_123_456_789, 4.0)]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import samples
-from browsers import NEEDS_CHROMIUM, seen_in_chromium
+from browsers import seen_in_chromium
+from chromium import NEEDS_CHROMIUM
 
 from frametool.geometry import floats, rigid
 

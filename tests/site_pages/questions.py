@@ -1,0 +1,44 @@
+"""A page for each question of the cookbook: the commands, what they print, why, their options, where to read on."""
+
+from __future__ import annotations
+
+import re
+
+from frametool.cli.commands.help import topics
+from frametool.cli.group import option_row
+from site_pages.cookbook import Question, questions
+from site_pages.markup import Page, Section, definitions, fenced, links, see_also
+
+
+def section() -> Section:
+    """Return the pages of all questions, by chapter."""
+    chapters: dict[str, list[Page]] = {}
+    for each in questions():
+        chapters.setdefault(each.chapter, []).append(Page(each.path, each.title, each.title, "", _text(each)))
+    return Section("cookbook", "Cookbook", "Questions people ask, each with the command that answers it.", chapters)
+
+
+def _text(question: Question) -> str:
+    parts = []
+    for command, output in question.shell:
+        parts.append(fenced(command, "sh"))
+        if output.strip():
+            parts += ["prints", fenced(output, "text" if re.search(r"(?m)^ |  ", output) else "output")]
+    if question.prose:
+        parts += ["## Why, and what to mind", _linked(question.prose)]
+    options = {option.name: option_row(option) for call in question.calls for option in call.options}
+    if options:
+        parts += ["## The options", definitions(options.values())]
+    return "\n\n".join([*parts, see_also({
+        "Commands": links("commands", question.commands),
+        "Topics": links("topics", question.topics),
+        "Forms of files": links("formats", question.forms),
+        "Files": links("examples", question.files),
+    })])  # fmt: skip
+
+
+def _linked(prose: str) -> str:
+    """Return sentences of the cookbook with links to the topics and pictures they name."""
+    for name in topics():
+        prose = prose.replace(f"`frametool help {name}`", f"[`frametool help {name}`](/topics/{name}.md)")
+    return re.sub(r"\]\((\w+\.svg)\)", r"](/examples/\1)", prose)
