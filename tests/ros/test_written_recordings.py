@@ -252,7 +252,7 @@ def test_without_the_extra_it_is_named(run: Run, monkeypatch: pytest.MonkeyPatch
     assert (done.status, done.err) == (5, "frametool: bags are written with an extra; install it: pip install 'frametool[bag]'\n")
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", [*FORMS, "csv"])
 @pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="files without a name are Linux's")
 def test_what_is_killed_while_it_writes_leaves_nothing(tmp_path: Path, form: str) -> None:
     row = as_tum([10**9], [[1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]]).encode()
