@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
-from frametool.cli.recording import MESSAGES, parse_messages
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -404,6 +403,18 @@ _PLACE = (
 
 def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
     return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
+
+
+MESSAGES = ("pose", "tf", "path", "point", "fix")
+
+
+def parse_messages(text: str) -> tuple[str, ...]:
+    """Read kinds of messages with commas between them; raises ValueInvalid."""
+    kinds = tuple(dict.fromkeys(text.split(",")))
+    if unknown := [each for each in kinds if each not in MESSAGES]:
+        near = did_you_mean(unknown[0], MESSAGES)
+        raise ValueInvalid(f"{shown(unknown[0])} is none of {', '.join(MESSAGES)}{near}")
+    return kinds
 
 
 _RECORDING = (

@@ -17,7 +17,6 @@ from click import UsageError
 
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
-from frametool.cli.recording import RECORDINGS, recorded
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
     from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
+WITH_PLACES = ("text", "yaml", "json", "csv", *writers("recording"))
 BLOCK = 1 << 13  # poses of a trajectory
 
 
@@ -96,7 +96,12 @@ class Output:
         digits = None if full else precision
         self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
         self.style.put_at(place)
-        self.style.recording = recorded(form, output)
+        if is_recording(form):
+            from frametool.cli.recording import recorded
+
+            self.style.recording = recorded(form, output)
+        else:
+            _refuse_recorded(form)
 
     def check_target(self, target: str) -> None:
         """Stop where places are asked for of what is seen from another frame than the Earth's."""
@@ -125,7 +130,7 @@ class Output:
 
     def _refuse_place(self) -> None:
         """Stop where a form has no place for latitude and longitude."""
-        if self.style.place is not None and self.style.form not in ("text", "yaml", "json", "csv", *RECORDINGS):
+        if self.style.place is not None and self.style.form not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.form} has no place for {names}; write csv, json, yaml or text")
 
@@ -306,6 +311,14 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
+
+
+def _refuse_recorded(form: str) -> None:
+    """Stop where options are about recordings, and the form is none."""
+    chosen = settings()
+    about = (("messages", chosen.messages), ("topic-out", chosen.topic_out), ("frames", chosen.recorded_frames))
+    if told := [f"--{name}" for name, value in about if value]:
+        raise UsageError(f"{', '.join(told)} is about recordings, {form} is none; -f {'|'.join(writers('recording'))}")
 
 
 def in_colour(text: str, marks: Sequence[str]) -> str:

@@ -6,31 +6,15 @@ import os
 
 from click import UsageError
 
-from frametool.cli.group import refuse_unused, settings
-from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.formats.table import FORMATS, is_folder, is_recording, writers
+from frametool.cli.group import settings
+from frametool.errors import shown
+from frametool.formats.table import FORMATS, is_folder
 from frametool.grammar.result import Recorded
-
-MESSAGES = ("pose", "tf", "path", "point", "fix")
-RECORDINGS = writers("recording")
-
-
-def parse_messages(text: str) -> tuple[str, ...]:
-    """Read kinds of messages with commas between them; raises ValueInvalid."""
-    kinds = tuple(dict.fromkeys(text.split(",")))
-    if unknown := [each for each in kinds if each not in MESSAGES]:
-        near = did_you_mean(unknown[0], MESSAGES)
-        raise ValueInvalid(f"{shown(unknown[0])} is none of {', '.join(MESSAGES)}{near}")
-    return kinds
 
 
 def recorded(form: str, output: str | None) -> Recorded:
-    """Return what of results a recording holds, as options say; elsewhere they are not used."""
+    """Return what of results a recording of a form holds, as options say; raises UsageError."""
     chosen = settings()
-    if not is_recording(form):
-        why = f"is about recordings, {form} is none; -f {'|'.join(RECORDINGS)}"
-        refuse_unused(why, "messages", "topic_out", "recorded_frames")
-        return Recorded()
     if output in (None, "-"):
         raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
     if is_folder(form) and output.endswith(FORMATS[form].suffixes):

@@ -212,7 +212,7 @@ def test_the_result_is_a_tree_that_the_other_commands_read(run: Run) -> None:
 
 @pytest.mark.parametrize("form", [form for form in writers("tree") if form not in ("yaml", "json", "text")])
 def test_every_form_of_trees_is_written_and_tells_once_what_it_loses(form: str, run: Run) -> None:
-    done = run("solve", "--points", "a.csv", "b.csv", "-f", form, files=points_files("points", "csv"))
+    done = run("solve", "--points", "a.csv", "b.csv", "-f", form, "-o", "tree", files=points_files("points", "csv"))
     assert done.status == 0, done.err
     assert done.err.count("covariances left out") == 1
 

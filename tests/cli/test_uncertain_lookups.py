@@ -224,10 +224,10 @@ def test_a_tree_at_a_time_keeps_its_covariances_and_the_drawing_shows_the_larges
 
 @pytest.mark.parametrize("form", [form for form in writers("tree", "trajectory") if form not in ("yaml", "json", "text")])
 def test_forms_that_cannot_hold_covariances_say_so_once(form: str, run: Run) -> None:
-    done = run("tree", "robot.yaml", "-f", form, files=FILES)
+    done = run("tree", "robot.yaml", "-f", form, "-o", "robot", files=FILES)
     assert done.err.count(f"frametool: warning: {form}: covariances left out\n") == 1
     assert done.err.count("covariances left out") == 1
-    assert "covariances" not in run("tree", "exact.yaml", "-f", form).err
+    assert "covariances" not in run("tree", "exact.yaml", "-f", form, "-o", "exact").err
 
 
 def test_commands_that_carry_none_say_so_once(run: Run) -> None:
