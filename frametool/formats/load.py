@@ -67,7 +67,7 @@ class Recording(InputFile):
         answers: what the form may leave open.  reads: of what its form may be, as the table says it.
         Raises FileProblem.
         """
-        folder = None if form else of_folder(str(path))
+        folder = found if (found := of_folder(str(path))) and form in (None, "", found) else None
         if not (form or folder) and os.path.isdir(path):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
