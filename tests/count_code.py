@@ -20,7 +20,7 @@ LATER = (
     "formats/trees/named.py", "formats/trees/kalibr.py", "formats/rows/bin_cloud.py", "cli/commands/examples.py",
     "geometry/place.py", "grammar/place.py", "stream/earth_columns.py", "stream/earth_records.py", "cli/earth.py",
     "ros/bag_records.py", "cli/comparing.py", "cli/commands/compare.py", "cli/commands/align.py",
-    "cli/commands/resample.py",
+    "cli/commands/resample.py", "cli/completion.py",
 )  # fmt: skip
 PACKAGE = Path(__file__).resolve().parent.parent / "frametool"
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -239,7 +239,7 @@ Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TA
 points in TARGET. Metres, radians unless said, quaternions x, y, z, w. `frametool help WORD` finds what explains a word,
 `frametool help cookbook` has questions with their commands, `frametool examples -o examples` copies files to try.
 """
-COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which click's scripts ask for completions
+COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which shells ask for completions
 
 
 class Group(WithHelp, click.Group):
@@ -321,9 +321,9 @@ def called(arguments: list[str]) -> object:
     Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
     """
     if instruction := os.environ.get(COMPLETION):
-        from click.shell_completion import shell_complete
+        from frametool.cli.completion import answer
 
-        return shell_complete(group, {}, "frametool", COMPLETION, instruction)
+        return answer(group, COMPLETION, instruction, " ".join(arguments))
     with group.make_context("frametool", arguments) as ctx:
         return group.invoke(ctx)
 
