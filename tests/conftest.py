@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
@@ -14,13 +16,18 @@ from frametool import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from oracles_of_use import Tool
 
 # the same examples in every run, however busy the machine is
 settings.register_profile("steady", deadline=None, derandomize=True, max_examples=60)  # more: -m fuzz, -m large
 settings.load_profile("steady")
+
+# terminals, shells, signals and forks are of POSIX; tests of them import what Windows has not
+POSIX = r"(?m)^\s*(?:import|from) (?:browsers|console|fcntl|machine_output|oracles_of_use|pty|readline|resource|shell|termios)\b"
+collect_ignore = [
+    str(path) for path in Path(__file__).parent.rglob("test_*.py") if re.search(POSIX, path.read_text(encoding="utf-8"))
+] if os.name == "nt" else []  # fmt: skip
 
 
 class Outcome(NamedTuple):

@@ -288,7 +288,7 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
         ctx.exit()
 
 
-EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "matplotlib": "plot"}  # package -> the extra it comes with
+EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "laspy": "las", "matplotlib": "plot"}  # package -> extra with it
 
 
 def _surroundings() -> str:
