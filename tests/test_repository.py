@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import platform
 import re
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 import yaml
 
 from frametool import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -121,12 +117,3 @@ def test_who_cites_it_says_this_version() -> None:
 @pytest.mark.parametrize("path", re.findall(r"`([\w./]+\.(?:py|toml|md)|frametool/[\w/]+/)`", (ROOT / ".github" / "CONTRIBUTING.md").read_text()))
 def test_what_contributors_are_sent_to_is_there(path: str) -> None:
     assert (ROOT / path).exists()
-
-
-def test_the_versions_for_a_report_are_of_all_that_is_installed_with_it(run: Callable[..., Any]) -> None:
-    lines = run("-v", "--version").out.splitlines()
-    extras = PROJECT["project"]["optional-dependencies"]
-    packages = [*PROJECT["project"]["dependencies"], *(extras[name][0] for name in ("bag", "arrow", "las", "plot"))]
-    assert lines[0] == f"frametool {__version__}"
-    assert lines[1] == f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"
-    assert {line.split(" ")[0] for line in lines[2:]} == {re.split("[<>=]", each)[0] for each in packages}

@@ -79,7 +79,7 @@ def test_the_version_can_tell_what_it_runs_on(run: Callable[..., Any]) -> None:
     for order in (("--version", "-v"), ("-v", "--version")):
         lines = run(*order).out.splitlines()
         assert lines[0] == run("--version").out.strip()
-        assert [line.split()[0] for line in lines] == ["frametool", "Python", "numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "matplotlib"]
+        assert [line.split()[0] for line in lines] == ["frametool", "Python", "numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "matplotlib"]
 
 
 def test_help_of_a_command_is_its_own(run: Callable[..., Any]) -> None:
