@@ -323,7 +323,8 @@ def called(arguments: list[str]) -> object:
     if instruction := os.environ.get(COMPLETION):
         from frametool.cli.completion import answer
 
-        return answer(group, COMPLETION, instruction, " ".join(arguments))
+        answer(group, COMPLETION, instruction, " ".join(arguments))
+        return 0
     with group.make_context("frametool", arguments) as ctx:
         return group.invoke(ctx)
 
