@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 import os
+import pathlib
 import re
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
@@ -16,6 +16,7 @@ from frametool import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from oracles_of_use import Tool
 
@@ -25,9 +26,8 @@ settings.load_profile("steady")
 
 # terminals, shells, signals and forks are of POSIX; tests of them import what Windows has not
 POSIX = r"(?m)^\s*(?:import|from) (?:browsers|console|fcntl|machine_output|oracles_of_use|pty|readline|resource|shell|termios)\b"
-collect_ignore = [
-    str(path) for path in Path(__file__).parent.rglob("test_*.py") if re.search(POSIX, path.read_text(encoding="utf-8"))
-] if os.name == "nt" else []  # fmt: skip
+TESTS = pathlib.Path(__file__).parent.rglob("test_*.py")
+collect_ignore = [str(each) for each in TESTS if os.name == "nt" and re.search(POSIX, each.read_text(encoding="utf-8"))]
 
 
 class Outcome(NamedTuple):

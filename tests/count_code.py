@@ -15,12 +15,13 @@ from pathlib import Path
 LATER = (
     "fit", "frames/trajectory.py", "stream/trajectories.py", "view/comparison_text.py", "view/comparison_page.py",
     "geometry/placed.py", "geometry/uncertainty.py", "grammar/covariance.py", "covariance.py",
+    "cli/completion.py",
     "stream/beside.py", "stream/carried.py", "geometry/earth.py", "geometry/transverse_mercator.py", "earth.py",
     "cli/commands/solve.py", "cli/solving.py", "stream/measurements.py", "stream/samples.py", "view/solution_text.py",
     "formats/trees/named.py", "formats/trees/kalibr.py", "formats/rows/bin_cloud.py", "cli/commands/examples.py",
     "geometry/place.py", "grammar/place.py", "stream/earth_columns.py", "stream/earth_records.py", "cli/earth.py",
     "ros/bag_records.py", "cli/comparing.py", "cli/commands/compare.py", "cli/commands/align.py",
-    "cli/commands/resample.py", "cli/completion.py",
+    "cli/commands/resample.py",
 )  # fmt: skip
 PACKAGE = Path(__file__).resolve().parent.parent / "frametool"
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
