@@ -90,7 +90,7 @@ def test_the_readme_is_short_and_the_cookbook_is_not() -> None:
 @pytest.mark.parametrize("link", sorted({link for text in (README, COOKBOOK) for link in re.findall(r"\]\(([^)]+)\)", text)}))
 def test_a_link_leads_to_a_file(link: str) -> None:
     inside = re.sub(r"https://.*?/blob/[^/]+/", "", link)  # as a release has them
-    assert (console.ROOT / inside).is_file() or (console.ROOT / "examples" / inside).is_file() or link == "https://pre-commit.com"
+    assert (console.ROOT / inside).is_file() or (console.ROOT / "examples" / inside).is_file()
 
 
 @pytest.mark.parametrize("command", re.findall(r"(?m)^frametool .*", SKILL))
