@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import os
+import pathlib
+import re
 import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +24,11 @@ if TYPE_CHECKING:
 # the same examples in every run, however busy the machine is
 settings.register_profile("steady", deadline=None, derandomize=True, max_examples=60)  # more: -m fuzz, -m large
 settings.load_profile("steady")
+
+# terminals, shells, signals and forks are of POSIX; tests of them import what Windows has not
+POSIX = r"(?m)^\s*(?:import|from) (?:browsers|console|fcntl|machine_output|oracles_of_use|pty|readline|resource|shell|termios)\b"
+TESTS = pathlib.Path(__file__).parent.rglob("test_*.py")
+collect_ignore = [str(each) for each in TESTS if os.name == "nt" and re.search(POSIX, each.read_text(encoding="utf-8"))]
 
 
 class Outcome(NamedTuple):

@@ -1,6 +1,7 @@
 """Run the console blocks of a text as a person would: in a terminal, `$ command` and what it prints.
 
-`python tests/console.py README.md` writes what the commands print now into the file.
+`python tests/console.py README.md` writes what the commands print now into the file; `python tests/console.py README.md BIN`
+does so with the frametool that is in the folder BIN.
 """
 
 from __future__ import annotations
@@ -70,4 +71,4 @@ if __name__ == "__main__":
 
     path = Path(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
-        path.write_text(rewritten(path.read_text(), Path(folder)))
+        path.write_text(rewritten(path.read_text(), Path(*sys.argv[2:] or [folder])))

@@ -15,6 +15,7 @@ from pathlib import Path
 LATER = (
     "fit", "frames/trajectory.py", "stream/trajectories.py", "view/comparison_text.py", "view/comparison_page.py",
     "geometry/placed.py", "geometry/uncertainty.py", "grammar/covariance.py", "covariance.py",
+    "cli/completion.py",
     "stream/beside.py", "stream/carried.py", "geometry/earth.py", "geometry/transverse_mercator.py", "earth.py",
     "cli/commands/solve.py", "cli/solving.py", "stream/measurements.py", "stream/samples.py", "view/solution_text.py",
     "formats/trees/named.py", "formats/trees/kalibr.py", "formats/rows/bin_cloud.py", "cli/commands/examples.py",

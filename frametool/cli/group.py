@@ -243,7 +243,7 @@ Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TA
 points in TARGET. Metres, radians unless said, quaternions x, y, z, w. `frametool help WORD` finds what explains a word,
 `frametool help cookbook` has questions with their commands, `frametool examples -o examples` copies files to try.
 """
-COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which click's scripts ask for completions
+COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which shells ask for completions
 
 
 class Group(WithHelp, click.Group):
@@ -292,7 +292,7 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
         ctx.exit()
 
 
-EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "matplotlib": "plot"}  # package -> the extra it comes with
+EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "laspy": "las", "matplotlib": "plot"}  # package -> extra with it
 
 
 def _surroundings() -> str:
@@ -325,9 +325,10 @@ def called(arguments: list[str]) -> object:
     Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
     """
     if instruction := os.environ.get(COMPLETION):
-        from click.shell_completion import shell_complete
+        from frametool.cli.completion import answer
 
-        return shell_complete(group, {}, "frametool", COMPLETION, instruction)
+        answer(group, COMPLETION, instruction, " ".join(arguments))
+        return 0
     with group.make_context("frametool", arguments) as ctx:
         return group.invoke(ctx)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.errors import BadTopology, FormatError, Unanswered, first_of, shown
+from frametool.formats.detect import by_sign
 from frametool.formats.load import refuse_unknown_joints
 from frametool.formats.trees.tree_reader import read_edges, without_slashes
 from frametool.frames.edge_log import EdgeLog
@@ -142,13 +143,16 @@ def _written_xyzw(value: Any, edge: Edge) -> bool:
 FLICKER = 3  # so many changes of parent are no picking up and putting down
 
 
-def check(files: Sequence[Recording], *, normalize: bool = False, tree: FrameTree | None = None) -> list[Finding]:
+def check(
+    files: Sequence[Recording], *, normalize: bool = False, tree: FrameTree | None = None, others: bool = False
+) -> list[Finding]:
     """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines.
 
     tree: takes what stands still
+    others: there may be files of something else; that one shows no sign of frames is all that is found in it
     """
     findings: list[Finding] = []
-    everything = _of_one_earth(_statements(files, findings, normalize=normalize), findings.append)
+    everything = _of_one_earth(_statements(files, findings, normalize=normalize, others=others), findings.append)
     if tree is not None:
         everything, again = tee(everything)
         _stand(tree, again)
@@ -184,14 +188,19 @@ def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
                 tree.add_components(*statements[0][:3])
 
 
-def _statements(files: Sequence[Recording], findings: list[Finding], *, normalize: bool) -> Iterator[Statement]:
+def _statements(
+    files: Sequence[Recording], findings: list[Finding], *, normalize: bool, others: bool
+) -> Iterator[Statement]:
     """Read all files; what cannot be read is found at once."""
     for file in files:
         before = len(findings)
+        may_be_other = others and by_sign(file.head(), "tree") is None
         statement = None
         for statement in read_all(file, findings.append, normalize=normalize):
             yield statement
-        if statement is None and len(findings) == before:
+        if statement is None and may_be_other:
+            findings[before:] = [Finding("no-frames", "no frames in it", file.name, 1, 1)]
+        elif statement is None and len(findings) == before:
             findings.append(Finding("empty", "no transforms in it", file.name, 1, 1))
     refuse_unknown_joints(files)
 

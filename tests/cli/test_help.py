@@ -79,7 +79,7 @@ def test_the_version_can_tell_what_it_runs_on(run: Callable[..., Any]) -> None:
     for order in (("--version", "-v"), ("-v", "--version")):
         lines = run(*order).out.splitlines()
         assert lines[0] == run("--version").out.strip()
-        assert [line.split()[0] for line in lines] == ["frametool", "Python", "numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "matplotlib"]
+        assert [line.split()[0] for line in lines] == ["frametool", "Python", "numpy", "click", "rich", "pyyaml", "rosbags", "pyarrow", "laspy", "matplotlib"]
 
 
 def test_help_of_a_command_is_its_own(run: Callable[..., Any]) -> None:
@@ -160,14 +160,16 @@ def test_programs_are_told_all_commands_options_values_and_exit_codes(run: Calla
         words = tuple(entry["name"].split())
         assert json.loads(run("help", "-f", "json", *words).out) == entry
         assert {name for each in entry["options"] for name in each["names"]} == {name for each in options_of(words) for name in each.opts}
-        assert all(each["help"] and each["takes"] != "" for each in entry["options"])
+        assert all(each["help"] and each["metavar"] != "" for each in entry["options"])
         assert entry["exit_codes"]["0"]
         assert entry["exit_codes"]["130"] == "interrupted"
         assert entry["examples"]
     lookup = next(each for each in whole["commands"] if each["name"] == "lookup")
     assert [each["name"] for each in lookup["arguments"]] == ["TREE", "TARGET", "SOURCE"]
-    assert next(each for each in lookup["options"] if "--to" in each["names"])["values"][:2] == ["quaternion", "xyzw"]
-    assert lookup["exit_codes"] == {"0": "done", "1": "bad data", "2": "usage", "3": "rows skipped", "4": "lookup", "5": "file", "130": "interrupted"}
+    assert next(each for each in lookup["options"] if "--to" in each["names"])["choices"][:2] == ["quaternion", "xyzw"]
+    assert next(each for each in lookup["options"] if "--at" in each["names"])["default"] == "latest"
+    assert whole["formats"] == [json.loads(line) for line in run("formats", "-f", "json").out.splitlines()]
+    assert whole["exit_codes"] == lookup["exit_codes"] == {"0": "done", "1": "bad data", "2": "usage", "3": "rows skipped", "4": "lookup", "5": "file", "130": "interrupted"}
 
 
 def test_what_an_assistant_reads_is_printed(run: Callable[..., Any]) -> None:

@@ -127,11 +127,11 @@ def run() -> Iterator[Run]:
                 (folder / name).write_text(text)
             for name, data in (("stdin", stdin), ("stdout", b""), ("stderr", b"")):
                 (folder / name).write_bytes(data)
-            completion = {"COMP_WORDS": words, "COMP_CWORD": "3", "_FRAMETOOL_COMPLETE": "bash_complete"} if words else {}
+            completion = {"_FRAMETOOL_COMPLETE": "words"} if words else {}
             asked, answers = started[row].stdin, started[row].stdout
             assert asked
             assert answers
-            print(json.dumps([str(folder), arguments, completion]), file=asked, flush=True)
+            print(json.dumps([str(folder), [words] if words else arguments, completion]), file=asked, flush=True)
             status = int(answers.readline())
             return Done(status, (folder / "stdout").read_bytes(), (folder / "stderr").read_text())
 

@@ -15,8 +15,8 @@ from frametool.cli.output import in_colour
 from frametool.cli.sink import writing
 from frametool.cli.stderr import folded, say
 from frametool.cli.trees import opened, refuse_two_readers, state
-from frametool.errors import listing, warn
-from frametool.lint.findings import RULES, WRITERS
+from frametool.errors import FormatError, listing, warn
+from frametool.lint.findings import RULES, WRITERS, Finding
 from frametool.lint.rules import check
 from frametool.lint.tree_diff import Tolerance, parse_tolerance
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.formats.load import Recording
-    from frametool.lint.findings import Finding
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
@@ -55,9 +54,11 @@ class CheckCommand(Command):
 @click.option("--tolerance", metavar="LENGTH,ANGLE",
               type=Parsed("tolerance", partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0)))),
               help="what they may be off  [3 sigmas, or 10mm,1deg]")  # fmt: skip
+@click.option("--each", is_flag=True, help="check each file on its own; one without frames is a warning")
 @file_options
 def command(
-    files: Sequence[str], form: str, strict: bool, measured: Sequence[str], tolerance: Tolerance | None, normalize: bool
+    files: Sequence[str], form: str, strict: bool, measured: Sequence[str], tolerance: Tolerance | None, each: bool,
+    normalize: bool,
 ) -> int:
     """Look for mistakes in FILES, trees and recordings, taken as one tree.
 
@@ -66,18 +67,24 @@ def command(
       frametool check drive.yaml --strict
       frametool check robot.yaml --measured measurements.yaml
       frametool check robot.yaml drive.yaml -f json || true
+      frametool check --each robot.yaml arm.urdf camchain.yaml
 
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
     """
     if tolerance is not None and not measured:
         raise click.UsageError("--tolerance is about --measured; name the measurements")
+    if each and measured:
+        raise click.UsageError("--measured is about one tree, not about --each file")
     refuse_two_readers((*files, *measured))
-    count = len(files) + len(measured)
-    rows = _read(opened(measured, behind=len(files), of=count), normalize=normalize) if measured else []
-    recordings = opened(files, of=count)
-    findings = _with_loops(recordings, rows, tolerance, normalize=normalize)
-    state(recordings)
+    if each:
+        findings = _one_by_one(files, normalize=normalize)
+    else:
+        count = len(files) + len(measured)
+        rows = _read(opened(measured, behind=len(files), of=count), normalize=normalize) if measured else []
+        recordings = opened(files, of=count)
+        findings = _with_loops(recordings, rows, tolerance, normalize=normalize)
+        state(recordings)
     text = WRITERS[form](findings)
     with writing(None) as write:
         is_seen = form == "text" and sys.stdout.isatty()
@@ -87,6 +94,20 @@ def command(
     if summary:
         say(summary)
     return FAILED if counts["error"] or (strict and counts["warning"]) else 0
+
+
+def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:
+    """Return what is wrong with each file alone; that one holds no frames, or is of an unknown form, is a warning."""
+    findings = []
+    for number, file in enumerate(files):
+        try:
+            recordings = opened([file], behind=number, of=len(files))
+        except FormatError as error:
+            findings.append(Finding("no-frames", error.message, error.source, error.line or 1, 1))
+        else:
+            findings += check(recordings, normalize=normalize, others=True)
+            state(recordings)
+    return findings
 
 
 def _read(files: Sequence[Recording], *, normalize: bool) -> list[Measurement]:

@@ -13,7 +13,7 @@ import click
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.examples import example
-from frametool.cli.group import GROUPS, option_groups, show_help, write_options
+from frametool.cli.group import GROUPS, option_groups, option_row, show_help, write_options
 from frametool.cli.options import EXIT_CODES, Command, Text
 from frametool.cli.sink import writing
 from frametool.errors import any_near, shown
@@ -146,12 +146,10 @@ def common(ctx: click.Context) -> str:
 def described(name: str, command: click.Command, ctx: click.Context) -> dict[str, Any]:
     """Return all that there is to say of a command for a program."""
     lines = [line.strip() for line in (command.help or "").replace("\b\n", "").split("\n")]
-    first, *others = (command.epilog or EXIT_CODES).removeprefix("Exit codes: ").rstrip(".").split("; ")
-    codes = dict(re.findall(r"(\d+|else) ((?:[^,]|, (?!\d|else))+)", first)) | dict(each.split(": ") for each in others)
     groups = option_groups(command, ctx).items()
     return {
         "name": name,
-        "summary": lines[0],
+        "about": lines[0],
         "usage": f"frametool {name} {' '.join(command.collect_usage_pieces(ctx))}",
         "help": "\n".join(lines).strip(),
         "examples": [line for line in lines if re.match(r"(frametool|printf|sed) .*", line)],
@@ -160,17 +158,24 @@ def described(name: str, command: click.Command, ctx: click.Context) -> dict[str
             for each in command.params if isinstance(each, click.Argument)
         ],
         "options": [_option(each, title.partition(" (")[0], ctx) for title, options in groups for each in options],
-        "exit_codes": codes | {"130": "interrupted"},
+        "exit_codes": _exit_codes(command.epilog or EXIT_CODES),
     }  # fmt: skip
+
+
+def _exit_codes(text: str) -> dict[str, str]:
+    first, *others = text.removeprefix("Exit codes: ").rstrip(".").split("; ")
+    codes = dict(re.findall(r"(\d+|else) ((?:[^,]|, (?!\d|else))+)", first)) | dict(each.split(": ") for each in others)
+    return codes | {"130": "interrupted"}
 
 
 def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, Any]:
     kind, is_flag = option.type, option.is_flag or option.count
-    values = kind.offers(ctx, "") if isinstance(kind, Text) else getattr(kind, "choices", ())
-    takes = option.metavar or (option.opts[-1].strip("-") if values else kind.name).upper()
+    choices = kind.offers(ctx, "") if isinstance(kind, Text) else getattr(kind, "choices", ())
+    metavar = option.metavar or (option.opts[-1].strip("-") if choices else kind.name).upper()
+    default = re.search(r"\[default: (.*?)\]", option_row(option)[1])
     return {
-        "names": option.opts, "takes": None if is_flag else takes, "values": list(values or ()),
-        "repeated": option.multiple, "group": group, "help": option.help,
+        "names": option.opts, "metavar": None if is_flag else metavar, "choices": list(choices or ()),
+        "default": default and default[1], "repeated": option.multiple, "group": group, "help": option.help,
     }  # fmt: skip
 
 
@@ -222,10 +227,14 @@ def command(ctx: click.Context, words: tuple[str, ...], form: str) -> None:
 
 def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
     from frametool.documents.json import dump
+    from frametool.view.report_text import form_entry
 
     if name and not named:
         hint = any_near(name, COMMANDS, "`frametool help` lists all")
         raise click.UsageError(f"-f json is about commands, and {shown(name)} is not one{hint}")
     every = [described(each, one, ctx) for each, one in ({name: named} if named else _commands(ctx)).items()]
-    whole = {"version": __version__, "topics": topics() | MADE, "commands": every}
+    whole = {
+        "version": __version__, "topics": topics() | MADE, "commands": every, "formats": [*map(form_entry, FORMATS)],
+        "exit_codes": _exit_codes(EXIT_CODES),
+    }  # fmt: skip
     return f"{dump(every[0] if named else whole)}\n"
