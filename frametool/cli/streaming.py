@@ -31,7 +31,7 @@ from frametool.formats.table import FORMATS, ORDERS, holds_arrays, is_trajectory
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
     from typing import TypeVar
 
     from frametool.cli.output import Output
@@ -353,7 +353,7 @@ class Stream:
             raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
         bad = self.policy(self.name)
         request = request._replace(by_default=holds_arrays(output.told or "") and not output.notations)
-        output.values(stream_results(stream, form, request, output.style, bad))
+        output.values(_then_closed(self.opened(), stream_results(stream, form, request, output.style, bad)))
         return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
@@ -396,6 +396,7 @@ class Stream:
         with (
             nullcontext(lambda _: None) if gathers else writing(output.path, force=output.force) as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            self.opened(),  # closed before a file takes its place, which Windows asks for
             closing(outcomes),  # ends the processes of --jobs
         ):
             return run(outcomes, write, self.policy(self.name, counted), progress.advance)
@@ -412,6 +413,12 @@ class Stream:
             return jobs
         say(f"--jobs does not help here: {obstacle}; one process does the work")
         return 1
+
+
+def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
+    """Yield the results of a stream, and close it behind them."""
+    with stream:
+        yield from results
 
 
 def _may_be_bag(path: str) -> bool:
