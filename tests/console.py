@@ -7,7 +7,6 @@ does so with the frametool that is in the folder BIN.
 from __future__ import annotations
 
 import os
-import pty
 import re
 import subprocess
 import sys
@@ -26,6 +25,8 @@ def commands(block: str) -> list[tuple[str, str]]:
 
 def printed(command: str, bin_folder: Path) -> str:
     """Run a shell command in the project's folder with a terminal for its output; give what appears there."""
+    import pty  # Windows has none; what else stands here is wanted there too
+
     script = bin_folder / "frametool"
     if not script.exists():
         script.write_text(f"#!{sys.executable}\nimport sys\nsys.path.insert(0, {str(ROOT)!r})\nimport frametool.__main__\n")

@@ -43,8 +43,9 @@ def run(arguments: list[str]) -> int:
     if sys.stdout is None:
         say("standard output is closed")
         return in_out
-    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.encoding.lower() != "utf-8":
-        sys.stdout.reconfigure(encoding="utf-8")  # the same bytes in every locale
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # the same bytes in every locale and on every system
+            stream.reconfigure(encoding="utf-8", errors=stream.errors, newline="\n")
     sys.setrecursionlimit(max(sys.getrecursionlimit(), 20 * DEEPEST))  # a document may be so deep, a walk some calls
     status = 0
     try:

@@ -240,7 +240,7 @@ class CommandBatch:
             is_own = words[0].startswith("-")  # an option of frametool itself
             return answered(lambda: called(words) if is_own else called_in(self.context, words), words)
         held = _Limited()
-        with redirect_stdout(TextIOWrapper(held, "utf-8", write_through=True)) as stream:
+        with redirect_stdout(TextIOWrapper(held, "utf-8", newline="\n", write_through=True)) as stream:
             status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
         if status in FINISHED:
             self.results.keep(name, held.getvalue().decode())
@@ -264,7 +264,7 @@ def _as_in_a_pipe() -> Iterator[None]:
     """Keep commands from standard input, whose lines are the batch's, and let them print as they print into a pipe."""
     before = sys.stdin, sys.stdout
     sys.stdin = _NoInput()
-    piped = _Pipe(sys.stdout.buffer, "utf-8") if sys.stdout.isatty() else None
+    piped = _Pipe(sys.stdout.buffer, "utf-8", newline="\n") if sys.stdout.isatty() else None
     sys.stdout = piped or sys.stdout
     try:
         yield

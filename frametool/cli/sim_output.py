@@ -287,6 +287,8 @@ def leader_of(argument: str, seed: int, *, paced: bool) -> MakeLeader:
 
 def _from_stdin(*, paced: bool) -> MakeLeader:
     """Read commands as they come: by their times, or in real time whenever they arrive."""
+    if sys.stdin is None:
+        raise FileProblem("standard input is closed")
     if sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe commands in, or see frametool sim teleop")
     if not paced:

@@ -31,7 +31,7 @@ from frametool.formats.table import FORMATS, ORDERS, has_no_text, holds_arrays, 
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
     from typing import TypeVar
 
     from frametool.cli.output import Output
@@ -355,7 +355,7 @@ class Stream:
         request = request._replace(by_default=has_no_text(output.told or "") and not output.notations)
         if is_recording(output.told or ""):
             request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
-        output.values(stream_results(stream, form, request, output.style, bad))
+        output.values(_then_closed(self.opened(), stream_results(stream, form, request, output.style, bad)))
         return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
@@ -397,6 +397,7 @@ class Stream:
         with (
             nullcontext(lambda _: None) if gathers else output.opened() as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            self.opened(),  # closed before a file takes its place, which Windows asks for
             closing(outcomes),  # ends the processes of --jobs
         ):
             return run(outcomes, write, self.policy(self.name, counted), progress.advance)
@@ -413,6 +414,12 @@ class Stream:
             return jobs
         say(f"--jobs does not help here: {obstacle}; one process does the work")
         return 1
+
+
+def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
+    """Yield the results of a stream, and close it behind them."""
+    with stream:
+        yield from results
 
 
 def _may_be_bag(path: str) -> bool:

@@ -5,11 +5,13 @@ point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R 
 
 from __future__ import annotations
 
+from math import atan2
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid
+from frametool.fit.linear import dot, summed, total, turn_between
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -57,7 +59,7 @@ def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[
 
 def principal_axes(xyz: Array) -> Array:
     """Return the rms of positions along their principal axes, the largest first."""
-    spread: Array = np.linalg.svd(xyz - xyz.mean(0), compute_uv=False) / np.sqrt(len(xyz))
+    spread: Array = np.linalg.svd(xyz - centre(xyz), compute_uv=False) / np.sqrt(len(xyz))
     return spread
 
 
@@ -72,28 +74,33 @@ def _require_plane(kind: str, xyz: Array, name: str) -> None:
 
 
 def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool) -> Fit:
-    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991, equations 38 to 43."""
+    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991, its rotation as Horn 1987 finds it."""
     mass = np.ones(len(ref)) if weights is None else weights
-    ref_mean, est_mean = np.average(ref, 0, weights), np.average(est, 0, weights)
+    ref_mean, est_mean = centre(ref, mass), centre(est, mass)
     r, e = ref - ref_mean, est - est_mean
-    u, d, v = np.linalg.svd(r.T * mass @ e / mass.sum())
-    s = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(v))])
-    e = e - np.average(e, 0, weights)  # what rounding left of the mean
-    scale = float(d @ s / np.average(e**2, 0, weights).sum()) if with_scale else 1.0
-    rotation = Rotation.from_matrix(u * s @ v, normalize=True)
+    e = e - centre(e, mass)  # what rounding left of the mean
+    rotation = turn_between(e, mass[:, None] * r)
+    scale = total(mass * dot(rotation.apply(e), r)) / total(mass * dot(e, e)) if with_scale else 1.0
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
+
+
+def centre(xyz: Array, mass: Array | None = None) -> Array:
+    """Return the weighted mean of positions."""
+    if mass is None:
+        return summed(xyz) / len(xyz)
+    return summed(mass[:, None] * xyz) / total(mass)
 
 
 def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str]) -> Fit:
     """Minimise the same over turns about `up` alone."""
-    ref_mean, est_mean = ref.mean(0), est.mean(0)
+    ref_mean, est_mean = centre(ref), centre(est)
     r, e = ref - ref_mean, est - est_mean
-    across = [each - np.outer(each @ up, up) for each in (r, e)]
+    across = [each - np.outer(dot(each, up), up) for each in (r, e)]
     for name, each, whole in zip(names, across, (ref, est), strict=True):
-        if np.sqrt((each**2).sum(1).mean()) < STILL * (1 + np.abs(whole).max()):
+        if np.sqrt(total(dot(each, each)) / len(each)) < STILL * (1 + np.abs(whole).max()):
             raise Unaligned(f"{name} has no motion across up: yaw is free; --align origin or none")
-    sine = (np.cross(across[1], across[0]) @ up).sum()
-    rotation = Rotation.from_axis_angle(up, float(np.arctan2(sine, (across[1] * across[0]).sum())))
+    sine, cosine = total(dot(np.cross(across[1], across[0]), up)), total(dot(across[1], across[0]))
+    rotation = Rotation.from_axis_angle(up, atan2(sine, cosine))
     return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
 
 

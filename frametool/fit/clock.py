@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.alignment import Unaligned, fitted
+from frametool.fit.alignment import Unaligned, centre, fitted
+from frametool.fit.linear import dot, length, total
 from frametool.fit.pairs import GAP, between, interval
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ LEAST = 3  # poses: two speeds make the least course
 NEARBY = 1.2  # of a step: what the best of all lags and its neighbours may miss
 DOUBT = 0.25  # of a step: the standard error that least squares may have
 TINY = 1e-12
+DIGITS = 9  # of a score, and of seconds: stamps are whole nanoseconds
 
 
 class ClockOffset(NamedTuple):
@@ -62,7 +65,7 @@ def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Ar
         rotation = each.rotation
         moved = rotation[:-1].distance(rotation[1:])  # type: ignore[index]
     else:
-        moved = np.linalg.norm(np.diff(each.xyz, axis=0), axis=1)
+        moved = length(np.diff(each.xyz, axis=0))
     speed = moved / np.diff(times)
     return None if np.std(speed) < 1e-6 * max(TINY, np.max(speed)) else ((times[1:] + times[:-1]) / 2, speed)
 
@@ -77,7 +80,7 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     size = 1 << (2 * len(grid) - 1).bit_length()
     masks = [((grid >= at[0]) & (grid <= at[-1])).astype(float) for at, _ in (a, b)]
     courses = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
-    courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
+    courses = [course - mask * (total(course) / total(mask)) for course, mask in zip(courses, masks, strict=True)]
 
     def correlated(x: Array, y: Array) -> Array:
         found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
@@ -93,11 +96,12 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     shortest = min(at[-1] - at[0] for at, _ in (a, b))
     tried = (np.abs(lags * step) <= limit_s) & (count * step >= shortest / 2)
     score = np.where(tried, covariance / np.sqrt(spread[0] * spread[1]), -1.0)
+    score = np.round(score, DIGITS)  # further digits are those of the FFT, which adds as the processor likes
     at = int(np.argmax(score))
     before, here, after = score[at - 1], score[at], score[(at + 1) % size]
     bend = before - 2 * here + after
     part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
-    return ClockOffset(float((lags[at] + part) * step), float(here))
+    return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here))
 
 
 def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
@@ -120,13 +124,13 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
             fit = fitted(kind, plain._replace(xyz=here), own, up)
         except Unaligned:
             return seconds
-        left = ((fit.moved(own).xyz - here) * velocity).sum(1)
-        squared = max(((velocity - velocity.mean(0)) ** 2).sum(), TINY)  # a constant velocity is a shift of the fit
-        change = float(np.clip(left.sum() / squared, -step, step))
+        left, unsteady = dot(fit.moved(own).xyz - here, velocity), velocity - centre(velocity)
+        squared = max(total(dot(unsteady, unsteady)), TINY)  # a constant velocity is a shift of the fit
+        change = min(max(total(left) / squared, -step), step)
         found += change
         if abs(change) < REFINED_S:
             break
-    centred = left - left.mean()
-    alike = float((centred[1:] @ centred[:-1]) / max(centred @ centred, TINY))
-    doubt = float(np.sqrt(left @ left * (1 + alike) / max(1 - alike, TINY)) / squared)
+    centred = left - total(left) / len(left)
+    alike = total(centred[1:] * centred[:-1]) / max(total(centred**2), TINY)
+    doubt = sqrt(total(left**2) * (1 + alike) / max(1 - alike, TINY)) / squared
     return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds

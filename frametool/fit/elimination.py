@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from frametool.fit.linear import inverse, product
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -79,26 +81,25 @@ class Elimination:
     def factored(self, blocks: Array) -> BlockFactor:
         """Eliminate all bodies of a positive definite matrix."""
         left = blocks.copy()
-        pivots: list[Any] = []
+        inverses: list[Any] = []
         gains: list[Any] = []
         for bodies, seen in self.steps:
-            pivot, beside = self.gathered(left, bodies, bodies), self.gathered(left, bodies, seen)
-            gain = np.linalg.solve(pivot, beside)
+            beside = self.gathered(left, bodies, seen)
+            inverses.append(inverse(self.gathered(left, bodies, bodies)))
+            gains.append(product(inverses[-1], beside))
             if len(seen):
-                self.scattered(left, seen, seen, self.gathered(left, seen, seen) - beside.T @ gain)
-            pivots.append(pivot)
-            gains.append(gain)
-        return BlockFactor(self, pivots, gains)
+                self.scattered(left, seen, seen, self.gathered(left, seen, seen) - product(beside.T, gains[-1]))
+        return BlockFactor(self, inverses, gains)
 
 
 class BlockFactor(NamedTuple):
     """A matrix after elimination.
 
-    pivots: of each step, the matrix of its bodies when their turn came; gains: inv(pivot) times what they see
+    inverses: of each step, that of the matrix of its bodies when their turn came; gains: that times what they see
     """
 
     elimination: Elimination
-    pivots: list[Array]
+    inverses: list[Array]
     gains: list[Array]
 
     def solve(self, right: Array) -> Array:
@@ -106,9 +107,9 @@ class BlockFactor(NamedTuple):
         x = right.copy()
         columns = right.shape[-1]
         for (bodies, seen), gain in zip(self.elimination.steps, self.gains, strict=True):
-            x[seen] -= (gain.T @ x[bodies].reshape(-1, columns)).reshape(-1, SIX, columns)
-        for (bodies, seen), pivot, gain in self._backwards():
-            above = np.linalg.solve(pivot, x[bodies].reshape(-1, columns)) - gain @ x[seen].reshape(-1, columns)
+            x[seen] -= product(gain.T, x[bodies].reshape(-1, columns)).reshape(-1, SIX, columns)
+        for (bodies, seen), own, gain in self._backwards():
+            above = product(own, x[bodies].reshape(-1, columns)) - product(gain, x[seen].reshape(-1, columns))
             x[bodies] = above.reshape(-1, SIX, columns)
         return x
 
@@ -118,16 +119,16 @@ class BlockFactor(NamedTuple):
         Source: Takahashi, Fagan, Chen 1973.
         """
         of = self.elimination
-        inverse = np.zeros((of.size, SIX, SIX))
-        for (bodies, seen), pivot, gain in self._backwards():
-            beside = -gain @ of.gathered(inverse, seen, seen)
-            own = np.linalg.inv(pivot) - beside @ gain.T
-            of.scattered(inverse, bodies, bodies, (own + own.T) / 2)
-            of.scattered(inverse, bodies, seen, beside)
-            of.scattered(inverse, seen, bodies, beside.T)
+        found = np.zeros((of.size, SIX, SIX))
+        for (bodies, seen), own, gain in self._backwards():
+            beside = -product(gain, of.gathered(found, seen, seen))
+            block = own - product(beside, gain.T)
+            of.scattered(found, bodies, bodies, (block + block.T) / 2)
+            of.scattered(found, bodies, seen, beside)
+            of.scattered(found, seen, bodies, beside.T)
         every = np.arange(of.count)
-        diagonal: Array = inverse[of.slots(every, every)]
+        diagonal: Array = found[of.slots(every, every)]
         return diagonal
 
     def _backwards(self) -> Any:
-        return reversed(list(zip(self.elimination.steps, self.pivots, self.gains, strict=True)))
+        return reversed(list(zip(self.elimination.steps, self.inverses, self.gains, strict=True)))

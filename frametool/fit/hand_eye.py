@@ -7,12 +7,13 @@ robot inv(G) stands for G, so that X is base_from_camera and Z gripper_from_targ
 from __future__ import annotations
 
 from itertools import chain
-from math import degrees, log, radians, sqrt
+from math import degrees, fsum, log, radians, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid
+from frametool.fit.linear import applied, crossed, dot, eigen, inverse, product, solved, total, turn_between
 from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.rigid_arrays import log as rotvecs_of
 from frametool.fit.robust import KEPT, LEAST, deviations, draws, fitted_sigmas, lengths, require_near, settled
@@ -35,6 +36,7 @@ STEPS, ROUGH_STEPS = 100, 4
 DONE = 1e-12  # of the extent, and radians
 STUCK = 1e9  # damping
 UNDAMPED = 1e-12
+ROUNDING = 1e-15
 BETTER = 5.0  # times: what fits so much better is what was meant
 CLEARLY = 2.0  # times, that both metres and radians must be better
 FLAT, FLAT_SHARE = radians(0.5), 0.02  # turns about the second axis: none, also as a part of those about the first
@@ -115,14 +117,14 @@ def solve_hand_eye(
     )
     model = found.model
     s_t, s_r = model.sigmas.tolist()
-    rms = np.sqrt((lengths(found.residuals[found.kept]) ** 2).mean(0))
+    count, off = int(found.kept.sum()), lengths(found.residuals[found.kept]).T
+    rms = np.sqrt(dot(off, off) / count)
     turns = _turns(hand.at(found.kept))
     if turns.rms[0] < KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
-    inverse = np.asarray(np.linalg.inv(model.hessian), float)
-    covariance = (inverse + inverse.T) / 2.0
-    count = int(found.kept.sum())
+    covariance = inverse(model.hessian)
+    covariance = (covariance + covariance.T) / 2.0
     return HandEye(
         model.x.transform.canonical(),
         model.z.transform.canonical(),
@@ -198,7 +200,7 @@ class _Samples(NamedTuple):
         damping = UNDAMPED
         for _ in range(steps):
             bent = now.hessian + damping * np.diag(np.diag(now.hessian))
-            step = -np.asarray(np.linalg.solve(bent, gradient), float)
+            step = -solved(bent, gradient[:, None])[:, 0]
             moved = now._replace(x=now.x.stepped(step[:6]), z=now.z.stepped(step[6:]))
             tried, its_gradient = self._linear(moved, weights)
             if tried.misfit <= now.misfit + DONE:
@@ -215,12 +217,13 @@ class _Samples(NamedTuple):
         errors = _errors(loop, model.x)
         sigmas = fitted_sigmas(errors, weights, 6)
         if model.ratio is not None:
-            sigmas = model.ratio * np.sqrt(((sigmas / model.ratio) ** 2).mean())
-        shares = (np.repeat(sigmas, 3) ** -2 * weights[:, None]).reshape(-1)
+            share = sigmas / model.ratio
+            sigmas = model.ratio * np.sqrt(dot(share, share) / 2.0)
+        weighed = (weights[:, None] / np.repeat(sigmas**2, 3)).reshape(-1, 1)
         slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
-        weighted = slopes.T * shares
-        misfit = 2.0 * float(np.log(sigmas).sum())
-        return model._replace(sigmas=sigmas, hessian=weighted @ slopes, misfit=misfit), weighted @ errors.reshape(-1)
+        gradient = crossed(slopes, weighed * errors.reshape(-1, 1))
+        misfit = 2.0 * fsum(map(log, sigmas.tolist()))
+        return model._replace(sigmas=sigmas, hessian=crossed(slopes, weighed * slopes), misfit=misfit), gradient[:, 0]
 
 
 def _errors(loop: _Loop, x: PoseArrays) -> Array:
@@ -230,15 +233,15 @@ def _errors(loop: _Loop, x: PoseArrays) -> Array:
 
 def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
     """Return how errors (n, 6) move with steps of X and of Z: (n, 6, 12)."""
-    left, back = loop.left.turns, loop.before.turns @ model.z.turns.T
+    left, back = loop.left.turns, product(loop.before.turns, model.z.turns.T)
     bent = inverse_left_jacobian(turned)
     slopes = np.zeros((len(turned), 6, 12))
     slopes[:, :3, :3] = left
-    slopes[:, :3, 3:6] = -left @ skew(loop.right.places @ model.x.turns.T)
-    slopes[:, 3:, 3:6] = bent @ left
+    slopes[:, :3, 3:6] = -product(left, skew(applied(model.x.turns, loop.right.places)))
+    slopes[:, 3:, 3:6] = product(bent, left)
     slopes[:, :3, 6:9] = -back
-    slopes[:, :3, 9:] = back @ skew(loop.after.places - model.z.places)
-    slopes[:, 3:, 9:] = -bent @ back
+    slopes[:, :3, 9:] = product(back, skew(loop.after.places - model.z.places))
+    slopes[:, 3:, 9:] = -product(bent, back)
     return slopes
 
 
@@ -266,12 +269,11 @@ def park_martin(gripper: PoseArrays, camera: PoseArrays) -> PoseArrays:
     """
     a, b = _motions(gripper, camera)
     alpha, beta = rotvecs_of(a.turns), rotvecs_of(b.turns)
-    angle = np.linalg.norm(alpha, axis=1)
+    angle = lengths(alpha)[:, 0]
     if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
         a, b, alpha, beta = a.at(clear), b.at(clear), alpha[clear], beta[clear]
-    u, _, v = np.linalg.svd(alpha.T @ beta)
-    turn = u * [1.0, 1.0, np.sign(np.linalg.det(u @ v))] @ v
-    place, _ = _least_squares((a.turns - np.eye(3)).reshape(-1, 3), (b.places @ turn.T - a.places).reshape(-1))
+    turn = turn_between(beta, alpha).as_matrix()
+    place, _ = _least_squares((a.turns - np.eye(3)).reshape(-1, 3), (applied(turn, b.places) - a.places).reshape(-1))
     return PoseArrays(turn, place)
 
 
@@ -283,7 +285,7 @@ def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseA
 def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
     """Say of a factor on the target's places that would fit much better which: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
-    lever, turned = (a.turns - np.eye(3)).reshape(-1, 3), (b.places @ x.turns.T).reshape(-1)
+    lever, turned = (a.turns - np.eye(3)).reshape(-1, 3), applied(x.turns, b.places).reshape(-1)
     place, plain = _least_squares(lever, turned - a.places.reshape(-1))
     place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.places.reshape(-1))
     if place[3] <= 0.0 or plain <= max(BETTER * scaled, LEAST):
@@ -293,8 +295,11 @@ def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
     """Return the least-squares solution, and how long what it leaves is."""
-    found = np.asarray(np.linalg.lstsq(slopes, wanted, rcond=None)[0], float)
-    return found, float(np.linalg.norm(slopes @ found - wanted))
+    squares = crossed(slopes, slopes)
+    squares += ROUNDING * np.diagonal(squares).max() * np.eye(len(squares))  # what nothing tells is 0
+    found = solved(squares, crossed(slopes, wanted[:, None]))[:, 0]
+    left = applied(slopes, found) - wanted
+    return found, sqrt(total(left * left))
 
 
 def _pairs(count: int) -> tuple[Indices, Indices]:
@@ -315,8 +320,8 @@ class _Turns(NamedTuple):
 
 def _turns(gripper: PoseArrays) -> _Turns:
     i, j = _pairs(len(gripper.places))
-    turns = rotvecs_of(np.swapaxes(gripper.turns[i], 1, 2) @ gripper.turns[j])
-    squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))
+    turns = rotvecs_of(product(np.swapaxes(gripper.turns[i], 1, 2), gripper.turns[j]))
+    squares, axes = eigen(crossed(turns, turns) / len(turns))
     axis = axes[:, 2] * np.sign(axes[np.abs(axes[:, 2]).argmax(), 2])
     _, second, first = np.sqrt(np.maximum(squares, 0.0)).tolist()
     return _Turns((first, second), " ".join(f"{part:.3f}" for part in np.round(axis, 3) + 0.0))

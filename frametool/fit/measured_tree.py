@@ -11,6 +11,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.bodies import bodies_of, require_connected
 from frametool.fit.graph import bridges
+from frametool.fit.linear import dot, inverse, total
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
 from frametool.fit.uncertainty import Uncertainty
@@ -70,7 +71,7 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
         if each.covariance is not None:
             covariance = np.array(each.covariance, float).reshape(6, 6)
             _require_regular(covariance, place_of(measurements, row))
-            information[row] = np.linalg.inv(covariance)
+            information[row] = inverse(covariance)
     return TreeRows(
         np.array([bodies.number[name] for name in parents]),
         np.array([bodies.number[name] for name in children]),
@@ -128,7 +129,7 @@ class TreeSolution:
         self.sigma_factor = found.noise.factor
         self.dof = max(3 * (int(self.used.sum()) - problem.unknown), 0)
         self.rms_distance, self.rms_angle = (
-            math.sqrt((part[self.used] ** 2).sum() / self.used.sum())
+            math.sqrt(total(dot(part, part)[self.used]) / self.used.sum())
             for part in (self.residuals[:, :3], self.residuals[:, 3:])
         )
         kept = np.flatnonzero(self.used).tolist()

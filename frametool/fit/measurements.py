@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import NotConnected, printable
+from frametool.fit.linear import applied, dot, length
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.robust import KEPT
 from frametool.geometry.conventions import axes_change
@@ -99,7 +100,7 @@ def loops(
             apart += 1
             continue
         error = pose.errors(PoseArrays.of(each.transform))
-        metres, radians = (float(np.linalg.norm(half)) for half in (error[:3], error[3:]))
+        metres, radians = map(float, length(error.reshape(2, 3)))
         if tolerance is None and each.covariance is not None:
             information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
             u = _sigmas(error[None], information)[0]
@@ -120,5 +121,4 @@ def loops(
 
 
 def _sigmas(errors: Array, information: Array) -> Array:
-    squares: Array = np.einsum("ni,ij,nj->n", errors, information, errors)
-    return np.sqrt(np.maximum(squares, 0.0) / 6)
+    return np.sqrt(np.maximum(dot(errors, applied(information, errors)), 0.0) / 6)

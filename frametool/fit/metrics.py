@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from frametool.fit.linear import dot, length, total
 from frametool.frames.trajectory import way
 
 if TYPE_CHECKING:
@@ -33,9 +35,10 @@ class Statistics(NamedTuple):
 
 def statistics(values: Array) -> Statistics:
     """Sum numbers up."""
-    sse = float(values @ values)
+    count, sse = len(values), total(values * values)
+    mean = total(values) / count
     return Statistics(
-        (sse / len(values)) ** 0.5, float(values.mean()), float(np.median(values)), float(values.std()),
+        sqrt(sse / count), mean, float(np.median(values)), sqrt(total((values - mean) ** 2) / count),
         float(values.min()), float(values.max()), sse, float(np.percentile(values, 95)),
     )  # fmt: skip
 
@@ -60,8 +63,7 @@ def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErro
     across = np.cross(above, along)
     turned = ref.rotation, est.rotation
     rad = None if turned[0] is None or turned[1] is None else turned[0].distance(turned[1])
-    parts = (np.einsum("ij,ij->i", gap, axis) for axis in (along, across, above))
-    return AbsoluteErrors(np.linalg.norm(gap, axis=1), rad, *parts)
+    return AbsoluteErrors(length(gap), rad, *(dot(gap, axis) for axis in (along, across, above)))
 
 
 def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
@@ -70,20 +72,20 @@ def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
     behind = (np.searchsorted(path, path - CHORD, "right") - 1).clip(0)
     ahead = np.searchsorted(path, path + CHORD).clip(0, len(path) - 1)
     chord = xyz[ahead] - xyz[behind]
-    length = np.linalg.norm(chord, axis=1)
-    moving = np.flatnonzero(length > 0.0)
+    size = length(chord)
+    moving = np.flatnonzero(size > 0.0)
     if not len(moving):
         along = np.tile([1.0, 0.0, 0.0], (len(xyz), 1))
     else:
         last = moving[(np.searchsorted(moving, np.arange(len(xyz)), "right") - 1).clip(0)]
-        along = chord[last] / length[last, None]
-    above = up - (along @ up)[:, None] * along
-    size = np.linalg.norm(above, axis=1)
+        along = chord[last] / size[last, None]
+    above = up - dot(along, up)[:, None] * along
+    size = length(above)
     parallel = size < ROUNDING
     if parallel.any():
         x = np.array([1.0, 0.0, 0.0])
-        above[parallel] = x - (along[parallel] @ x)[:, None] * along[parallel]
-        size = np.linalg.norm(above, axis=1)
+        above[parallel] = x - along[parallel, :1] * along[parallel]
+        size = length(above)
     return along, above / size[:, None]
 
 
@@ -102,13 +104,13 @@ class RelativeErrors(NamedTuple):
 
 def relative_errors(ref: Trajectory, est: Trajectory, start: Indices, end: Indices) -> RelativeErrors:
     """Compare the ways from pose to pose: E = inv(inv(ref_i) ref_j) inv(est_i) est_j."""
-    covered = [np.linalg.norm(each.xyz[end] - each.xyz[start], axis=1) for each in (ref, est)]
+    covered = [length(each.xyz[end] - each.xyz[start]) for each in (ref, est)]
     distance = np.abs(covered[1] - covered[0])
     if ref.xyzw is None or est.xyzw is None:
         return RelativeErrors(start, end, None, None, distance)
     steps = [each.poses[start].relative(each.poses[end]) for each in (ref, est)]
     error = steps[0].relative(steps[1])
-    return RelativeErrors(start, end, np.linalg.norm(error.xyz, axis=1), error.rotation.angle(), distance)
+    return RelativeErrors(start, end, length(error.xyz), error.rotation.angle(), distance)
 
 
 def chained(along: Array, delta: float) -> tuple[Indices, Indices]:

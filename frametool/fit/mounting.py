@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.alignment import fitted
+from frametool.fit.alignment import centre, fitted
+from frametool.fit.linear import applied, crossed, eigen, product, solved
 
 if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array
 
 STEPS = 50
-SEEN = 1e-6  # of the largest singular value: a direction of the arm that the turns show
+SEEN = 1e-6  # rms of metres that a metre of the arm moves: along a direction that the turns show
 DONE = 1e-13
 
 
@@ -37,9 +38,11 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
         free = turns.reshape(-1, 3)
         residual = (ref.xyz - placed.xyz).reshape(-1)
         if own is not None:
-            basis = np.linalg.qr(own)[0]
-            free, residual = free - basis @ (basis.T @ free), residual - basis @ (basis.T @ residual)
-        step = np.linalg.lstsq(free, residual, rcond=SEEN)[0]
+            free = free - product(own, solved(crossed(own, own), crossed(own, free)))
+        squares, axes = eigen(crossed(free, free))
+        seen = squares > (SEEN * fit.scale) ** 2 * len(turns)
+        along = product(axes[:, seen].T, crossed(free, residual[:, None]))[:, 0]
+        step = applied(axes[:, seen], along / squares[seen])
         arm = arm + step
         if np.abs(step).max() <= DONE * (1 + np.abs(arm).max()):
             break
@@ -50,7 +53,7 @@ def _tangents(kind: str, xyz: Array, up: Array) -> Array | None:
     """Return how the parameters of an alignment move positions: shifts, turns about x, y, z or up, and scale."""
     if kind in ("none", "origin"):
         return None
-    centred = xyz - xyz.mean(0)
+    centred = xyz - centre(xyz)
     axes = up[None] if kind == "yaw" else np.eye(3)
     parts = [*(np.broadcast_to(axis, xyz.shape) for axis in np.eye(3)), *(np.cross(axis, centred) for axis in axes)]
     if kind == "sim3":

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from math import degrees
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from frametool.fit.metrics import statistics
 from frametool.frames.trajectory import way
+from frametool.geometry import arrays
+from frametool.geometry.floats import half_sincos
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -116,8 +119,8 @@ def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
     """Sum up distances and angles, and as evo does the norm of R - I and of the whole matrix."""
     found = {"m": _summed(m), "deg": None if rad is None else _summed(np.degrees(rad))}
     if evo and m is not None and rad is not None:
-        rot = SQRT8 * np.sin(rad / 2)
-        found |= {"rot": _summed(rot), "full": _summed(np.hypot(m, rot))}
+        rot = SQRT8 * half_sincos(rad, arrays)[0]
+        found |= {"rot": _summed(rot), "full": _summed(np.sqrt(m * m + rot * rot))}
     return found
 
 
@@ -139,8 +142,8 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
     def mean(chosen: Any) -> dict[str, Any]:
         return {
             "segments": int(np.count_nonzero(chosen)),
-            "percent": 100 * float(segments.share[chosen].mean()),
-            "deg_per_m": float(np.degrees(segments.rad_per_m[chosen].mean())),
+            "percent": 100 * statistics(segments.share[chosen]).mean,
+            "deg_per_m": degrees(statistics(segments.rad_per_m[chosen]).mean),
         }
 
     lengths = [

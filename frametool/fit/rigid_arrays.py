@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.geometry import arrays, matrix, quaternion, vectors
+from frametool.fit.linear import applied, length, product
+from frametool.geometry import arrays, floats, matrix, quaternion, vectors
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -43,15 +44,15 @@ class PoseArrays(NamedTuple):
     def inverse(self) -> PoseArrays:
         """The poses the other way round."""
         back = np.swapaxes(self.turns, -1, -2)
-        return PoseArrays(back, -np.einsum("...ij,...j->...i", back, self.places))
+        return PoseArrays(back, -applied(back, self.places))
 
     def __matmul__(self, other: PoseArrays) -> PoseArrays:
         """Compose: a_from_c = a_from_b @ b_from_c."""
-        return PoseArrays(self.turns @ other.turns, self.apply(other.places))
+        return PoseArrays(product(self.turns, other.turns), self.apply(other.places))
 
     def apply(self, points: Array) -> Array:
         """Move points."""
-        moved: Array = np.einsum("...ij,...j->...i", self.turns, points) + self.places
+        moved: Array = applied(self.turns, points) + self.places
         return moved
 
     def at(self, index: Any) -> PoseArrays:
@@ -60,11 +61,11 @@ class PoseArrays(NamedTuple):
 
     def stepped(self, steps: Array) -> PoseArrays:
         """Add small steps: place + d[:3], Exp(d[3:]) turn."""
-        return PoseArrays(exp(steps[..., 3:]) @ self.turns, self.places + steps[..., :3])
+        return PoseArrays(product(exp(steps[..., 3:]), self.turns), self.places + steps[..., :3])
 
     def errors(self, measured: PoseArrays) -> Array:
         """Return [place - measured place, Log(turn measured turn')]."""
-        turned = log(self.turns @ np.swapaxes(measured.turns, -1, -2))
+        turned = log(product(self.turns, np.swapaxes(measured.turns, -1, -2)))
         return np.concatenate([self.places - measured.places, turned], -1)
 
 
@@ -99,9 +100,10 @@ def inverse_left_jacobian(rotvecs: Array) -> Array:
 
     Source: Barfoot 2017, eq. 7.77b; I - [w]x / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) [w]x^2, a = |w|.
     """
-    angle = np.linalg.norm(rotvecs, axis=-1)
+    angle = length(rotvecs)
     far = angle > NEAR
     a = np.where(far, angle, 1.0)
-    factor = np.where(far, 1.0 / a**2 - 1.0 / (2.0 * a * np.tan(a / 2.0)), 1.0 / 12.0)
+    sine, cosine = floats.half_sincos(a, arrays)
+    factor = np.where(far, 1.0 / a**2 - cosine / (2.0 * a * sine), 1.0 / 12.0)
     crossed = skew(rotvecs)
-    return np.eye(3) - crossed / 2.0 + factor[..., None, None] * (crossed @ crossed)
+    return np.eye(3) - crossed / 2.0 + factor[..., None, None] * product(crossed, crossed)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from frametool.errors import ValueInvalid
+from frametool.fit.linear import dot, length, summed, total
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -106,20 +107,21 @@ def settled(
 
 def lengths(residuals: Array) -> Array:
     """Return the length of each three of the numbers of a row."""
-    found: Array = np.linalg.norm(residuals.reshape(len(residuals), -1, 3), axis=2)
-    return found
+    return length(residuals.reshape(len(residuals), -1, 3))
 
 
 def deviations(residuals: Array, sigmas: Array) -> Array:
     """Return u of rows: the root of the mean square of their numbers in sigmas."""
-    found: Array = np.sqrt(((lengths(residuals) / sigmas) ** 2).mean(1) / 3.0)
-    return found
+    off = lengths(residuals) / sigmas
+    u: Array = np.sqrt(dot(off, off) / (3.0 * off.shape[1]))
+    return u
 
 
 def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:
     """Return the sigma of each three numbers of weighted rows that share so many unknown ones."""
-    dof = max(3.0 * weights.sum() - unknown, 1.0)
-    return np.array([rms_sigma(squares, dof) for squares in weights @ lengths(residuals) ** 2])
+    dof = max(3.0 * total(np.asarray(weights, float)) - unknown, 1.0)
+    squares = summed(weights[:, None] * lengths(residuals) ** 2)
+    return np.array([rms_sigma(each, dof) for each in squares.tolist()])
 
 
 def first_weights(u: Array) -> Array:

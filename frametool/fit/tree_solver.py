@@ -14,6 +14,7 @@ import numpy as np
 
 from frametool.fit.elimination import Elimination
 from frametool.fit.graph import SpanningTree, bridges, spanning_tree
+from frametool.fit.linear import applied, dot, length, product, total
 from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.robust import KEPT, LEAST, MEDIAN_OF_SIX, first_weights, median_sigma, rms_sigma
 
@@ -73,18 +74,18 @@ def identities(count: int) -> PoseArrays:
 def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Array, Array]:
     """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
     back = np.swapaxes(parent.turns, -1, -2)
-    turn = inverse_left_jacobian(turned) @ back
+    turn = product(inverse_left_jacobian(turned), back)
     by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
     by_child[..., :3, :3], by_child[..., 3:, 3:] = back, turn
     by_parent[..., :3, :3], by_parent[..., 3:, 3:] = -back, -turn
-    by_parent[..., :3, 3:] = back @ skew(child.places - parent.places)
+    by_parent[..., :3, 3:] = product(back, skew(child.places - parent.places))
     return by_parent, by_child
 
 
 def of_body(jacobian: Array, body: PoseArrays, frame: PoseArrays) -> Array:
     """Return the Jacobian by the step of a body from that by the step of a frame in it: the lever arm turns along."""
     moved = jacobian.copy()
-    moved[..., 3:] -= jacobian[..., :3] @ skew(frame.places - body.places)
+    moved[..., 3:] -= product(jacobian[..., :3], skew(frame.places - body.places))
     return moved
 
 
@@ -120,7 +121,7 @@ class TreeProblem:
 
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return how many sigmas each row is off: the root mean square of its six numbers."""
-        squares: Array = np.einsum("ni,nij,nj->n", errors, self.information(noise, noise.factor), errors)
+        squares = dot(errors, applied(self.information(noise, noise.factor), errors))
         return np.sqrt(np.maximum(squares, 0.0) / 6)
 
     def tree(self, rows: Iterable[int]) -> SpanningTree:
@@ -143,9 +144,9 @@ class TreeProblem:
             some, orders = [self.tree(order) for order in orders[:at_once]], orders[at_once:]
             placed = self.placed(some)
             for at, tree in enumerate(some):
-                off = np.log1p(self.u(self.errors(placed.at(at)), Noise()) ** 2)
-                if off.sum() < least:
-                    best, least = placed.at(at), off.sum()
+                off = np.array([math.log1p(u * u) for u in self.u(self.errors(placed.at(at)), Noise()).tolist()])
+                if (sum_off := total(off)) < least:
+                    best, least = placed.at(at), sum_off
                 off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
                 closest = np.minimum(closest, off)
             if not orders and trees > 1:
@@ -178,20 +179,21 @@ class TreeProblem:
         by_parent, by_child = jacobians(parent, child, errors[:, 3:])
         by_parent = of_body(by_parent, bodies.at(rows.parent), parent)
         by_child = of_body(by_child, bodies.at(rows.child), child)
-        weighed = np.einsum("nij,nj->ni", information, errors)
+        weighed = applied(information, errors)
         blocks, gradient = np.zeros((self.elimination.size, 6, 6)), np.zeros((self.unknown, 6))
         sides = ((self._of_parent, rows.parent, by_parent), (self._of_child, rows.child, by_child))
         for chosen, body, by in sides:
             self._add(blocks, body[chosen], body[chosen], by[chosen], information[chosen], by[chosen])
-            np.add.at(gradient, body[chosen] - 1, np.einsum("nji,nj->ni", by[chosen], weighed[chosen]))
+            np.add.at(gradient, body[chosen] - 1, applied(by[chosen].swapaxes(1, 2), weighed[chosen]))
         both = self._of_both
         a, b, by_a, by_b = rows.parent[both], rows.child[both], by_parent[both], by_child[both]
         self._add(blocks, a, b, by_a, information[both], by_b)
         self._add(blocks, b, a, by_b, information[both], by_a)
-        return blocks, gradient, float((errors * weighed).sum())
+        return blocks, gradient, total(dot(errors, weighed))
 
     def _add(self, blocks: Array, a: Indices, b: Indices, by_a: Array, information: Array, by_b: Array) -> None:
-        np.add.at(blocks, self.elimination.slots(a - 1, b - 1), by_a.swapaxes(1, 2) @ information @ by_b)
+        made = product(product(by_a.swapaxes(1, 2), information), by_b)
+        np.add.at(blocks, self.elimination.slots(a - 1, b - 1), made)
 
     def improved(self, bodies: PoseArrays, information: Array, damping: float) -> tuple[PoseArrays, float, float]:
         """Take one step, damped until it helps; returns the bodies, the size of the step and the damping."""
@@ -206,7 +208,7 @@ class TreeProblem:
             step[1:] = -self.elimination.factored(damped).solve(gradient[..., None])[..., 0]
             moved, size = bodies.stepped(step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
             errors = self.errors(moved)
-            after = float(np.einsum("ni,nij,nj->", errors, information, errors))
+            after = total(dot(errors, applied(information, errors)))
             if size <= REST or after <= before * (1 + 1e-12):
                 return moved, size, damping / 10 if damping > 1e-9 else 0.0
             damping = max(damping * 10, 1e-6)
@@ -234,11 +236,12 @@ class TreeProblem:
         free, given = kept & ~self.rows.given, kept & self.rows.given
         factor = 1.0
         if given.any():
-            chi2 = 6 * (self.u(errors, Noise())[given] ** 2).sum()
+            chi2 = 6 * total(self.u(errors, Noise())[given] ** 2)
             factor = max(1.0, math.sqrt(chi2 / (2 * dof * given.sum() / kept.sum())))
         if not estimate:
             return Noise(factor=factor)
-        place, turn = (rms_sigma((part[free] ** 2).sum(), dof * free.sum() / kept.sum()) for part in _halves(errors))
+        squares = (total(dot(part, part)[free]) for part in _halves(errors))
+        place, turn = (rms_sigma(each, dof * free.sum() / kept.sum()) for each in squares)
         return Noise(place, turn, factor)
 
     def medians(self, errors: Array, looped: Any) -> Noise:
@@ -251,7 +254,7 @@ class TreeProblem:
             factor = float(np.median(_odd(self.u(errors, noise)[given]))) / (MEDIAN_OF_SIX * share)
             noise = noise._replace(factor=max(1.0, factor))
         if free.any():
-            place, turn = (median_sigma(_odd(np.linalg.norm(part[free], axis=1)), share) for part in _halves(errors))
+            place, turn = (median_sigma(_odd(length(part[free])), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
         return noise
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.fit.graph import Groups
+from frametool.fit.linear import crossed, product
 from frametool.fit.tree_solver import Fitted, TreeProblem, jacobians, of_body
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ class Uncertainty:
         right = np.zeros((self._problem.count, 6, 6))
         for body, frame, by in zip((t, s), (a, b), jacobians(a, b, np.zeros(3)), strict=True):
             right[body] = of_body(by, self._found.bodies.at(body), frame).T
-        return _symmetric(np.einsum("nij,nik->jk", right[1:], self._factor.solve(right[1:])))
+        solved = self._factor.solve(right[1:])
+        return _symmetric(crossed(right[1:].reshape(-1, 6), solved.reshape(-1, 6)))
 
     def in_root(self, body: int, frame: PoseArrays) -> Array | None:
         """Return that of a frame in the root."""
@@ -47,7 +49,7 @@ class Uncertainty:
         if self._known.of(body) != self._known.of(0):
             return None
         arm = of_body(np.eye(6), self._found.bodies.at(body), frame)
-        return _symmetric(arm @ self._of_bodies[body - 1] @ arm.T)
+        return _symmetric(product(product(arm, self._of_bodies[body - 1]), arm.T))
 
     @cached_property
     def _factor(self) -> BlockFactor:

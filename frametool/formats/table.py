@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, NamedTuple
 
 
@@ -665,12 +666,11 @@ def is_folder(name: str) -> bool:
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
     """Return which of some forms is written to a file of this name: by the whole name, then by its suffix."""
-    last = (path or "").rpartition("/")[2]
+    last = os.path.basename(path or "")
     return next((name for name in names if last in FORMATS[name].names), None) or by_suffix(path, names)
 
 
 def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
     """Return which of some forms the suffix of a file stands for, if any."""
-    begin, dot, suffix = (path or "").rpartition(".")
-    told = f"{dot}{suffix}".lower() if begin and "/" not in suffix else ""
+    told = os.path.splitext(path or "")[1].lower()
     return next((name for name in names if told in FORMATS[name].suffixes), None)

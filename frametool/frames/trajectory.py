@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
+from frametool.geometry import arrays, quaternion
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -80,4 +81,5 @@ def columns(rows: Array) -> list[Array]:
 
 def way(xyz: Array) -> Array:
     """Return the path in metres up to each position."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(xyz, axis=0), axis=1)))
+    x, y, z = np.diff(xyz, axis=0).T
+    return np.append(0.0, np.cumsum(quaternion.magnitude(x, y, z, arrays)))

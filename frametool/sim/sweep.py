@@ -12,10 +12,12 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
+from frametool.geometry import arrays
+from frametool.geometry.floats import bearing, half_sincos
 from frametool.sim.drivers import ARRIVED, FollowController, unbounded
 from frametool.sim.scene import TUTORIAL_SPAWN, tutorial
 from frametool.sim.simulate import simulate
-from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, turned
+from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -164,7 +166,8 @@ class _FollowerBlock:
         """Advance one tick: `Turtle.update`, without what followers never do."""
         if still:
             self.speed, self.turn = np.zeros_like(self.x), np.zeros_like(self.x)
-        self.theta, cosine, sine = turned(self.theta, self.turn, np)
+        self.theta = wrapped(self.theta + self.turn * DT, np)
+        sine, cosine = half_sincos(2.0 * self.theta, arrays)
         self.x += cosine * self.speed * DT
         self.down -= sine * self.speed * DT
         if all(axis.min(initial=0.0) >= 0.0 and axis.max(initial=SIZE) <= SIZE for axis in (self.x, self.down)):
@@ -190,15 +193,14 @@ class _FollowerBlock:
 
     def steer(self, leader: TurtlePose) -> None:
         """Follow the published pose: what `lookup` and `FollowController.command` give, from float32 poses."""
-        theta = _single(self.theta)
-        sine, cosine = np.sin(theta), np.cos(theta)
+        sine, cosine = half_sincos(2.0 * _single(self.theta), arrays)
         across, up = leader.x - _single(self.x), leader.y - _single(SIZE - self.down)
         ahead, left = cosine * across + sine * up, cosine * up - sine * across
         distance = np.sqrt(ahead * ahead + left * left)
         moving = distance >= ARRIVED
-        with np.errstate(over="ignore"):  # what comes of it is refused below
+        with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is refused below, or stands still
             self.speed = np.clip(self.gain_linear * distance * moving, -self.max_linear, self.max_linear)
-            turn = self.gain_angular * np.arctan2(left, ahead) * moving
+            turn = self.gain_angular * np.where(moving, bearing(left, ahead, distance, arrays), 0.0)
         self.turn = np.clip(turn, -self.max_angular, self.max_angular)
         finite = np.isfinite(self.speed) & (abs(self.turn) <= FASTEST_TURN)
         if not finite.all():

@@ -102,15 +102,6 @@ def wrapped(theta: Any, xp: Any = math) -> Any:
     return theta - 2.0 * PI * xp.floor((theta + PI) / (2.0 * PI))
 
 
-def turned(theta: Any, turning: Any, xp: Any) -> tuple[Any, Any, Any]:
-    """Return the heading after one tick at a turn rate (rad/s), its cosine and its sine.
-
-    Floats with `math` as xp, or arrays with numpy.
-    """
-    theta = wrapped(theta + turning * DT, xp)
-    return theta, xp.cos(theta), xp.sin(theta)
-
-
 class Turtle:
     """A turtle that keeps its last command for a second, walks, and stops at the walls.
 
@@ -189,7 +180,8 @@ class Turtle:
         if now_ns - self._commanded_ns > TIMEOUT_NS:
             self._velocity = Twist(0.0, 0.0)
         ahead, turning, aside = self._velocity
-        self._theta, cosine, sine = turned(self._theta, turning, math)
+        self._theta = wrapped(self._theta + turning * DT)
+        cosine, sine = math.cos(self._theta), math.sin(self._theta)
         self._x += cosine * ahead * DT - sine * aside * DT
         self._down -= cosine * aside * DT + sine * ahead * DT
         return self._stay_inside()

@@ -298,5 +298,7 @@ class ArrayWriter(ColumnsWriter):
         columns = [np.ascontiguousarray(column) for column in block.numbers.T]
         if not self.placed:
             columns = [columns[0] * 0.0] * 3 + columns
+        nothing = columns[0] * 0.0  # nan in rows without a result; the last row of a matrix is four plain numbers
         with np.errstate(invalid="ignore"):
-            return [*self.target.numbers(tuple(columns[: self.own]), arrays), *columns[self.own :]]
+            numbers = self.target.numbers(tuple(columns[: self.own]), arrays)
+        return [*(each + nothing if isinstance(each, float) else each for each in numbers), *columns[self.own :]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pty
-import shutil
 import signal
 import subprocess
 import sys
@@ -138,39 +137,3 @@ def test_a_start_that_can_open_no_file_is_one_line() -> None:
     code = "import resource; from frametool.cli import main; resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3)); main()"
     done = subprocess.run([sys.executable, "-c", code, "--version"], env=ENVIRONMENT, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (5, b"frametool: too many open files\n")
-
-
-# what Windows lacks; libraries that know which system they run on are imported before it is taken away
-LACKING = """
-import multiprocessing.connection, os, select, signal, subprocess, sys, tempfile
-import numpy
-for name in ("fcntl", "grp", "posix", "pty", "pwd", "resource", "termios", "tty"):
-    sys.modules[name] = None
-for module, names in (
-    (signal, "SIGALRM SIGCHLD SIGCONT SIGHUP SIGPIPE SIGQUIT SIGTSTP SIGUSR1 SIGWINCH alarm pthread_sigmask setitimer"),
-    (os, "O_NONBLOCK chown fchmod fork getegid geteuid getgid getuid mkfifo posix_fadvise pread register_at_fork"
-         " sched_getaffinity setsid statvfs sysconf uname"),
-    (select, "epoll poll POLLIN POLLHUP"),
-):
-    for name in names.split():
-        delattr(module, name)
-from frametool.cli import run
-for line in sys.argv[1:]:
-    assert run(line.split("|")) == 0, line
-"""
-COMMANDS = [
-    "--version", "--help", "help|time", "formats", "convert|--from|rpy|0|0|0|-o|b.yaml|--force", "compose|{xyz: [1, 2, 3]}|b.yaml",
-    "invert|b.yaml", "lookup|robot.yaml|map|tool", "tree|robot.yaml", "check|robot.yaml", "static|robot.yaml", "calc|1 + 2",
-    "view|robot.yaml|-o|robot.html", "convert|-i|walk.tum|-f|csv|-o|walk.csv", "convert|-i|walk.tum|-f|npy|-o|walk.npy",
-    "convert|-i|walk.npy|-f|kitti", "apply|--transform|b.yaml|-i|cloud.csv|--jobs|2", "mean|walk.tum", "sim|follow|--duration|1",
-    "fk|arm.urdf|arm_base|tool|-i|joints.csv",
-]  # fmt: skip
-
-
-def test_a_system_without_what_posix_has_does_the_same(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "examples", tmp_path, dirs_exist_ok=True)
-    (tmp_path / "b.yaml").write_text("before")
-    call = [sys.executable, "-c", LACKING, *COMMANDS]
-    done = subprocess.run(call, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, check=False)
-    assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
-    assert "w: 1.0" in (tmp_path / "b.yaml").read_text()

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import pty
 import re
 import struct
 import subprocess
-import termios
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,6 +131,7 @@ def test_a_crowded_picture_says_how_to_see_a_part(run: Run) -> None:
 
 def shown_in_a_terminal(*arguments: str, size: tuple[int, int] = (60, 20), command: str = "view", **environment: str) -> bytes:
     """Return what a command writes to a terminal of so many columns and lines."""
+    pty, fcntl, termios = (pytest.importorskip(name) for name in ("pty", "fcntl", "termios"))
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", *size[::-1], 0, 0))
     inherited = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "COLUMNS", "LINES")}

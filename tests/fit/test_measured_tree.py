@@ -412,14 +412,14 @@ def test_errors(rows: list[Measurement], more: dict[str, Any], text: str) -> Non
     assert str(error.value) == text
 
 
-@pytest.mark.parametrize("size", [1e30, 1e150, 1e300])
+@pytest.mark.parametrize("size", [1e200, 1e300])
 def test_numbers_beyond_all_measure_are_refused(size: float) -> None:
     rows = [each._replace(components=(*(size * part for part in each.components[:3]), *each.components[3:])) for each in world(6, 14, 3).measurements]
     with pytest.raises(ValueInvalid, match=r"^translations \(up to .* m\) or sigmas differ too much in size to be solved$"):
         solve_tree(rows)
 
 
-@pytest.mark.parametrize("size", [1e-9, 1e7])
+@pytest.mark.parametrize("size", [1e-9, 1e7, 1e30, 1e150])
 def test_small_and_large_worlds_are_solved(size: float) -> None:
     truth = world(6, 14, 3)
     rows = [each._replace(components=(*(size * part for part in each.components[:3]), *each.components[3:])) for each in truth.measurements]

@@ -44,7 +44,7 @@ POINTS = {
 # forms whose points have the same numbers always refuse what lacks one: tests/formats/test_bin_clouds.py
 ARRAYS = [name for name, row in FORMATS.items() if "arrays" in row.writes and not row.columns]
 OTHERS = [form for form in ARRAYS if form != "npy"]
-MOVES = (("convert",), ("invert",), ("apply", "--transform", "{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}"), ("convert", "--to", "rpy"))
+MOVES = (("convert",), ("invert",), ("apply", "--transform", "{xyz: [1, 0, 0], rpy_deg: [0, 0, 90]}"), ("convert", "--to", "rpy"), ("convert", "--to", "matrix"))
 
 
 @pytest.fixture(autouse=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import pty
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -241,7 +240,7 @@ def test_single_results_are_an_array_too(use: Use) -> None:
 
 
 def test_no_array_is_written_to_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    shown, terminal = pty.openpty()
+    shown, terminal = pytest.importorskip("pty").openpty()
     with os.fdopen(terminal, "w") as stdout:
         monkeypatch.setattr(sys, "stdout", stdout)
         assert cli.run(["convert", POSE, "-f", "npy"]) == 1

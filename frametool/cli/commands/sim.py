@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from frametool.sim.scene import Scene
     from frametool.sim.turtle import Twist
 
+INSTEAD = "pipe key names into frametool sim follow --leader -"
 SUBCOMMANDS = {
     "follow": "a leader, and one or more turtles that follow",
     "run": "a whole scene from one file",
@@ -245,8 +246,8 @@ def teleop(**options: Any) -> None:
     Each key moves for a second: 2 m/s ahead or back, 2 rad/s to the left or right. With --turtlesim ros2 the keys
     g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
     """
-    if not sys.stdin.isatty():
-        raise click.UsageError("standard input is no terminal; pipe key names into frametool sim follow --leader -")
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise click.UsageError(f"standard input is no terminal; {INSTEAD}")
     mailbox = Mailbox()
     output, scene = output_and_scene({**options, "live": True}, lambda: mailbox, leaders=True)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
@@ -256,8 +257,11 @@ def teleop(**options: Any) -> None:
 @contextmanager
 def keyboard(mailbox: Mailbox, *, headings: bool) -> Iterator[None]:
     """Read single keys from the terminal into a mailbox; the terminal is as before afterwards."""
-    import termios
-    import tty
+    try:
+        import termios
+        import tty
+    except ImportError:
+        raise click.UsageError(f"single keys are read on Linux and macOS alone; {INSTEAD}") from None
     from threading import Thread
 
     clean_up()

@@ -122,9 +122,10 @@ def command(
         write(content)
     if opens and path:
         import webbrowser
+        from pathlib import Path
 
         say(f"the page is {path}")
-        webbrowser.open(f"file://{os.path.abspath(path)}")
+        webbrowser.open(Path(path).absolute().as_uri())
 
 
 def _form(form: str | None, output: str | None, *, opens: bool) -> str:
