@@ -118,7 +118,7 @@ def _check_each(rows: Any, side: int) -> None:
     import numpy as np
 
     whole = rows.reshape(-1, side, side)
-    roots = np.sqrt(abs(np.einsum("nii->ni", whole)))
+    roots = np.sqrt(abs(np.diagonal(whole, axis1=1, axis2=2)))
     with np.errstate(invalid="ignore"):
         skew = abs(whole - whole.swapaxes(1, 2)) > uncertainty.ASYMMETRY * roots[:, :, None] * roots[:, None, :]
     doubtful = skew.any((1, 2)) | ~np.isfinite(rows).all(1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import operator
 from contextlib import suppress
 from functools import partial
+from math import inf, nan
 from typing import TYPE_CHECKING
 
 from frametool.calc.parser import METRE, PLAIN, RADIAN, CalcError, frame_text
@@ -33,6 +34,7 @@ from frametool.geometry import floats, quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from typing import Any
 
     from frametool.calc.parser import Dimension
     from frametool.calc.values import Kernel
@@ -408,9 +410,23 @@ def unit_pose(*parts: Number) -> Rigid:
 
 def _powered(base: Number, exponent: Number, xp: Namespace) -> Components:
     if xp is floats:
-        result = base**exponent
-        return (float(result),) if not isinstance(result, complex) else (float("nan"),)
-    return (base**exponent,)
+        return (_power(base, exponent),)
+    import numpy as np
+
+    powers: Any = np.frompyfunc(_row_power, 2, 1)  # arrays' own differ between processors
+    return (powers(base, exponent).astype(float),)
+
+
+def _power(base: float, exponent: float) -> float:
+    result = base**exponent
+    return nan if isinstance(result, complex) else float(result)
+
+
+def _row_power(base: float, exponent: float) -> float:
+    try:
+        return _power(base, exponent)
+    except (OverflowError, ZeroDivisionError):
+        return inf
 
 
 def _no_power(base: float, exponent: float) -> str:

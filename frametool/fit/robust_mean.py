@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import log
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -102,6 +103,6 @@ def _middle(poses: Transform, roots: Array) -> Transform:
     tried = range(count) if count <= MOST else next(draws(1, MOST, count))
 
     def apart(at: int) -> float:
-        return sum(float(np.log(max(np.median(roots[:, 0] * off), LEAST))) for off in poses[at].distance(poses))
+        return sum(log(max(np.median(roots[:, 0] * off), LEAST)) for off in poses[at].distance(poses))
 
     return poses[min(tried, key=apart)]

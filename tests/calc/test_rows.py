@@ -154,6 +154,17 @@ def test_a_row_without_a_value_says_why(run: Callable[..., Any]) -> None:
     assert "stdin:4: acos() takes -1 .. 1, found 3" in done.err
 
 
+def test_powers_of_rows_are_those_of_single_numbers(run: Callable[..., Any]) -> None:
+    done = run("calc", "-e", "p=(row.k + 2) ^ 2.7", "-e", "q=2.5 ^ row.k", stdin=TABLE)
+    assert column(done.out, "p", "q").tolist() == [[(k + 2) ** 2.7, 2.5**k] for k in K.tolist()]
+
+
+@pytest.mark.parametrize(("row", "told"), [("0", "division by zero"), ("-2", "-2 has no power -2.5"), ("1e-200", "the result is not finite")])
+def test_a_row_without_a_power_says_why(row: str, told: str, run: Callable[..., Any]) -> None:
+    done = run("calc", "-e", "p=row.k ^ -2.5", "--on-error", "skip", stdin=f"x,y,z,k\n1,2,3,4\n1,2,3,{row}\n")
+    assert (done.out, done.err.splitlines()[0]) == ("x,y,z,k,p\n1,2,3,4,0.03125\n", f"frametool: stdin:3: {told} (row skipped)")
+
+
 @pytest.mark.parametrize(("arguments", "status", "told"), [
     (["row * x"], 1, "unknown name 'x'\n  row * x\n        ^"),
     (["(map<-lidar) * row"], 2, "give --tree FILE"),
