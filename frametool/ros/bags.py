@@ -47,24 +47,33 @@ def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
     if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
         raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
-        from rosbags.highlevel import AnyReader
+        import rosbags.highlevel  # noqa: F401 - whether it is there
+
+        from frametool.ros.bag_reader import BagReader
     except ImportError:
         raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
 
     if path == "-":
         raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
-    try:
-        _check_whole(path, tally)
-        with AnyReader([Path(path)]) as reader:
+    with broken(path):
+        check_files(path, tally)
+        with BagReader([Path(path)]) as reader:
             yield reader
+
+
+@contextmanager
+def broken(path: str) -> Iterator[None]:
+    """Make one error of whatever reading a broken bag raises: anything, also MemoryError."""
+    try:
+        yield
     except (FrametoolError, BrokenPipeError):
         raise
-    except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything, also MemoryError
+    except Exception as error:  # noqa: BLE001 - see above
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
 
 
-def _check_whole(path: str, tally: Tally) -> None:
+def check_files(path: str, tally: Tally) -> None:
     """Check what the library does not: the pages of sqlite3; tell if an MCAP file has no counts to compare with."""
     for file in sorted(Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]:
         if file.suffix == ".db3":
