@@ -436,6 +436,14 @@ def result_options(*what: str) -> Callable[[Function], Function]:
     return together(_form_option(forms, "form of the result"), _PRECISION, *recording, *_PLACE)
 
 
+# of a command that copies one
+recording_options = together(
+    click.option("-f", "--format", "format_name", type=click.Choice(writers("recording")),
+                 help="form of the copy  [default: by the name of --output]"),
+    *_PLACE,
+)  # fmt: skip
+
+
 def list_options(*more: str) -> Callable[[Function], Function]:
     """Add to a command the options that shape and place a list for people, which is text wherever it goes.
 
@@ -600,6 +608,19 @@ def window_of(start: int | None, stop: int | None, column: str | None = None) ->
     from frametool.frames.stamps import FURTHEST_NS
 
     return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
+
+
+def read_window(text: str) -> tuple[int, int]:
+    """Read START,STOP: two times of which the second is not before the first."""
+    from frametool.frames.stamps import format_stamp
+
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise ValueInvalid(f"{shown(text)} is not START,STOP: two times with a comma between them")
+    start, stop = map(_stamp_ns, map(str.strip, parts))
+    if start > stop:
+        raise ValueInvalid(f"{format_stamp(start)} is after {format_stamp(stop)}; START comes first")
+    return start, stop
 
 
 def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
