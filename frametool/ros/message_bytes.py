@@ -91,17 +91,16 @@ class MessageFields:
 
     def header(self, frame: str | None = None) -> Place:
         """Take a header over, or with another frame in it, and return what it said."""
-        stamp_ns = self.stamp()
-        return Place(self.text(frame), stamp_ns)
-
-    def stamp(self) -> int:
-        """Take the stamp of a header over, and the counter that ROS 1 has before it."""
-        if self.ros1:
-            self.integer()
-        seconds, nanoseconds = self.integer("I" if self.ros1 else "i"), self.integer()
+        seconds, nanoseconds = self.stamp()
         if problem := stamp_problem(seconds, nanoseconds, STAMPS[0]):
             raise problem
-        return seconds * BILLION + nanoseconds
+        return Place(self.text(frame), seconds * BILLION + nanoseconds)
+
+    def stamp(self) -> tuple[int, int]:
+        """Take seconds and nanoseconds of a header over, and the counter that ROS 1 has before them."""
+        if self.ros1:
+            self.integer()
+        return self.integer("I" if self.ros1 else "i"), self.integer()
 
     def whole(self) -> bytes:
         """Return the new message; raises ValueInvalid where the old one goes on behind its fields, or ends in them."""
@@ -111,23 +110,34 @@ class MessageFields:
         return bytes(self.made + rest)
 
 
-class RecordedTransform(NamedTuple):
-    """One transform of a message: parent_from_child, and between which bytes the two names stand."""
+class Said(NamedTuple):
+    """A transform as it was recorded, unchecked; numbers: tx, ty, tz, x, y, z, w; stamp: seconds and nanoseconds."""
 
     parent: str
     child: str
     numbers: Rigid
-    begin: int
-    end: int
+    stamp: tuple[int, int]
 
 
-def transforms(fields: MessageFields) -> Iterator[RecordedTransform]:
-    """Take a TFMessage over; yield each transform, whose numbers `put` replaces then."""
-    for _ in range(fields.integer()):
-        fields.stamp()
-        begin = fields.at
-        parent, child, end = fields.text(), fields.text(), fields.at
-        yield RecordedTransform(parent, child, fields.pose(), begin, end)
+class Transforms:
+    """The transforms of a TFMessage that is taken over; `put` of its fields replaces the numbers of the last one.
+
+    names: between which bytes those of the last one stand
+    """
+
+    def __init__(self, data: bytes, *, ros1: bool) -> None:
+        """Begin before the first one."""
+        self.fields = MessageFields(data, ros1=ros1)
+        self.names = 0, 0
+
+    def __iter__(self) -> Iterator[Said]:
+        """Yield each transform."""
+        fields = self.fields
+        for _ in range(fields.integer()):
+            stamp, begin = fields.stamp(), fields.at
+            parent, child = fields.text(), fields.text()
+            self.names = begin, fields.at
+            yield Said(parent, child, fields.pose(), stamp)
 
 
 _INTEGERS = {(order, code): struct.Struct(order + code) for order in "<>" for code in "iI"}

@@ -31,7 +31,7 @@ from frametool.ros.mcap_chunks import McapFile, McapWriter, Schemas, built, mapp
 from frametool.ros.recordings import BAG1, BAG2, KINDS, METADATA, NAME, PIECE, FirstPiece, serialised, typestore
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from frametool.grammar.edges import Tally
     from frametool.ros.bag1_chunks import Connection
@@ -91,6 +91,18 @@ class CopiedRecording:
                 self._check(count, source.expected)
                 total += count
             self._check(total, None if said is None else int(said))
+
+    def messages(self, types: Collection[str]) -> Iterator[tuple[Channel, int, bytes]]:
+        """Yield channel, log time and data of the messages of some types."""
+        channels: dict[int, Channel] = {}
+        for piece in self.pieces():
+            if not isinstance(piece, Chunk):
+                continue
+            for number, log_ns, _, start, end in piece.entries:
+                if number not in channels:
+                    channels = self.channels
+                if channels[number].type in types:
+                    yield channels[number], log_ns, piece.raw[start:end]
 
     def _check(self, count: int, expected: int | None) -> None:
         """Raise FormatError unless as many messages are there as are said to be."""

@@ -12,14 +12,14 @@ from frametool.frames.path import to_root
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Names, Topics
-from frametool.ros.message_bytes import MessageFields, transforms
+from frametool.ros.message_bytes import Transforms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.ros.message_bytes import RecordedTransform
+    from frametool.ros.message_bytes import Said
 
 SAME = 1e-12  # metres, of positions a metre long, and radians: what composing and writing numbers leaves
 STATIC = "tf_static"
@@ -82,15 +82,15 @@ class RecordedEdges:
         known = self._alike.get((topic, len(data)), [(0, 0, b".")])
         if all(data[begin:end] == text for begin, end, text in known):
             return  # most messages say nothing new
-        fields, found = MessageFields(data, ros1=self.ros1), []
-        for transform in transforms(fields):
-            edge = self._added(topic, transform)
-            end = transform.end if edge.varies else fields.at
-            found.append((transform.begin, end, data[transform.begin : end]))
-        fields.whole()
+        message, found = Transforms(data, ros1=self.ros1), []
+        for transform in message:
+            begin, end = message.names
+            end = end if self._added(topic, transform).varies else message.fields.at
+            found.append((begin, end, data[begin:end]))
+        message.fields.whole()
         self._alike[topic, len(data)] = found
 
-    def _added(self, topic: str, transform: RecordedTransform) -> RecordedEdge:
+    def _added(self, topic: str, transform: Said) -> RecordedEdge:
         """Take a transform in."""
         parent, child, numbers = self.bare(transform.parent), self.bare(transform.child), transform.numbers
         edge = self.known.get(child)
@@ -200,9 +200,9 @@ def _unit(tx: float, ty: float, tz: float, x: float, y: float, z: float, w: floa
 
 def replaced(data: bytes, edges: dict[str, AddedEdge], bare_name: Callable[[str], str], *, ros1: bool) -> bytes:
     """Return a message of transforms with other numbers in some edges; the same object where it has none of them."""
-    fields, found = MessageFields(data, ros1=ros1), False
-    for transform in transforms(fields):
+    message, found = Transforms(data, ros1=ros1), False
+    for transform in message:
         if edge := edges.get(bare_name(transform.child)):
-            fields.put(edge.numbers)
+            message.fields.put(edge.numbers)
             found = True
-    return fields.whole() if found else data
+    return message.fields.whole() if found else data

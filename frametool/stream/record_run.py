@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import (
@@ -15,8 +16,9 @@ from frametool.errors import (
 )
 from frametool.formats.load import Recording, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.grammar.edges import Edge
-from frametool.ros.bags import TYPES
+from frametool.grammar.edges import Edge, Options, stop
+from frametool.ros.bags import TYPES, recorded_edge
+from frametool.ros.message_bytes import Transforms
 from frametool.ros.moved_messages import MOVED_TYPES, MessageMover
 from frametool.ros.record_copy import RecordChanges, RecordContents, added_messages, copied
 from frametool.ros.recorded_edges import MOST_NAMED, STATIC, Planned, RecordedEdges, replaced
@@ -25,10 +27,9 @@ from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misuse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from typing import Any
 
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import Remark
+    from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
     from frametool.ros.chunks import Channel
     from frametool.ros.record_copy import Advance, Change, CopiedRecording
     from frametool.ros.recorded_edges import AddedEdge
@@ -114,10 +115,8 @@ class RecordRun:
         """Take a message of transforms in."""
         if not self._counts(channel):
             return
-        try:
+        with _on_topic(channel.topic, self.recording.path):
             self.edges.add(channel.topic, data)
-        except ValueInvalid as error:
-            raise FormatError(f"a message on {channel.topic}: {error}", source=self.recording.path) from None
 
     def _check_topics(self, channels: dict[int, Channel]) -> None:
         """Raise FormatError for a topic that is not there or holds what does not move, Misused for one of no use."""
@@ -151,13 +150,11 @@ class RecordRun:
 
     def _frames(self) -> Frames:
         """Return the transforms of the recording as they are in the copy, all over time."""
-        channels = self.recording.channels
-        has_own = any(self.contents.counts[number] for number, each in channels.items() if self._counts(each))
         more = [*self.planned.added, *self.planned.replaced]
-        if not has_own and not more:
+        channels = self.recording.channels
+        if not more and not any(self.contents.counts[number] for number in channels if self._counts(channels[number])):
             raise FormatError("no transforms in it; --with FILE brings some", source=self.recording.path)
-        source = TransformsOfCopy(self.recording.path, topics=self.transforms)
-        source.more, source.has_own = more, has_own
+        source = TransformsOfCopy(self.recording, self.transforms, more)
         return load_sources([source], Rules(normalize=self.asked.normalize))
 
     def _replacer(self) -> Change:
@@ -239,21 +236,37 @@ class RecordRun:
 
 
 class TransformsOfCopy(Recording):
-    """The transforms of a recording as its copy has them.
+    """The transforms of a recording as its copy has them: some of its edges are replaced, and others are added."""
 
-    has_own: it has any; more: edges that are added, or stand in the place of its own
-    """
+    def __init__(self, recording: CopiedRecording, topics: set[str], more: Sequence[AddedEdge]) -> None:
+        """Take the recording, the topics that are read (all if none), and the edges that are added or replaced."""
+        super().__init__(recording.path, topics=topics)
+        self.recording, self.more = recording, more
 
-    has_own = True
-    more: Sequence[AddedEdge] = ()
-
-    def pieces(self, *args: Any, **options: Any) -> Iterator[Any]:
+    def pieces(
+        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False  # noqa: ARG002
+    ) -> Iterator[Edge | Samples | EdgeColumns]:  # fmt: skip
         """Yield its edges, but for those that are replaced, and then the others."""
+        self.close()
+        options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
         children = {edge.child for edge in self.more}
-        if self.has_own:
-            own: Iterator[Any] = super().pieces(*args, **options)
-            yield from (edge for edge in own if edge.child not in children)
+        for number, (channel, log_ns, data) in enumerate(self.recording.messages(TYPES), 1):
+            with _on_topic(channel.topic, self.path):
+                for said in Transforms(data, ros1=self.recording.is_ros1):
+                    edge = recorded_edge(said, number, channel.topic, log_ns, self.path, options)
+                    if edge is not None and edge.child not in children:
+                        yield edge
         yield from (Edge(edge.parent, edge.child, edge.numbers) for edge in self.more)
+        self.tell()
+
+
+@contextmanager
+def _on_topic(topic: str, path: str) -> Iterator[None]:
+    """Name the topic of a message that cannot be read."""
+    try:
+        yield
+    except ValueInvalid as error:
+        raise FormatError(f"a message on {topic}: {error}", source=path) from None
 
 
 def _is_among(topic: str, topics: set[str]) -> bool:
