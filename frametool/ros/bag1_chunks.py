@@ -183,6 +183,7 @@ class Bag1File:
             raise ValueError("a connection without topic or type")
         number = number_of(fields[b"conn"])
         self.connections.setdefault(number, (fields, said))
+        channel_of((fields, said))  # raises for one that cannot be read
         return number
 
     def _entries(self, raw: bytes) -> list[Entry]:

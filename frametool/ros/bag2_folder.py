@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import dump
+from frametool.errors import FormatError, ValueInvalid
 from frametool.ros.chunks import FULL, Chunk, zstd
 from frametool.ros.mcap_chunks import MESSAGE_HEAD, mapping, message_head, sized
 from frametool.ros.recordings import BAG2, METADATA, typestore
@@ -45,8 +46,15 @@ def says_by_numbers(qos: str) -> bool:
 
 
 def read_metadata(text: str, name: str) -> dict[str, Any]:
-    """Read metadata, of a folder or as it stands in an MCAP file; every value in it is text."""
-    for document in parse_documents(text, name):
+    """Read metadata, of a folder or as it stands in an MCAP file; every value in it is text.
+
+    Raises ValueError for what is no YAML.
+    """
+    try:
+        documents = parse_documents(text, name)
+    except FormatError as error:
+        raise ValueError(str(error)) from None
+    for document in documents:
         if type(document.value) is dict:
             found = document.value.get(INFORMATION, document.value)
             return found if type(found) is dict else {}
@@ -116,12 +124,11 @@ class DatabaseFile:
         kind = topic["type"]
         defined = definitions.get(kind) or self._defined(kind)
         encoding, text = str(defined["encoding"]), str(defined["encoded_message_definition"])
-        schemas, channels = (max(each, default=0) + 1 for each in (self.known.schemas, self.known.channels))
-        schema = self.known.add_schema(schemas, b"".join(sized(each.encode()) for each in (kind, encoding, text)))
+        schema = self.known.add_schema(None, b"".join(sized(each.encode()) for each in (kind, encoding, text)))
         said = {QOS: topic.get(QOS) or "", HASH: topic.get("type_description_hash") or ""}
         said = {key: value for key, value in said.items() if value or key == QOS}
         named = (sized(str(topic[name]).encode()) for name in ("name", "serialization_format"))
-        return self.known.add_channel(channels, schema, b"".join((*named, mapping(said))))
+        return self.known.add_channel(None, schema, b"".join((*named, mapping(said))))
 
     def _defined(self, kind: str) -> dict[str, str]:
         """Return the definition of a type that the file does not define: that of ROS 2 Humble, or none."""
@@ -135,19 +142,21 @@ def metadata_of(writer: McapWriter, before: dict[str, Any], file: str) -> dict[s
     """Return the metadata of a file that was written, with what it said before of where it comes from."""
     first, last = writer.span or (0, 0)
     topics: dict[tuple[Any, ...], dict[str, Any]] = {}
+    listed = (each["topic_metadata"] for each in before.get("topics_with_message_count") or ())
+    hashes = {(each["name"], each["type"]): each.get("type_description_hash") for each in listed}
     by_numbers = False
     for number in sorted(writer.known.channels):
         channel, schema, said = writer.known.channel(number)
         qos = said.get(QOS, "")
         by_numbers |= says_by_numbers(qos)
-        told = said.get(HASH) or type_hash(*writer.known.schema(schema)) if schema else ""
+        told = said.get(HASH) or hashes.get((channel.topic, channel.type)) or type_hash(*writer.known.schema(schema))
         about = {"name": channel.topic, "type": channel.type, "serialization_format": channel.encoding,
                  QOS: qos, "type_description_hash": told}  # fmt: skip
         row = topics.setdefault((*about.values(),), {"topic_metadata": about, "message_count": 0})
         row["message_count"] += writer.counts.get(number, 0)
     version = VERSION_OF_NUMBERS if by_numbers else VERSION
     for row in topics.values() if version == VERSION else ():
-        row["topic_metadata"][QOS] = _profiles(row["topic_metadata"][QOS])
+        row["topic_metadata"][QOS] = _profiles(row["topic_metadata"][QOS], row["topic_metadata"]["name"])
     count = sum(writer.counts.values())
     times = {"duration": {"nanoseconds": last - first}, "starting_time": {"nanoseconds_since_epoch": first}}
     return {
@@ -158,9 +167,12 @@ def metadata_of(writer: McapWriter, before: dict[str, Any], file: str) -> dict[s
     }  # fmt: skip
 
 
-def _profiles(qos: str) -> Any:
+def _profiles(qos: str, topic: str) -> Any:
     """Return the profiles of a topic as a list."""
-    found = parse_documents(qos, METADATA)
+    try:
+        found = parse_documents(qos, METADATA)
+    except FormatError as error:
+        raise ValueInvalid(f"what {topic} offers ({QOS}) cannot be read: {error.message}") from None
     return _plain(found[0].value) if found else []
 
 

@@ -88,11 +88,11 @@ class Schemas:
         self.schemas: dict[int, bytes] = {}
         self.channels: dict[int, tuple[int, bytes]] = {}  # number of the schema, and the rest of the record
 
-    def add_schema(self, number: int, body: bytes) -> int:
+    def add_schema(self, number: int | None, body: bytes) -> int:
         """Return the number of a schema in the copy; body: name, encoding and data."""
-        return _numbered(self.schemas, number, body) if number else 0  # 0 is none
+        return 0 if number == 0 else _numbered(self.schemas, number, body)  # 0 is none
 
-    def add_channel(self, number: int, schema: int, body: bytes) -> int:
+    def add_channel(self, number: int | None, schema: int, body: bytes) -> int:
         """Return the number of a channel in the copy; body: topic, encoding and metadata."""
         return _numbered(self.channels, number, (schema, body))
 
@@ -112,15 +112,12 @@ class Schemas:
         return Channel(topic, name, encoding), schema, texts_of(fields.data())
 
 
-def _numbered(known: dict[int, Value], number: int, value: Value) -> int:
-    """Return the number under which a value is known: its own, if that is free, or that of an equal one, or a new."""
-    if number not in known:
-        known[number] = value
-    if known[number] == value:
-        return number
-    found = next((other for other, each in known.items() if each == value), max(known) + 1)
-    known[found] = value
-    return found
+def _numbered(known: dict[int, Value], number: int | None, value: Value) -> int:
+    """Return the number under which a value is known: its own, if it has one that is free, that of an equal, or a new."""
+    if number is None or known.get(number, value) != value:
+        number = next((other for other, each in known.items() if each == value), max(known, default=0) + 1)
+    known[number] = value
+    return number
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, bytes]]:
@@ -196,6 +193,7 @@ class McapFile:
         elif kind == CHANNEL:
             number, schema = struct.unpack_from("<HH", body)
             self._channels[number] = self.known.add_channel(number, self._schemas[schema], body[4:])
+            self.known.channel(self._channels[number])  # raises for one that cannot be read
         return kind in (SCHEMA, CHANNEL, FOOTER)
 
     def _chunk(self, body: bytes) -> Chunk:

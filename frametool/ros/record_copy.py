@@ -260,10 +260,10 @@ def _latched_channel(recording: CopiedRecording, topic: str) -> int:
     definition, _ = typestore(BAG2).generate_msgdef(STATIC.type, ros_version=2)
     kind = b"".join(sized(each.encode()) for each in (STATIC.type, "ros2msg", definition))
     named = [number for number, body in known.schemas.items() if body.startswith(sized(STATIC.type.encode()))]
-    schema = named[0] if named else known.add_schema(max(known.schemas, default=0) + 1, kind)
+    schema = named[0] if named else known.add_schema(None, kind)
     said = mapping({QOS: latched_qos(by_numbers=any(map(says_by_numbers, qos)))})
     body = b"".join((sized(topic.encode()), sized(b"cdr"), said))
-    return known.add_channel(max(known.channels, default=0) + 1, schema, body)
+    return known.add_channel(None, schema, body)
 
 
 def _latched_connection(recording: CopiedRecording, topic: str) -> int:
@@ -293,28 +293,31 @@ def copied(
     if form == BAG1:
         yield from _bag(recording, changes, added, first_ns, folder, advance)
         return
-    writer = McapWriter(recording.known, recording.head)
-    yield FirstPiece(writer.begin(), FILE) if form == BAG2 else writer.begin()
-    yield writer.chunk(_chunk_of(added, first_ns, mcap_chunks.message), None)
-    itself: list[OtherRecord] = []
-    for piece in recording.pieces():
-        if isinstance(piece, Chunk):
-            yield writer.chunk(piece, changes.of(piece))
-            advance(len(piece.entries), len(piece.stored or piece.raw))
-        elif piece.kind == mcap_chunks.METADATA and piece.body.startswith(SELF):
-            itself.append(piece)
-        else:
-            yield writer.other(piece)
-    said = texts_of(itself[0].body[len(SELF) + 4 :]).get(SERIALIZED, "") if itself else ""
-    before = recording.metadata or read_metadata(said, recording.path)
-    metadata = metadata_of(writer, before, FILE) if itself or form == BAG2 else {}
-    if len(itself) == 1 and before.get("message_count") == str(metadata["message_count"]):
-        yield writer.other(itself[0])
-    elif itself:
-        yield writer.other(OtherRecord(mcap_chunks.METADATA, SELF + mapping({SERIALIZED: dump(metadata)})))
-    yield writer.end()
-    if form == BAG2:
-        yield FirstPiece(dump({INFORMATION: metadata}).encode(), METADATA)
+    with broken(recording.path):
+        writer = McapWriter(recording.known, recording.head)
+        first = writer.begin()
+        yield FirstPiece(first, FILE) if form == BAG2 else first
+        yield writer.chunk(_chunk_of(added, first_ns, mcap_chunks.message), None)
+        itself = []
+        for piece in recording.pieces():
+            if isinstance(piece, Chunk):
+                yield writer.chunk(piece, changes.of(piece))
+                advance(len(piece.entries), len(piece.stored or piece.raw))
+            elif piece.kind == mcap_chunks.METADATA and piece.body.startswith(SELF):
+                itself.append(piece)
+            else:
+                yield writer.other(piece)
+        said = texts_of(itself[0].body[len(SELF) + 4 :]).get(SERIALIZED, "") if itself else ""
+        before = recording.metadata or read_metadata(said, recording.path)
+        metadata = metadata_of(writer, before, FILE) if itself or form == BAG2 else {}
+        if len(itself) == 1 and before.get("message_count") == str(metadata["message_count"]):
+            yield writer.other(itself[0])
+        elif itself:
+            made = SELF + mapping({SERIALIZED: dump(metadata)})
+            yield writer.other(OtherRecord(mcap_chunks.METADATA, made))
+        yield writer.end()
+        if form == BAG2:
+            yield FirstPiece(dump({INFORMATION: metadata}).encode(), METADATA)
 
 
 def _chunk_of(messages: Sequence[tuple[int, bytes]], log_ns: int, record: Callable[[int, int, bytes], bytes]) -> Chunk:
