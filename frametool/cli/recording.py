@@ -1,4 +1,4 @@
-"""What the options say of a recording that is written: which messages, on which topic, what frames are called, where."""
+"""What options say of a recording that is written: which messages, on which topic, names of frames, and where."""
 
 from __future__ import annotations
 

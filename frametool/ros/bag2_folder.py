@@ -6,6 +6,7 @@ import re
 import shutil
 from contextlib import closing
 from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
@@ -18,6 +19,7 @@ from frametool.ros.recordings import BAG2, METADATA, typestore
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from contextlib import ExitStack
 
     from frametool.ros.chunks import Entry
     from frametool.ros.mcap_chunks import McapWriter, Schemas
@@ -61,12 +63,12 @@ def read_metadata(text: str, name: str) -> dict[str, Any]:
     return {}
 
 
-def files_of(folder: Path, metadata: dict[str, Any], home: Path) -> list[Path]:
-    """Return the files of a bag in their order; those compressed as a whole are unpacked into another folder."""
+def files_of(folder: Path, metadata: dict[str, Any], opened: ExitStack) -> list[Path]:
+    """Return the files of a bag in their order; those compressed as a whole are unpacked, as long as it is opened."""
     found = [folder / PurePath(name).name for name in metadata["relative_file_paths"]]
     if metadata.get("compression_mode", "").lower() != "file":
         return found
-    unpacked = []
+    home, unpacked = Path(opened.enter_context(TemporaryDirectory(prefix="frametool."))), []
     for path in found:
         unpacked.append(home / path.stem)
         with zstd().open(path, "rb") as packed, unpacked[-1].open("wb") as plain:
@@ -80,9 +82,12 @@ class DatabaseFile:
     head = sized(b"ros2") + sized(b"frametool")
     expected: int | None = None
 
-    def __init__(self, path: Path, schemas: Schemas, untold: set[str]) -> None:
-        """Begin before the first message; the schemas are those of the copy; untold: takes types it does not define."""
-        self.path, self.known, self.untold = path, schemas, untold
+    def __init__(self, path: Path, schemas: Schemas, undefined: dict[str, bool]) -> None:
+        """Begin before the first message; the schemas are those of the copy.
+
+        undefined: takes the types that it does not define, and whether ROS 2 Humble does
+        """
+        self.path, self.known, self.undefined = path, schemas, undefined
 
     def pieces(self) -> Iterator[Chunk]:
         """Yield chunks, in the order of log times.
@@ -134,7 +139,7 @@ class DatabaseFile:
         """Return the definition of a type that the file does not define: that of ROS 2 Humble, or none."""
         store = typestore(BAG2)
         text = store.generate_msgdef(kind, ros_version=2)[0] if kind in store.types else ""
-        self.untold |= set() if text else {kind}
+        self.undefined[kind] = bool(text)
         return {"encoding": "ros2msg" if text else "", "encoded_message_definition": text}
 
 

@@ -45,8 +45,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 @contextmanager
 def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
     """Open a bag and yield its reader; whatever the library raises for a broken one is one error."""
-    if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
-        raise FormatError("nothing in it: an empty file is no bag", source=path)
+    refuse_empty(path)
     try:
         import rosbags.highlevel  # noqa: F401 - whether it is there
 
@@ -72,6 +71,12 @@ def broken(path: str) -> Iterator[None]:
     except Exception as error:  # noqa: BLE001 - see above
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
+
+
+def refuse_empty(path: str) -> None:
+    """Raise FormatError for an empty file, whose suffix alone says that it is a bag."""
+    if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
+        raise FormatError("nothing in it: an empty file is no bag", source=path)
 
 
 def check_files(path: str, tally: Tally) -> None:

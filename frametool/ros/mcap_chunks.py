@@ -113,7 +113,7 @@ class Schemas:
 
 
 def _numbered(known: dict[int, Value], number: int | None, value: Value) -> int:
-    """Return the number under which a value is known: its own, if it has one that is free, that of an equal, or a new."""
+    """Return the number under which a value is known: its own where that is free, else that of an equal, or a new."""
     if number is None or known.get(number, value) != value:
         number = next((other for other, each in known.items() if each == value), max(known, default=0) + 1)
     known[number] = value

@@ -18,9 +18,11 @@ from frametool.formats.load import Recording, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
 from frametool.ros.bags import TYPES, recorded_edge
+from frametool.ros.latched import added_messages
 from frametool.ros.message_bytes import Transforms
 from frametool.ros.moved_messages import MOVED_TYPES, MessageMover
-from frametool.ros.record_copy import RecordChanges, RecordContents, added_messages, copied
+from frametool.ros.record_changes import RecordChanges, RecordContents
+from frametool.ros.record_copy import copied
 from frametool.ros.recorded_edges import MOST_NAMED, STATIC, Planned, RecordedEdges, replaced
 from frametool.ros.recordings import SECONDS_ROS2
 from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
@@ -31,7 +33,8 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
     from frametool.ros.chunks import Channel
-    from frametool.ros.record_copy import Advance, Change, CopiedRecording
+    from frametool.ros.record_changes import Change
+    from frametool.ros.record_copy import Advance, CopiedRecording
     from frametool.ros.recorded_edges import AddedEdge
 
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
@@ -213,9 +216,9 @@ class RecordRun:
             yield f"{_count(total - self.skipped)} in {self.asked.into} ({first_of([*self.moved], MOST_NAMED)}){stayed}"
         if self.contents.outside:
             yield f"{_count(self.contents.outside)} on {STATIC} from outside of --between kept, at their own log times"
-        if self.recording.untold:
-            kinds = first_of(sorted(self.recording.untold), MOST_NAMED)
-            yield f"not defined in it, and copied without a definition: {kinds}"
+        for is_usual, said in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
+            if kinds := sorted(kind for kind, usual in self.recording.undefined.items() if usual is is_usual):
+                yield f"types that it does not define are {said}: {first_of(kinds, MOST_NAMED)}"
         if not (self.added or self.rewritten or self.moved or self.asked.window):
             yield f"nothing is changed: {_count(sum(self.contents.counts.values()))} copied"
 
