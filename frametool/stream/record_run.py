@@ -215,7 +215,7 @@ class RecordRun:
             stayed = f", {self.unmoved} of them were in it" if self.unmoved else ""
             yield f"{_count(total - self.skipped)} in {self.asked.into} ({first_of([*self.moved], MOST_NAMED)}){stayed}"
         if self.contents.outside:
-            yield f"{_count(self.contents.outside)} on {STATIC} from outside of --between kept, at their own log times"
+            yield f"kept outside of --between: {_count(self.contents.outside)} on {STATIC}"
         for is_usual, said in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
             if kinds := sorted(kind for kind, usual in self.recording.undefined.items() if usual is is_usual):
                 yield f"types that it does not define are {said}: {first_of(kinds, MOST_NAMED)}"

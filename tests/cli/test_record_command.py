@@ -37,8 +37,6 @@ def folder(tmp_path: Path) -> Path:
     write(tmp_path / "sqlite", "sqlite", messages("sqlite"))
     write(tmp_path / "made", "mcap", messages("mcap")).rename(tmp_path / "run.mcap")
     (tmp_path / "tree.yaml").write_text(TREE)
-    for left in ("made/metadata.yaml", "made"):
-        (tmp_path / left).rmdir() if left == "made" else (tmp_path / left).unlink()
     return tmp_path
 
 
