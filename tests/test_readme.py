@@ -61,6 +61,10 @@ def test_a_readme_example_prints_what_the_readme_shows(command: str, output: str
 @pytest.mark.parametrize(("name", "command"), HELP_EXAMPLES, ids=[command for _, command in HELP_EXAMPLES])
 def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tmp_path: Path) -> None:
     console.printed(f"frametool examples -o {tmp_path}", bin_folder)
+    if name == "record":  # the recordings are anybody's own
+        from recorded import write_those_of_the_help
+
+        write_those_of_the_help(tmp_path)
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False,
         stdin=subprocess.DEVNULL, env={"PATH": f"{bin_folder}:/usr/bin:/bin"},
@@ -68,7 +72,7 @@ def test_an_example_in_a_help_runs(name: str, command: str, bin_folder: Path, tm
     differs = {1} if command.startswith("sed") and name == "diff" else set()
     left_out = {3} if name == "solve" or "--robust" in command else set()
     assert done.returncode in {0} | differs | left_out, done.stderr
-    assert name in ("sim", "monitor", "check", "diff", "relative", "solve") or "--robust" in command or not [line for line in done.stderr.splitlines() if not STATED.match(line)]  # these sum up what they did or found
+    assert name in ("sim", "monitor", "check", "diff", "relative", "solve", "record") or "--robust" in command or not [line for line in done.stderr.splitlines() if not STATED.match(line)]  # these sum up what they did or found
 
 
 def test_every_command_has_an_example_in_its_help_and_in_the_readme() -> None:

@@ -167,7 +167,8 @@ OWN = {
     "interpolate": ("notations",), "lookup": ("at", "times", "source_at", "fixed", "notations", "covariance"),
     "apply": ("at", "time_column", "frame_column", "input_path", "output", "covariance"), "calc": ("input_path",),
     "fk": ("input_path", "joints"), "tree": ("at", "notations", "joints"), "view": ("at", "fixed", "output"),
-    "resample": ("times",), "diff": ("at", "with_a", "with_b"), "sweep": ("gain_linear", "gain_angular"),
+    "resample": ("times",), "diff": ("at", "with_a", "with_b"),
+    "record": ("more", "topics", "on_error", "output"), "sweep": ("gain_linear", "gain_angular"),
 }  # fmt: skip
 WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option

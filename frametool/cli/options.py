@@ -323,7 +323,6 @@ _TOPIC = _setting(
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES, array_option)
 _READING = (
-    _TOPIC,
     _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
              help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
@@ -341,16 +340,18 @@ _READING = (
 _ORDER = _setting("--from", "order", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
 
 
-def reading_options(*, streams: bool = False, order: bool = True) -> Callable[[Function], Function]:
+def reading_options(
+    *, streams: bool = False, order: bool = True, topics: bool = True
+) -> Callable[[Function], Function]:
     """Add to a command the options that say how files of frames are read; `opened` heeds them.
 
     streams: the command has those of streams too, `--in`, `--quiet` and `--from` among them
-    order: it has no --from of its own
+    order, topics: it has no --from, or --topic, of its own
     """
     if streams:
-        return together(*_READING)
+        return together(_TOPIC, *_READING)
     quiet = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
-    return together(in_option, quiet, *_READING, *[_ORDER] * order)
+    return together(in_option, quiet, *[_TOPIC] * topics, *_READING, *[_ORDER] * order)
 
 
 def input_forms(*, streams: bool = False) -> tuple[list[str], str]:

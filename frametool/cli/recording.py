@@ -1,28 +1,86 @@
-"""What the options say of a recording that is written: which messages, on which topic, what frames are called."""
+"""What options say of a recording that is written: which messages, on which topic, names of frames, and where."""
 
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
 
 from click import UsageError
 
 from frametool.cli.group import settings
-from frametool.errors import shown
-from frametool.formats.table import FORMATS, is_folder
+from frametool.cli.sink import writing
+from frametool.errors import FileProblem, printable, shown
+from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.grammar.result import Recorded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from contextlib import AbstractContextManager
+
+    from frametool.cli.sink import Write
 
 
 def recorded(form: str, output: str | None) -> Recorded:
     """Return what of results a recording of a form holds, as options say; raises UsageError."""
-    chosen = settings()
-    if output in (None, "-"):
-        raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
-    if is_folder(form) and output.endswith(FORMATS[form].suffixes):
-        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
+    chosen, place = settings(), _place(form, output)
     told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
     frames = tuple(name.strip() for name in told.split(",")) if told else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
     chosen.inputs = (*chosen.inputs, *[("", ("frames",))] * bool(chosen.named_frames))
-    folder = os.path.dirname(os.path.abspath(output))
-    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder if os.path.isdir(folder) else "")
+    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
+
+
+def _place(form: str, output: str | None) -> str:
+    """Return where a recording is written; raises UsageError where it cannot be."""
+    if output in (None, "-"):
+        raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
+    if is_folder(form) and output.endswith(FORMATS[form].suffixes):
+        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
+    return output
+
+
+def folder_of(place: str) -> str:
+    """Return the folder in which there is room for what is written to a place; "" where that does not exist."""
+    folder = os.path.dirname(os.path.abspath(place))
+    return folder if os.path.isdir(folder) else ""
+
+
+def copied_as(form: str, path: str, output: str | None, told: str | None) -> tuple[str, str]:
+    """Return the form that a recording of some form is copied in, and its place; raises UsageError where none can be.
+
+    told: the form, where the name of the place does not say it
+    """
+    folder = "bag2" if os.path.isdir(path) and output and not os.path.splitext(output)[1] else None
+    copy = told or by_name(output, writers("recording")) or folder
+    if copy is None:
+        unknown = f"-o {output} names no form; " if output else ""
+        raise UsageError(f"{unknown}give {'-o NEW.bag' if form == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")
+    place = _place(copy, output)
+    if "bag1" in (form, copy) and form != copy:
+        what = f"{path} is copied as {'a ROS 1 bag' if form == 'bag1' else 'mcap or bag2'}, not as {copy}"
+        raise UsageError(f"{what}; rosbags-convert --src {path} --dst {output} makes that of it")
+    return copy, place
+
+
+def refuse_input(output: str, inputs: Iterable[str]) -> None:
+    """Raise FileProblem where a result would be written over what it is made of, or over a folder that this is in."""
+    place = os.path.realpath(output)
+    for path in filter(os.path.exists, inputs):
+        files = [path, *(os.path.join(path, name) for name in os.listdir(path))] if os.path.isdir(path) else [path]
+        if os.path.exists(place) and any(os.path.samefile(each, place) for each in files):
+            raise FileProblem(f"{printable(output)}: is {printable(path)}, which is read; give another name")
+        read = os.path.realpath(path)
+        for inner, outer in ((read, place), (place, read)):
+            if os.path.isdir(outer) and inner.startswith(f"{outer}{os.sep}"):
+                inside = f"{printable(inner)} lies in {printable(outer)}"
+                raise FileProblem(f"{printable(output)}: {inside}; give another name")
+
+
+def opened_place(form: str, place: str, *, force: bool) -> AbstractContextManager[Write]:
+    """Open the place where a recording is written."""
+    if is_folder(form):
+        from frametool.cli.folder_sink import filling
+
+        return filling(place, force=force)
+    return writing(place, force=force)

@@ -45,7 +45,7 @@ def solved_tree(
     measurements = _measurements(files, without, normalize=normalize)
     measured = dict.fromkeys(name for each in measurements for name in each[:2])
     fixed = _fixed_edges(fix, measured, normalize=normalize) if fix else []
-    with ProgressBar(SHARES, quiet=settings().quiet, rows=False) as bar:
+    with ProgressBar(SHARES, quiet=settings().quiet, counted="") as bar:
         found = solve_tree(
             measurements,
             root=root,

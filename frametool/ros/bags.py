@@ -14,6 +14,7 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
+from frametool.ros.message_bytes import Said
 from frametool.ros.messages import POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components
 
@@ -44,27 +45,41 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 @contextmanager
 def opened_bag(path: str, tally: Tally) -> Iterator[Any]:
     """Open a bag and yield its reader; whatever the library raises for a broken one is one error."""
-    if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
-        raise FormatError("nothing in it: an empty file is no bag", source=path)
+    refuse_empty(path)
     try:
-        from rosbags.highlevel import AnyReader
+        import rosbags.highlevel  # noqa: F401 - whether it is there
+
+        from frametool.ros.bag_reader import BagReader
     except ImportError:
         raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
 
     if path == "-":
         raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
-    try:
-        _check_whole(path, tally)
-        with AnyReader([Path(path)]) as reader:
+    with broken(path):
+        check_files(path, tally)
+        with BagReader([Path(path)]) as reader:
             yield reader
+
+
+@contextmanager
+def broken(path: str) -> Iterator[None]:
+    """Make one error of whatever reading a broken bag raises: anything, also MemoryError."""
+    try:
+        yield
     except (FrametoolError, BrokenPipeError):
         raise
-    except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything, also MemoryError
+    except Exception as error:  # noqa: BLE001 - see above
         said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
         raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None
 
 
-def _check_whole(path: str, tally: Tally) -> None:
+def refuse_empty(path: str) -> None:
+    """Raise FormatError for an empty file, whose suffix alone says that it is a bag."""
+    if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
+        raise FormatError("nothing in it: an empty file is no bag", source=path)
+
+
+def check_files(path: str, tally: Tally) -> None:
     """Check what the library does not: the pages of sqlite3; tell if an MCAP file has no counts to compare with."""
     for file in sorted(Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]:
         if file.suffix == ".db3":
@@ -106,20 +121,15 @@ def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
         poses = sorted({connection.topic for connection in reader.connections if connection.msgtype in POSES})
         known = ", ".join(sorted(options.topics.seen))
         hint = f"; --topic {poses[0]} reads its poses" if poses else ""
-        said = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
-        raise FormatError(said, source=path)
+        what = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
+        raise FormatError(what, source=path)
     number = 0
     for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
-        name = topic.topic
-        still = name.endswith("tf_static")
         message = reader.deserialize(data, topic.msgtype)
         for transform in [message] if topic.msgtype in POSES else message.transforms:
-            if not options.topics.takes(name):
-                continue
-            edge = _edge(transform, number, path, options, name)
-            if problem := options.topics.conflict(name, edge.child):
-                options.report(FormatError(problem, source=path, rule="two-topics"))
-            yield edge._replace(stamp_ns=None if still else edge.stamp_ns, received_ns=received_ns, topic=name)
+            said = _said(transform, topic.topic, options)
+            if edge := recorded_edge(said, number, topic.topic, received_ns, path, options):
+                yield edge
     check_count(reader, topics, number, path)
     if not number:
         raise FormatError(f"no messages on {', '.join(topic.topic for topic in topics)}", source=path)
@@ -148,9 +158,8 @@ def _is_read(connection: Any, options: Options) -> bool:
     return kind in TYPES or (kind in POSES and options.topics.chooses(connection.topic))
 
 
-def _edge(message: Any, number: int, path: str, options: Options, topic: str) -> Edge:
-    """Return one TransformStamped, or a pose over time."""
-    tally = options.tally
+def _said(message: Any, topic: str, options: Options) -> Said:
+    """Return what a TransformStamped says, or a pose over time."""
     if hasattr(message, "transform"):
         named, moved, turned = message.child_frame_id, message.transform.translation, message.transform.rotation
     else:
@@ -158,16 +167,33 @@ def _edge(message: Any, number: int, path: str, options: Options, topic: str) ->
         named = getattr(message, "child_frame_id", "") or body_of(topic, options.answers)
         moved, turned = pose.position, pose.orientation
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
-    parent, child = tally.names.bare(message.header.frame_id), tally.names.bare(named)
-    components = unit_components(numbers, number, tally, options.normalize)
+    stamp = message.header.stamp
+    return Said(message.header.frame_id, named, numbers, (stamp.sec, stamp.nanosec))
+
+
+def recorded_edge(
+    said: Said, number: int, topic: str, received_ns: int, path: str, options: Options
+) -> Edge | None:
+    """Return the edge that a message on a topic says; None where the topic does not count.
+
+    number: of the message among those with transforms
+    Raises FormatError for one that is none.
+    """
+    if not options.topics.takes(topic):
+        return None
+    tally = options.tally
+    parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
+    components = unit_components(said.numbers, number, tally, options.normalize)
     if components is None or not parent or not child:
-        problem = _complaint(parent, child, numbers, normalize=options.normalize)
+        problem = _complaint(parent, child, said.numbers, normalize=options.normalize)
         edge = f"{shown(parent)} -> {shown(child)}"
         raise FormatError(f"message {number}: {edge}: {problem}", source=path, rule=problem.rule)
-    stamp = message.header.stamp
-    if misfit := stamp_problem(stamp.sec, stamp.nanosec, STAMPS[0]):
+    if misfit := stamp_problem(*said.stamp, STAMPS[0]):
         raise FormatError(f"message {number}: {parent!r} -> {child!r}: {misfit}", source=path)
-    return Edge(parent, child, components, stamp.sec * BILLION + stamp.nanosec, number)
+    if clash := options.topics.conflict(topic, child):
+        options.report(FormatError(clash, source=path, rule="two-topics"))
+    stamp_ns = None if topic.endswith("tf_static") else said.stamp[0] * BILLION + said.stamp[1]
+    return Edge(parent, child, components, stamp_ns, number, received_ns, topic=topic)
 
 
 def _complaint(parent: str, child: str, numbers: tuple[float, ...], *, normalize: bool) -> ValueInvalid:

@@ -16,9 +16,9 @@ PATIENCE = 2.0  # seconds before anything is shown
 class ProgressBar:
     """Show how far a job is, if stderr is a terminal and the job takes longer than two seconds."""
 
-    def __init__(self, total: int | None, *, quiet: bool, rows: bool = True) -> None:
-        """Start the clock; `total` is the number of bytes, if it is known; rows: whether these are told."""
-        self.total, self._has_rows = total, rows
+    def __init__(self, total: int | None, *, quiet: bool, counted: str = "rows") -> None:
+        """Start the clock; `total` is the number of bytes, if it is known; counted: what is done, "" if only that."""
+        self.total, self._counted = total, counted
         self.rows = self.size = 0
         self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()
         self._start = time.monotonic()
@@ -42,19 +42,19 @@ class ProgressBar:
         if self._hidden or seconds < PATIENCE:
             return
         if self._bar is None:
-            self._bar = _bar(self.total, rows=self._has_rows)
+            self._bar = _bar(self.total, self._counted)
             self._bar.start()
             self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
         with suppress(OSError):
             self._bar.update(self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}")
 
 
-def _bar(total: int | None, *, rows: bool) -> Any:
+def _bar(total: int | None, counted: str) -> Any:
     from rich import progress
 
     from frametool.view.tree_text import coloured_console
 
-    text = "{task.fields[rows]} rows  {task.fields[rate]} rows/s" if rows else "solving"
+    text = f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s" if counted else "solving"
     columns: list[Any] = [progress.TextColumn(text)]
     if total:
         columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]

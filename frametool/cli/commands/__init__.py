@@ -20,6 +20,7 @@ COMMANDS = {
     "view": ("frametool.cli.commands.view", "the frames seen: in the terminal, as a page that turns, as a picture"),
     "calc": ("frametool.cli.commands.calc", "expressions over poses whose frames are checked like units"),
     "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording goes by"),
+    "record": ("frametool.cli.commands.record", "a recording with edges, frames of poses or its span changed"),
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
     "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
     "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),

@@ -1,0 +1,143 @@
+"""`frametool record`: a recording with something changed, and every other message as it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.group import refuse_unused, settings
+from frametool.cli.options import FILE, LIMIT, TEXT, Command, Text, pose_options, reading_options, verbose_option
+from frametool.cli.recording import copied_as, folder_of, opened_place, refuse_input
+from frametool.cli.sink import refuse_existing
+from frametool.cli.stderr import say, say_error
+from frametool.cli.trees import FRAME, load_tree, tree_file
+from frametool.errors import FileProblem, FormatError, shown, warn
+from frametool.formats.load import Recording, Rules
+from frametool.formats.table import FORMATS, is_recording, writers
+from frametool.grammar.edges import Tally
+from frametool.grammar.readers import is_slashed
+from frametool.stream.faults import ON_ERROR, STOP
+from frametool.view.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
+OF_FILES = ("input_forms", "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "order")
+TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
+
+
+class Between(Text):
+    """Two times with a comma between them, the second not before the first."""
+
+    name = "times"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return nanoseconds."""
+        parts = [part.strip() for part in super().convert(value, param, ctx).split(",")]
+        if len(parts) != len(("START", "STOP")):
+            self.fail(f"{shown(value)} is not START,STOP: two times with a comma between them", param, ctx)
+        start, stop = (LIMIT.convert(part, param, ctx) for part in parts)
+        if start > stop:
+            self.fail(f"{parts[0]} is after {parts[1]}; START comes first", param, ctx)
+        return start, stop
+
+
+@click.command(cls=Command, name="record", epilog=EXIT_CODES)
+@click.argument("tree", type=FILE, metavar="RECORDING")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file or folder, whole or not at all")
+@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE",
+              help="add the edges of this tree that are missing; may be repeated")  # fmt: skip
+@click.option("--replace", is_flag=True, help="let --with replace edges that are there with other values")
+@click.option("--into", type=FRAME, metavar="FRAME", help="move the messages of each --topic into this frame")
+@click.option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
+              help="a topic whose messages move, or whose transforms count; may be repeated")  # fmt: skip
+@click.option("--on-error", type=click.Choice(ON_ERROR[:2]), default=STOP, show_default=True,
+              help="at a message that cannot be moved")  # fmt: skip
+@click.option("--between", type=Between(), metavar="START,STOP", help="leave out what was logged before and after")
+@click.option("-f", "--format", "format_name", type=click.Choice(writers("recording")),
+              help="form of the copy  [default: by the name of --output]")  # fmt: skip
+@click.option("--force", is_flag=True, help="let --output replace a file")
+@reading_options(topics=False)
+@verbose_option
+@pose_options
+def command(
+    tree: str, output: str | None, more: Sequence[str], replace: bool, into: str | None, topics: tuple[str, ...],
+    on_error: str, between: tuple[int, int] | None, format_name: str | None, force: bool, normalize: bool,
+) -> int:  # fmt: skip
+    """Copy RECORDING with something changed; all other messages stay as they are.
+
+    \b
+      frametool record run.mcap --with extrinsics.yaml -o fixed.mcap
+      frametool record run.bag --with calibration.yaml --replace -o new.bag
+      frametool record run.mcap --into map --topic /pose --topic /odom -o new.mcap
+      frametool record run.mcap --between 1700000010,1700000020 -o part.mcap
+
+    --with adds the edges of a tree, in any form, that are missing: one message on /tf_static that comes first. An edge
+    that is there with other values is an error; --replace puts the new ones into every message that has it.
+    --into moves PoseStamped, PoseWithCovarianceStamped, PoseArray, Path, PointStamped and Odometry (its twist stays)
+    at their stamps, by the transforms of the recording and of --with; covariances turn along.
+    --between keeps what was logged from START to STOP, and all of /tf_static.
+
+    An MCAP file or ROS 2 bag becomes MCAP (-o NEW.mcap) or a folder (-f bag2 -o FOLDER), a ROS 1 bag one (-o NEW.bag).
+    """
+    from frametool.ros.record_copy import opened_recording
+    from frametool.stream.record_run import RecordRequest, RecordRun
+
+    _refuse_idle(more, into, topics)
+    path = tree_file(tree)
+    if path == "-":
+        raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
+    form = _form_of(path)
+    copy, place = copied_as(form, path, output, format_name)
+    refuse_input(place, (path, *more))
+    refuse_existing(place, force=force)
+    tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
+    if edges is not None and edges.covariances:
+        warn(f"{copy}: covariances left out")
+    asked = RecordRequest(
+        edges, replace=replace, into=_bare(into or ""), topics=topics, window=between, on_error=on_error,
+        tell=lambda error: say_error(error, in_json=False), normalize=normalize,
+    )  # fmt: skip
+    quiet = settings().quiet
+    with opened_recording(path, form, tally) as opened:
+        run = RecordRun(opened, asked)
+        with ProgressBar(2 * opened.size, quiet=quiet, counted="messages") as progress:
+            run.look(progress.advance)
+            with opened_place(copy, place, force=force) as write:
+                for piece in run.pieces(copy, folder_of(place), progress.advance):
+                    write(piece)
+    for remark in (*tally.told(), *run.remarks()):
+        warn(f"{path}: {remark.message}", rule=remark.rule)
+    for sentence in () if quiet else run.told():
+        say(f"{path}: {sentence}")
+    return run.finish()
+
+
+def _refuse_idle(more: Sequence[str], into: str | None, topics: Sequence[str]) -> None:
+    """Refuse options that would not be used."""
+    if not more:
+        refuse_unused("is for --with FILE", "replace", *OF_FILES)
+    if not into:
+        refuse_unused("is for --into FRAME", "on_error", *(["normalize"] if not more else []))
+    of_poses = [topic for topic in topics if topic.rpartition("/")[2] not in TRANSFORMS]
+    if topics and not into and (of_poses or not more):
+        raise click.UsageError(f"--topic {(of_poses or topics)[0]} is for --into FRAME, which moves its messages")
+
+
+def _bare(frame: str) -> str:
+    """Return a frame's name as messages have it."""
+    if is_slashed(frame):
+        warn(f"frame {shown(frame)}: the leading / is no part of a name and was left out")
+    return frame[is_slashed(frame) :]
+
+
+def _form_of(path: str) -> str:
+    """Return the form of a recording; raises FormatError for what is none."""
+    source = Recording(path)
+    source.close()
+    if not is_recording(source.form):
+        hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
+        raise FormatError(f"{FORMATS[source.form].summary}: no recording of messages; {hint}", source=path)
+    return source.form

@@ -1,0 +1,208 @@
+"""The transforms of a recording as a copy needs them: which edges there are, and how they get along with others.
+
+Every message of transforms is looked at, and of each edge only what it was first is kept: memory does not grow.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import BadTopology, bare, first_of, shown
+from frametool.frames.path import to_root
+from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry.representations import EARTH_FRAMES
+from frametool.grammar.edges import Names, Topics
+from frametool.ros.message_bytes import Transforms
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Rigid
+    from frametool.ros.message_bytes import Said
+
+SAME = 1e-12  # metres, of positions a metre long, and radians: what composing and writing numbers leaves
+STATIC = "tf_static"
+MOST_NAMED = 8  # edges
+
+
+class RecordedEdge:
+    """What a recording says of one frame: the topics it comes by, its parents, its numbers, and whether they change."""
+
+    __slots__ = ("is_static", "numbers", "parents", "topics", "varies")
+
+    def __init__(self, numbers: Rigid) -> None:
+        """Begin with the first message that has it."""
+        self.numbers = numbers
+        self.parents: dict[str, None] = {}
+        self.topics: dict[str, None] = {}
+        self.is_static = self.varies = False
+
+    @property
+    def moves(self) -> bool:
+        """Tell whether it is another one at other times."""
+        return self.varies and not self.is_static
+
+
+class AddedEdge(NamedTuple):
+    """An edge that stands still: parent_from_child."""
+
+    parent: str
+    child: str
+    numbers: Rigid
+
+    def __str__(self) -> str:
+        """Return `parent -> child`."""
+        return f"{bare(self.parent)} -> {bare(self.child)}"
+
+
+class Planned(NamedTuple):
+    """What becomes of edges that are to be in a recording."""
+
+    added: list[AddedEdge]
+    same: list[AddedEdge]
+    replaced: list[AddedEdge]
+
+
+class RecordedEdges:
+    """The edges of a recording, by their children."""
+
+    def __init__(self, name: str, *, ros1: bool) -> None:
+        """Begin without any; `name` is that of the recording in messages."""
+        self.name, self.ros1 = name, ros1
+        self.known: dict[str, RecordedEdge] = {}
+        self.names, self._topics = Names(), Topics()
+        self._conflicts: dict[str, str] = {}  # of frames that come from two robots
+        # topic and size of messages -> what is alike in those that say nothing new, and between which bytes
+        self._alike: dict[tuple[str, int], list[tuple[int, int, bytes]]] = {}
+        self._topic_of: dict[str, str] = {}  # frame -> the topic by which it came first
+
+    def add(self, topic: str, data: bytes) -> None:
+        """Take the transforms of a message in; raises ValueInvalid for one that is none."""
+        known = self._alike.get((topic, len(data)), [(0, 0, b".")])
+        if all(data[begin:end] == text for begin, end, text in known):
+            return  # most messages say nothing new
+        message, found = Transforms(data, ros1=self.ros1), []
+        for transform in message:
+            begin, end = message.names
+            end = end if self._added(topic, transform).varies else message.fields.at
+            found.append((begin, end, data[begin:end]))
+        message.fields.whole()
+        self._alike[topic, len(data)] = found
+
+    def _added(self, topic: str, transform: Said) -> RecordedEdge:
+        """Take a transform in."""
+        parent, child, numbers = self.bare(transform.parent), self.bare(transform.child), transform.numbers
+        edge = self.known.get(child)
+        if edge is None:
+            edge = self.known[child] = RecordedEdge(numbers)
+        if parent not in edge.parents or topic not in edge.topics:
+            edge.parents[parent] = edge.topics[topic] = None
+            edge.is_static |= topic.endswith(STATIC)
+            self._topic_of.setdefault(parent, topic)
+            self._topic_of.setdefault(child, topic)
+            if problem := self._topics.conflict(topic, child):
+                self._conflicts[child] = problem
+        if not edge.varies and numbers != edge.numbers:
+            edge.varies = not is_same(numbers, edge.numbers)
+        return edge
+
+    def bare(self, name: str) -> str:
+        """Return a frame's name without a leading slash."""
+        return self.names.bare(name) if name else ""
+
+    @property
+    def frames(self) -> dict[str, str]:
+        """Return all frames, each with the topic by which it came first."""
+        return self._topic_of
+
+    def topic_for(self, edge: AddedEdge, added: Iterable[AddedEdge]) -> str:
+        """Return the topic that an edge is added on: `tf_static` beside what the frames came by that it hangs from."""
+        parents = {each.child: each.parent for each in added}
+        line = [*to_root(edge.parent, parents.get), edge.child]
+        topic = next((self._topic_of[frame] for frame in line if frame in self._topic_of), "/tf")
+        return f"{topic.rpartition('/')[0]}/{STATIC}"
+
+    def planned(self, tree: Frames, *, replace: bool) -> Planned:
+        """Say which edges of a tree are missing, and which are there, with the same values or with others.
+
+        replace: those with others are to be replaced
+        Raises BadTopology for what does not fit: a frame that moves, in either of the two, another parent, a cycle,
+        and other values where nothing is to be replaced.
+        """
+        found = Planned([], [], [])
+        for track in tree.tracks():
+            child, parent = (self._called(frame) for frame in (track.child, track.parent))
+            if not track.standing:
+                what = f"frame {shown(child)} moves in {bare(tree.name)}; --with adds what stands still"
+                raise BadTopology(what, rule="static-and-moving")
+            edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
+            if known is None:
+                found.added.append(edge)
+                continue
+            self._refuse_other(edge, known, tree.name)
+            same = not known.varies and is_same(known.numbers, edge.numbers)
+            (found.same if same else found.replaced).append(edge)
+        if found.replaced and not replace:
+            raise BadTopology(self._others(found.replaced, tree.name), rule="two-poses")
+        self._refuse_cycles(found.added)
+        return found
+
+    def _called(self, frame: str) -> str:
+        """Return what a frame is called here: the Earth's has two names."""
+        if frame in EARTH_FRAMES and frame not in self._topic_of:
+            return next((other for other in EARTH_FRAMES if other in self._topic_of), frame)
+        return frame
+
+    def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
+        """Raise BadTopology for a frame with another parent, one that moves, and one that comes from two robots."""
+        topics, child = first_of([*known.topics], MOST_NAMED), shown(edge.child)
+        here = f"({self.name}, {topics})"
+        if edge.child in self._conflicts:
+            raise BadTopology(self._conflicts[edge.child], source=self.name, rule="two-topics")
+        if others := [parent for parent in known.parents if parent != edge.parent]:
+            parents = f"{shown(others[0])} {here} and {shown(edge.parent)} ({bare(tree)})"
+            raise BadTopology(f"frame {child} has two parents: {parents}", rule="two-parents")
+        if known.moves:
+            both = f"it moves in {shown(edge.parent)} {here} and stands still in it ({bare(tree)})"
+            raise BadTopology(f"frame {child}: {both}", rule="static-and-moving")
+
+    def _others(self, edges: list[AddedEdge], tree: str) -> str:
+        """Say which edges have other values, and how far off they are."""
+        told = []
+        for edge in edges:
+            known = self.known[edge.child]
+            metres, radians = rigid.distance(*known.numbers, *edge.numbers, xp=floats)
+            off = f"{metres:.3g} m and {radians * floats.RADIAN:.3g} deg off"
+            told.append(f"{edge} on {first_of([*known.topics], MOST_NAMED)} ({off})")
+        what = first_of(told, MOST_NAMED)
+        return f"{self.name}: other values than in {bare(tree)}: {what}; --replace puts those of {bare(tree)} in"
+
+    def _refuse_cycles(self, added: list[AddedEdge]) -> None:
+        """Raise BadTopology where edges that are added hang a frame below itself."""
+        parents = {child: [*edge.parents][-1] for child, edge in self.known.items()}
+        parents |= {edge.child: edge.parent for edge in added}
+        for edge in added:
+            to_root(edge.child, parents.get)
+
+
+def is_same(a: Rigid, b: Rigid) -> bool:
+    """Tell whether two transforms are one, whatever the sign of their quaternions; zeros are no rotation."""
+    if not (any(a[3:]) and any(b[3:])):
+        return a == b
+    metres, radians = rigid.distance(*_unit(*a), *_unit(*b), xp=floats)
+    return bool(metres <= SAME * (1.0 + max(map(abs, a[:3]))) and radians <= SAME)
+
+
+def _unit(tx: float, ty: float, tz: float, x: float, y: float, z: float, w: float) -> Rigid:
+    return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
+
+
+def replaced(data: bytes, edges: dict[str, AddedEdge], bare_name: Callable[[str], str], *, ros1: bool) -> bytes:
+    """Return a message of transforms with other numbers in some edges; the same object where it has none of them."""
+    message, found = Transforms(data, ros1=ros1), False
+    for transform in message:
+        if edge := edges.get(bare_name(transform.child)):
+            message.fields.put(edge.numbers)
+            found = True
+    return message.fields.whole() if found else data

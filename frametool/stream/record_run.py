@@ -1,0 +1,285 @@
+"""A recording with something changed: which edges come in, which messages move, what is left out, and what is told."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.errors import (
+    FormatError,
+    FrametoolError,
+    LookupFailed,
+    NoDataAt,
+    ValueInvalid,
+    alternatives,
+    first_of,
+)
+from frametool.formats.load import Recording, Rules, load_sources
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.grammar.edges import Edge, Options, stop
+from frametool.ros.bags import TYPES, recorded_edge
+from frametool.ros.latched import added_messages
+from frametool.ros.message_bytes import Transforms
+from frametool.ros.moved_messages import MOVED_TYPES, MessageMover
+from frametool.ros.record_changes import RecordChanges, RecordContents
+from frametool.ros.record_copy import copied
+from frametool.ros.recorded_edges import MOST_NAMED, STATIC, Planned, RecordedEdges, replaced
+from frametool.ros.recordings import SECONDS_ROS2
+from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from frametool.frames.lookups import Frames
+    from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
+    from frametool.ros.chunks import Channel
+    from frametool.ros.record_changes import Change
+    from frametool.ros.record_copy import Advance, CopiedRecording
+    from frametool.ros.recorded_edges import AddedEdge
+
+MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
+OTHER_TRANSFORMS = "FrameTransform"  # of Foxglove, and lists of them
+LAST_STAMP = SECONDS_ROS2[1] * BILLION
+
+
+class RecordRequest(NamedTuple):
+    """What is to be changed in a recording.
+
+    tree: whose edges are to be in it; replace: also where it has them with other values
+    into: the frame that the messages of some topics are moved into; topics: these, and those of transforms that count
+    window: the first and the last log time of what is left
+    on_error: STOP or SKIP, for messages that cannot be moved; tell: takes why
+    normalize: any non-zero quaternion is taken
+    """
+
+    tree: Frames | None = None
+    replace: bool = False
+    into: str = ""
+    topics: tuple[str, ...] = ()
+    window: tuple[int, int] | None = None
+    on_error: str = STOP
+    tell: Callable[[FrametoolError], None] = lambda _error: None
+    normalize: bool = False
+
+
+class RecordRun:
+    """One copy: `look` at the recording, then write its `pieces`; `told` and `finish` say what was done."""
+
+    def __init__(self, recording: CopiedRecording, asked: RecordRequest) -> None:
+        """Begin before the first look."""
+        self.recording, self.asked = recording, asked
+        self.changes = RecordChanges(asked.window)
+        self.contents = RecordContents(recording, self.changes)
+        self.edges = RecordedEdges(recording.path, ros1=recording.is_ros1)
+        self.planned = Planned([], [], [])
+        self.added: dict[str, list[AddedEdge]] = {}  # by the topics they come on
+        self.transforms = {topic for topic in asked.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
+        self.mover: MessageMover | None = None
+        self.moved: dict[str, int] = {}  # topic -> how many of its messages were looked at
+        self.unmoved = self.skipped = self.rewritten = 0
+
+    def look(self, advance: Advance) -> None:
+        """Read the recording once, and find out what is to be done.
+
+        Raises FormatError for a recording that is not whole and a topic that cannot be moved, BadTopology for edges
+        that do not fit, LookupFailed for a frame that is not there and a window without messages.
+        """
+        asked = self.asked
+        self.contents.read(advance, self._see if asked.tree is not None else None)
+        channels = self.recording.channels
+        self._check_topics(channels)
+        if asked.window and not self.contents.inside:
+            raise NoDataAt(self._empty(asked.window))
+        if asked.tree is not None or asked.into:
+            self._refuse_others(channels)
+        if asked.tree is not None:
+            self.planned = self.edges.planned(asked.tree, replace=asked.replace)
+            for edge in self.planned.added:
+                self.added.setdefault(self.edges.topic_for(edge, self.planned.added), []).append(edge)
+        changes = self.changes.change
+        if self.planned.replaced:
+            change = self._replacer()
+            changes |= {number: change for number, each in channels.items() if self._counts(each)}
+        if asked.into:
+            ros1, normalize = self.recording.is_ros1, asked.normalize
+            self.mover = mover = MessageMover(self._frames(), asked.into, ros1=ros1, normalize=normalize)
+            named = {number: each for number, each in channels.items() if self._is_named(each)}
+            changes |= {number: self._moving(each, mover) for number, each in named.items()}
+
+    def _counts(self, channel: Channel) -> bool:
+        """Tell whether a channel is one of transforms that count: all, or those of the topics that are named."""
+        return channel.type in TYPES and (not self.transforms or _is_among(channel.topic, self.transforms))
+
+    def _is_named(self, channel: Channel) -> bool:
+        """Tell whether the messages of a channel are to be moved."""
+        return _is_among(channel.topic, {*self.asked.topics} - self.transforms)
+
+    def _see(self, channel: Channel, data: bytes) -> None:
+        """Take a message of transforms in."""
+        if not self._counts(channel):
+            return
+        with _on_topic(channel.topic, self.recording.path):
+            self.edges.add(channel.topic, data)
+
+    def _check_topics(self, channels: dict[int, Channel]) -> None:
+        """Raise FormatError for a topic that is not there or holds what does not move, Misused for one of no use."""
+        path, into = self.recording.path, self.asked.into
+        known = {channel.topic for channel in channels.values()}
+        for topic in self.asked.topics:
+            if not _is_among(topic, known):
+                raise FormatError(f"no topic {topic}{alternatives(topic, known, 'topics')}", source=path)
+        named = [channel for channel in channels.values() if self._is_named(channel)]
+        for topic, kind, _ in named:
+            if kind not in MOVED_TYPES:
+                raise FormatError(f"{topic} holds {kind or 'no type'}; --into moves {MOVES}", source=path)
+        if into and not named:
+            movable = sorted({each.topic for each in channels.values() if each.type in MOVED_TYPES})
+            remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
+            raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=path)
+
+    def _refuse_others(self, channels: dict[int, Channel]) -> None:
+        """Raise FormatError for transforms that are not read here, and so would not count."""
+        for topic, kind, encoding in channels.values():
+            if kind.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
+                raise FormatError(f"{topic} holds {kind}: no transforms of recordings", source=self.recording.path)
+            if encoding == "ros1" and not self.recording.is_ros1:
+                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.recording.path)
+
+    def _empty(self, window: tuple[int, int]) -> str:
+        """Say that no message lies in a window."""
+        span = self.contents.span
+        there = f"they are logged from {' to '.join(map(format_stamp, span))}" if span else "it has none at all"
+        return f"{self.recording.path}: no messages from {' to '.join(map(format_stamp, window))}; {there}"
+
+    def _frames(self) -> Frames:
+        """Return the transforms of the recording as they are in the copy, all over time."""
+        more = [*self.planned.added, *self.planned.replaced]
+        channels = self.recording.channels
+        if not more and not any(self.contents.counts[number] for number in channels if self._counts(channels[number])):
+            raise FormatError("no transforms in it; --with FILE brings some", source=self.recording.path)
+        source = TransformsOfCopy(self.recording, self.transforms, more)
+        return load_sources([source], Rules(normalize=self.asked.normalize))
+
+    def _replacer(self) -> Change:
+        """Return what puts other values into messages of transforms."""
+        edges = {edge.child: edge for edge in self.planned.replaced}
+        names = [child.encode() for child in edges]
+
+        def change(data: bytes, _log_ns: int) -> bytes:
+            if not any(name in data for name in names):
+                return data
+            new = replaced(data, edges, self.edges.bare, ros1=self.recording.is_ros1)
+            self.rewritten += new is not data
+            return new
+
+        return change
+
+    def _moving(self, channel: Channel, mover: MessageMover) -> Change:
+        """Return what moves the messages of a channel; one that cannot be moved is an error, or left out."""
+
+        def change(data: bytes, _log_ns: int) -> bytes | None:
+            number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
+            try:
+                new = mover.moved(channel.type, data)
+            except (LookupFailed, ValueInvalid) as error:
+                stamp = "" if mover.place is None else f", stamp {format_stamp(mover.place.stamp_ns)}"
+                fate = " (message skipped)" if self.asked.on_error == SKIP else ""
+                error.args = (f"{self.recording.path}: message {number} on {channel.topic}{stamp}: {error}{fate}",)
+                if not fate:
+                    raise
+                self.skipped += 1
+                if self.skipped <= MOST:
+                    self.asked.tell(error)
+                return None
+            self.unmoved += new is data
+            return new
+
+        return change
+
+    def pieces(self, form: str, folder: str, advance: Advance) -> Iterator[bytes]:
+        """Yield the bytes of the copy in a form; folder: where there is room for it while it is written."""
+        first_ns = self.contents.first_ns or 0
+        added = added_messages(self.recording, self.added, first_ns if first_ns < LAST_STAMP else 0)
+        yield from copied(self.recording, self.changes, added, first_ns, form, folder, advance)
+
+    def told(self) -> Iterator[str]:
+        """Yield a sentence for each thing that was done, or that was not needed."""
+        for topic, edges in self.added.items():
+            yield f"added on {topic}: {_listed(edges)}"
+        if self.planned.replaced:
+            yield f"replaced in {_count(self.rewritten)}: {_listed(self.planned.replaced)}"
+        if self.planned.same:
+            yield f"there already with the same values: {_listed(self.planned.same)}"
+        if self.moved:
+            total = sum(self.moved.values())
+            stayed = f", {self.unmoved} of them were in it" if self.unmoved else ""
+            yield f"{_count(total - self.skipped)} in {self.asked.into} ({first_of([*self.moved], MOST_NAMED)}){stayed}"
+        if self.contents.outside:
+            yield f"kept outside of --between: {_count(self.contents.outside)} on {STATIC}"
+        for is_usual, said in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
+            if kinds := sorted(kind for kind, usual in self.recording.undefined.items() if usual is is_usual):
+                yield f"types that it does not define are {said}: {first_of(kinds, MOST_NAMED)}"
+        if not (self.added or self.rewritten or self.moved or self.asked.window):
+            yield f"nothing is changed: {_count(sum(self.contents.counts.values()))} copied"
+
+    def remarks(self) -> Iterator[Remark]:
+        """Yield what was odd in messages that were moved."""
+        if self.mover is not None:
+            yield from self.mover.tally.told()
+
+    def finish(self) -> int:
+        """Report how many messages were left out; return the exit status."""
+        if not self.skipped:
+            return DONE
+        total = sum(self.moved.values())
+        more = f", {self.skipped - MOST} of them not shown" if self.skipped > MOST else ""
+        message = f"{self.recording.path}: {self.skipped} of {total} messages skipped{more}"
+        self.asked.tell(RowsSkipped(message, source=self.recording.path, bad=self.skipped, messages=total))
+        return ROWS_SKIPPED
+
+
+class TransformsOfCopy(Recording):
+    """The transforms of a recording as its copy has them: some of its edges are replaced, and others are added."""
+
+    def __init__(self, recording: CopiedRecording, topics: set[str], more: Sequence[AddedEdge]) -> None:
+        """Take the recording, the topics that are read (all if none), and the edges that are added or replaced."""
+        super().__init__(recording.path, topics=topics)
+        self.recording, self.more = recording, more
+
+    def pieces(
+        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False  # noqa: ARG002
+    ) -> Iterator[Edge | Samples | EdgeColumns]:  # fmt: skip
+        """Yield its edges, but for those that are replaced, and then the others."""
+        self.close()
+        options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
+        children = {edge.child for edge in self.more}
+        for number, (channel, log_ns, data) in enumerate(self.recording.messages(TYPES), 1):
+            with _on_topic(channel.topic, self.path):
+                for said in Transforms(data, ros1=self.recording.is_ros1):
+                    edge = recorded_edge(said, number, channel.topic, log_ns, self.path, options)
+                    if edge is not None and edge.child not in children:
+                        yield edge
+        yield from (Edge(edge.parent, edge.child, edge.numbers) for edge in self.more)
+        self.tell()
+
+
+@contextmanager
+def _on_topic(topic: str, path: str) -> Iterator[None]:
+    """Name the topic of a message that cannot be read."""
+    try:
+        yield
+    except ValueInvalid as error:
+        raise FormatError(f"a message on {topic}: {error}", source=path) from None
+
+
+def _is_among(topic: str, topics: set[str]) -> bool:
+    """Tell whether a topic is one of some, with or without a slash in front."""
+    return topic.strip("/") in {each.strip("/") for each in topics}
+
+
+def _listed(edges: Sequence[AddedEdge]) -> str:
+    return first_of(list(map(str, edges)), MOST_NAMED)
+
+
+def _count(messages: int) -> str:
+    return f"{messages} message{'s' * (messages != 1)}"
