@@ -110,7 +110,7 @@ def test_a_subject_is_found_in_any_number_and_case(word: str, found: str, run: C
     [
         (("rotatoins",), "no topic, command or text has 'rotatoins'; did you mean 'rotations'?"),
         (("eular",), "no topic, command or text has 'eular'; did you mean 'euler'?"),
-        (("recrods",), "no topic, command or text has 'recrods'; did you mean 'records' or 'recordings'?"),
+        (("recrods",), "no topic, command or text has 'recrods'; did you mean 'records' or 'record' or 'recordings'?"),
         (("xyzzyx",), "no topic, command or text has 'xyzzyx'; `frametool help` lists all topics"),
         (("(",), "no topic, command or text has '('; `frametool help` lists all topics"),
         (("cookbook", "xyzzyx"), "no question has 'xyzzyx'; `frametool help cookbook` lists all"),
