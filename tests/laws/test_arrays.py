@@ -76,6 +76,17 @@ def test_every_form_of_rows_goes_into_every_form_of_columns_or_is_refused_in_a_l
             assert len(rows_of(run("apply", "--transform", "{}", "-i", f"made.{form}", "-f", "csv", "--quiet").out)) == 2
 
 
+@pytest.mark.parametrize("form", [form for form in ARRAYS if form not in ("las", "laz")])
+@pytest.mark.parametrize("names", ["matrix", "rpy", "mrp"])
+@pytest.mark.parametrize("head", ["x,y,z,", ""])
+def test_a_pose_or_a_rotation_is_read_back_in_every_notation(run: Run, form: str, names: str, head: str) -> None:
+    row = ["1,2,3,"] * bool(head)
+    given = f"{head}qx,qy,qz,qw\n{''.join(row)}0.0,0.0,0.6,0.8\n"
+    assert into(run, ("convert", "--to", names), "in.csv", given, form).status == 0
+    back = rows_of(run("convert", "-i", f"made.{form}", "--to", "quaternion", "-f", "csv", "--quiet").out)
+    assert [float(back[0][name]) for name in ("qx", "qy", "qz", "qw")] == pytest.approx([0, 0, 0.6, 0.8], abs=1e-6)
+
+
 @pytest.mark.parametrize("form", ARRAYS)
 @pytest.mark.parametrize("name", POINTS)
 def test_points_stay_points_through_every_form(run: Run, name: str, form: str) -> None:

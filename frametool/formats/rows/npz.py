@@ -63,6 +63,8 @@ class NpzFile(npy.NpyFile):
             message = f"--array {shown(wanted)}: there is none{alternatives(wanted, arrays, 'arrays')}"
             raise BadAnswer(message, source=self.name)
         fitting = [wanted] if wanted else [name for name, member in arrays.items() if self._fits(member)]
+        if not fitting and len(arrays) == 1 and npy.NpyFile(self._opened(*arrays.values())).names:
+            fitting = [*arrays]  # fields alone: a matrix, or a rotation without a position
         if len(fitting) > 1:
             raise Unanswered(f"several arrays fit; give --array {'|'.join(fitting)}", source=self.name)
         if not fitting:
