@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frametool.errors import ValueInvalid
 from frametool.geometry import floats, quaternion
 from frametool.geometry.rotation import Rotation
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.geometry.types import Array
+
+class NotSettled(ValueInvalid):
+    """Report equations that have no solution."""
+
 
 LONG = 24  # rows and columns of a large matrix
 BITS = 53  # of a float
@@ -98,7 +103,7 @@ def _parts(matrix: Array, axis: int, bits: int) -> Iterator[Array]:
 def inverse(matrix: Array) -> Array:
     """Return the inverse of a symmetric positive definite matrix; a large one goes by quarters.
 
-    Raises LinAlgError where there is none.
+    Raises NotSettled where there is none.
     """
     if (half := len(matrix) // 2) <= LONG // 2:
         return solved(matrix, np.eye(len(matrix)))
@@ -115,13 +120,13 @@ def inverse(matrix: Array) -> Array:
 def solved(matrix: Array, right: Array) -> Array:
     """Return inv(matrix) right, (n, k), of a small symmetric positive definite matrix, by elimination.
 
-    Raises LinAlgError where there is none.
+    Raises NotSettled where there is none.
     """
     size = len(matrix)
     rows = np.hstack([matrix, right])
     for k in range(size):
         if not rows[k, k] > 0.0:
-            raise np.linalg.LinAlgError
+            raise NotSettled("the numbers do not settle what is asked for: too few, too alike or too far apart")
         rows[k + 1 :, k:] -= rows[k + 1 :, k, None] / rows[k, k] * rows[k, k:]
     for k in reversed(range(size)):
         rows[k, size:] /= rows[k, k]

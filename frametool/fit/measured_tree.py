@@ -11,7 +11,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.bodies import bodies_of, require_connected
 from frametool.fit.graph import bridges
-from frametool.fit.linear import dot, inverse, total
+from frametool.fit.linear import NotSettled, dot, inverse, total
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
 from frametool.fit.uncertainty import Uncertainty
@@ -58,7 +58,7 @@ def solve_tree(
             found, fits = judged(problem, measurements, problem.fitted(robust=robust, told=told))
             told(1.0)
             return TreeSolution(measurements, bodies, problem, found, fits)
-    except (np.linalg.LinAlgError, FloatingPointError):
+    except (NotSettled, FloatingPointError):
         far = max(abs(part) for each in measurements for part in each.components[:3])
         raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
 
