@@ -253,10 +253,14 @@ def built(raw: bytes, changed: Iterable[tuple[Entry, bytes | None]]) -> tuple[by
     entries: list[Entry] = []
     at = 0
     for (channel, log_ns, begin, start, end), new in changed:
-        data = raw[start:end] if new is None else new
-        _, _, _, sequence, _, publish_ns = _MESSAGE.unpack_from(raw, begin)
-        pieces += message_head(channel, log_ns, len(data), sequence, publish_ns), data
-        behind = at + MESSAGE_HEAD + len(data)
+        _, _, own, sequence, _, publish_ns = _MESSAGE.unpack_from(raw, begin)
+        if new is None and own == channel:
+            piece = raw[begin:end]
+        else:
+            data = raw[start:end] if new is None else new
+            piece = message_head(channel, log_ns, len(data), sequence, publish_ns) + data
+        pieces.append(piece)
+        behind = at + len(piece)
         entries.append((channel, log_ns, at, at + MESSAGE_HEAD, behind))
         at = behind
     return b"".join(pieces), entries

@@ -41,23 +41,23 @@ class MessageFields:
             raise ValueInvalid(f"it begins with {data[:CDR_BEGIN].hex(' ') or 'nothing'}: that is not plain CDR")
         self.data, self.ros1 = data, ros1
         self._order = "<" if layout & 1 else ">"  # of the bytes of a number
-        self._widest = 1 if ros1 else WIDEST[layout]
+        self._four, self._eight = (1, 1) if ros1 else (4, WIDEST[layout])  # bytes that numbers of so many align to
         self._begin = self.at = 0 if ros1 else CDR_BEGIN
         self.made = bytearray(data[: self.at])
 
     def doubles(self, count: int) -> Components:
         """Take doubles over."""
-        return self._numbers(_doubles(self._order, count), min(8, self._widest))
+        return self._numbers(_layout(f"{self._order}{count}d"), self._eight)
 
     def pose(self) -> Rigid:
         """Take the seven numbers of a pose or transform over."""
         tx, ty, tz, x, y, z, w = self.doubles(POSE)
         return tx, ty, tz, x, y, z, w
 
-    def integer(self, code: str = "I") -> int:
-        """Take an integer of four bytes over; `i` has a sign."""
-        number: int = self._numbers(_INTEGERS[self._order, code], min(4, self._widest))[0]
-        return number
+    def integer(self) -> int:
+        """Take a length or a count over."""
+        (number,) = self._numbers(_layout(self._order + "I"), self._four)
+        return int(number)
 
     def _numbers(self, layout: struct.Struct, to: int) -> tuple[Any, ...]:
         """Take numbers over that are aligned to so many bytes."""
@@ -72,7 +72,7 @@ class MessageFields:
 
     def put(self, numbers: Sequence[float]) -> None:
         """Replace the doubles that were taken over last."""
-        layout = _doubles(self._order, len(numbers))
+        layout = _layout(f"{self._order}{len(numbers)}d")
         layout.pack_into(self.made, len(self.made) - layout.size, *numbers)
 
     def text(self, new: str | None = None) -> str:
@@ -82,7 +82,7 @@ class MessageFields:
         kept = raw
         if new is not None:
             kept = new.encode() + b"\0" * (not self.ros1)
-            _INTEGERS[self._order, "I"].pack_into(self.made, len(self.made) - 4, len(kept))
+            _layout(self._order + "I").pack_into(self.made, len(self.made) - 4, len(kept))
         self.made += kept
         try:
             return raw.removesuffix(b"\0").decode()
@@ -98,9 +98,8 @@ class MessageFields:
 
     def stamp(self) -> tuple[int, int]:
         """Take seconds and nanoseconds of a header over, and the counter that ROS 1 has before them."""
-        if self.ros1:
-            self.integer()
-        return self.integer("I" if self.ros1 else "i"), self.integer()
+        *_, seconds, nanoseconds = self._numbers(_layout(self._order + ("III" if self.ros1 else "iI")), self._four)
+        return seconds, nanoseconds
 
     def whole(self) -> bytes:
         """Return the new message; raises ValueInvalid where the old one goes on behind its fields, or ends in them."""
@@ -140,9 +139,6 @@ class Transforms:
             yield Said(parent, child, fields.pose(), stamp)
 
 
-_INTEGERS = {(order, code): struct.Struct(order + code) for order in "<>" for code in "iI"}
-
-
 @cache
-def _doubles(order: str, count: int) -> struct.Struct:
-    return struct.Struct(f"{order}{count}d")
+def _layout(code: str) -> struct.Struct:
+    return struct.Struct(code)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryFile, gettempdir
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.yaml_writer import dump
-from frametool.errors import FileProblem, FormatError
+from frametool.errors import FileProblem, FormatError, FrametoolError
 from frametool.ros import bag1_chunks, mcap_chunks
 from frametool.ros.bag1_chunks import Bag1File, Bag1Writer
 from frametool.ros.bag2_folder import INFORMATION, DatabaseFile, files_of, metadata_of, read_metadata
@@ -190,7 +190,7 @@ def _bag(
 ) -> Iterator[bytes]:  # fmt: skip
     """Yield the bytes of a ROS 1 bag, whose first ones are known last."""
     writer = Bag1Writer(recording.connections)
-    with TemporaryFile(dir=folder or None) as file:
+    with _room(folder), TemporaryFile(dir=folder or None) as file:
         file.write(writer.begin())
         file.write(writer.chunk(_chunk_of(added, first_ns, bag1_chunks.message), None))
         for piece in recording.pieces():
@@ -204,3 +204,14 @@ def _bag(
         file.seek(0)
         while data := file.read(PIECE):
             yield data
+
+
+@contextmanager
+def _room(folder: str) -> Iterator[None]:
+    """Name the folder in which there is no room, or what else the system says of it."""
+    try:
+        yield
+    except FrametoolError:
+        raise
+    except OSError as error:
+        raise FileProblem(f"{folder or gettempdir()}: {(error.strerror or str(error)).lower()}") from None
