@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Run = Callable[..., Outcome]
 
 STORED = [json.loads(line) for line in GOLDEN.read_text().splitlines()]
-SILENT = {"help", "view"}  # nothing for machines; pictures have tests of their own
+SILENT = {"help", "view", "record"}  # nothing for machines; pictures and recordings have tests of their own
 
 
 @pytest.mark.parametrize("each", STORED, ids=[f"{each['run']} < {each['in']}".rstrip("< ") for each in STORED])
