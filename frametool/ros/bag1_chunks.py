@@ -92,10 +92,10 @@ def _read(stream: BinaryIO, end: int) -> bytes:
 
 
 class MessageHead:
-    """What stands before the data of a message: in all of a file the same fields, nearly always in the same order."""
+    """What stands before the data of a message: the same fields in all of a file, nearly always in the same order."""
 
     def __init__(self, raw: bytes) -> None:
-        """Learn from the first one, with the two lengths that are around its header."""
+        """Learn the layout from a message: its header, with the length before it and that of the data behind it."""
         self.size = len(raw)
         places: dict[bytes, int] = {}
         at = 4
@@ -104,7 +104,7 @@ class MessageHead:
             name, _, value = raw[at + 4 : at + 4 + size].partition(b"=")
             at += 4 + size
             places[name] = at - len(value)
-        self._number, self._time = places.get(b"conn", 0), places.get(b"time", 0)
+        self._number, self._time = (places[b"conn"], places[b"time"]) if raw else (0, 0)
         values = sorted(((self._number, 4), (self._time, 8), (self.size - 4, 4)))
         ends = [0, *(begin + size for begin, size in values)]
         fixed = [(end, begin, raw[end:begin]) for end, (begin, _) in zip(ends, values, strict=False)]
@@ -127,7 +127,7 @@ class Bag1File:
     head = b""  # of MCAP files
 
     def __init__(self, path: Path, connections: dict[int, Connection]) -> None:
-        """Begin before the first record; what connections there are is added to those of the copy."""
+        """Begin before the first record; connections are added to those of the copy."""
         self.path, self.connections = path, connections
         self.expected = 0
         self._head = MessageHead(b"")
@@ -177,7 +177,7 @@ class Bag1File:
             raise ValueError(_CUT)
 
     def _connection(self, fields: Fields, data: bytes) -> int:
-        """Take a connection in and return its number."""
+        """Register a connection and return its number."""
         said = fields_of(data)
         if b"type" not in said or b"topic" not in fields:
             raise ValueError("a connection without topic or type")
@@ -207,7 +207,7 @@ class Bag1File:
         return entries
 
     def _other(self, raw: bytes, at: int) -> int:
-        """Take another record than a message in and return where it ends; learn how heads of messages look."""
+        """Register a connection and return where its record ends; at a message learn the layout of its head."""
         (size,) = struct.unpack_from("<I", raw, at)
         start = at + 8 + size
         fields = fields_of(raw[at + 4 : start - 4])
@@ -222,7 +222,7 @@ class Bag1File:
 
 
 class Bag1Writer:
-    """A bag as pieces of bytes; the first ones are only known at the end."""
+    """A bag that is written piece by piece; its first bytes are only known at the end."""
 
     def __init__(self, connections: Mapping[int, Connection]) -> None:
         """Begin; connections: by their numbers."""
@@ -236,17 +236,18 @@ class Bag1Writer:
         totals = {b"conn_count": _uint(len(self.connections)), b"chunk_count": _uint(len(self._infos))}
         head = header({b"op": bytes([BAG]), b"index_pos": struct.pack("<Q", index), **totals})
         fill = b" " * (FIRST_RECORD - 8 - len(head))
-        return self._placed(MAGIC, _uint(len(head)), head, _uint(len(fill)), fill)
+        return self._counted(MAGIC, _uint(len(head)), head, _uint(len(fill)), fill)
 
-    def _placed(self, *pieces: bytes) -> bytes:
+    def _counted(self, *pieces: bytes) -> bytes:
+        """Join pieces and count their bytes."""
         made = b"".join(pieces)
         self.size += len(made)
         return made
 
     def chunk(self, chunk: Chunk, changed: Sequence[tuple[Entry, bytes | None]] | None) -> bytes:
-        """Return a chunk with its index, as it was or with what is left of it.
+        """Return a chunk with its index, as it was or with some of its messages.
 
-        changed: the messages that are left, with their data where these are others
+        changed: these messages, with their data where it is new
         """
         raw, data, entries = chunk.raw, chunk.stored, chunk.entries
         if changed is not None or data is None:
@@ -288,12 +289,12 @@ class Bag1Writer:
             self.counts[number] = self.counts.get(number, 0) + len(each)
             head = {b"op": bytes([INDEX]), b"ver": _uint(1), b"conn": _uint(number), b"count": _uint(len(each))}
             pieces.append(record(head, b"".join(each)))
-        return self._placed(*pieces)
+        return self._counted(*pieces)
 
     def end(self) -> tuple[bytes, bytes]:
         """Return the index, and the first bytes as they are to be."""
         index = self.size
-        made = self._placed(*map(self._connection, self.connections), *self._infos)
+        made = self._counted(*map(self._connection, self.connections), *self._infos)
         return made, self.begin(index)
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from contextlib import ExitStack
 
     from frametool.ros.chunks import Entry
-    from frametool.ros.mcap_chunks import McapWriter, Schemas
+    from frametool.ros.mcap_chunks import ChannelRegistry, McapWriter
 
 INFORMATION = "rosbag2_bagfile_information"
 QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # what rosbag2 says of a channel of MCAP
@@ -82,12 +82,12 @@ class DatabaseFile:
     head = sized(b"ros2") + sized(b"frametool")
     expected: int | None = None
 
-    def __init__(self, path: Path, schemas: Schemas, undefined: dict[str, bool]) -> None:
-        """Begin before the first message; the schemas are those of the copy.
+    def __init__(self, path: Path, registry: ChannelRegistry, undefined: dict[str, bool]) -> None:
+        """Begin before the first message; the registry is that of the copy.
 
         undefined: takes the types that it does not define, and whether ROS 2 Humble does
         """
-        self.path, self.known, self.undefined = path, schemas, undefined
+        self.path, self.registry, self.undefined = path, registry, undefined
 
     def pieces(self) -> Iterator[Chunk]:
         """Yield chunks, in the order of log times.
@@ -129,11 +129,11 @@ class DatabaseFile:
         kind = topic["type"]
         defined = definitions.get(kind) or self._defined(kind)
         encoding, text = str(defined["encoding"]), str(defined["encoded_message_definition"])
-        schema = self.known.add_schema(None, b"".join(sized(each.encode()) for each in (kind, encoding, text)))
+        schema = self.registry.add_schema(None, b"".join(sized(each.encode()) for each in (kind, encoding, text)))
         said = {QOS: topic.get(QOS) or "", HASH: topic.get("type_description_hash") or ""}
         said = {key: value for key, value in said.items() if value or key == QOS}
         named = (sized(str(topic[name]).encode()) for name in ("name", "serialization_format"))
-        return self.known.add_channel(None, schema, b"".join((*named, mapping(said))))
+        return self.registry.add_channel(None, schema, b"".join((*named, mapping(said))))
 
     def _defined(self, kind: str) -> dict[str, str]:
         """Return the definition of a type that the file does not define: that of ROS 2 Humble, or none."""
@@ -150,11 +150,11 @@ def metadata_of(writer: McapWriter, before: dict[str, Any], file: str) -> dict[s
     listed = (each["topic_metadata"] for each in before.get("topics_with_message_count") or ())
     hashes = {(each["name"], each["type"]): each.get("type_description_hash") for each in listed}
     by_numbers = False
-    for number in sorted(writer.known.channels):
-        channel, schema, said = writer.known.channel(number)
+    for number in sorted(writer.registry.channels):
+        channel, schema, said = writer.registry.channel(number)
         qos = said.get(QOS, "")
         by_numbers |= says_by_numbers(qos)
-        told = said.get(HASH) or hashes.get((channel.topic, channel.type)) or type_hash(*writer.known.schema(schema))
+        told = said.get(HASH) or hashes.get((channel.topic, channel.type)) or type_hash(*writer.registry.schema(schema))
         about = {"name": channel.topic, "type": channel.type, "serialization_format": channel.encoding,
                  QOS: qos, "type_description_hash": told}  # fmt: skip
         row = topics.setdefault((*about.values(),), {"topic_metadata": about, "message_count": 0})

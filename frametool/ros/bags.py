@@ -14,7 +14,7 @@ from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
 from frametool.grammar.readers import Note
-from frametool.ros.message_bytes import Said
+from frametool.ros.message_bytes import RawTransform
 from frametool.ros.messages import POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components
 
@@ -158,7 +158,7 @@ def _is_read(connection: Any, options: Options) -> bool:
     return kind in TYPES or (kind in POSES and options.topics.chooses(connection.topic))
 
 
-def _said(message: Any, topic: str, options: Options) -> Said:
+def _said(message: Any, topic: str, options: Options) -> RawTransform:
     """Return what a TransformStamped says, or a pose over time."""
     if hasattr(message, "transform"):
         named, moved, turned = message.child_frame_id, message.transform.translation, message.transform.rotation
@@ -168,11 +168,11 @@ def _said(message: Any, topic: str, options: Options) -> Said:
         moved, turned = pose.position, pose.orientation
     numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
     stamp = message.header.stamp
-    return Said(message.header.frame_id, named, numbers, (stamp.sec, stamp.nanosec))
+    return RawTransform(message.header.frame_id, named, numbers, (stamp.sec, stamp.nanosec))
 
 
 def recorded_edge(
-    said: Said, number: int, topic: str, received_ns: int, path: str, options: Options
+    said: RawTransform, number: int, topic: str, received_ns: int, path: str, options: Options
 ) -> Edge | None:
     """Return the edge that a message on a topic says; None where the topic does not count.
 

@@ -38,7 +38,7 @@ def _latched_channel(recording: CopiedRecording, topic: str) -> int:
     for number, channel in recording.channels.items():
         if channel == (topic, STATIC.type, "cdr"):
             return number
-    known = recording.known
+    known = recording.registry
     qos = [known.channel(number)[2].get(QOS, "") for number in known.channels]
     definition, _ = typestore(BAG2).generate_msgdef(STATIC.type, ros_version=2)
     kind = b"".join(sized(each.encode()) for each in (STATIC.type, "ros2msg", definition))

@@ -1,7 +1,7 @@
-"""MCAP files chunk by chunk, read and written: every record is kept, what is not known here too.
+"""MCAP files chunk by chunk, read and written: every record is kept, of unknown kinds too.
 
-Layout of records: https://mcap.dev/spec.  Numbers of schemas and channels are those of the first file; where several
-files are joined, those of the later ones may get others.
+Layout of records: https://mcap.dev/spec.  Schemas and channels keep their numbers; where several files are joined,
+those of later files get others if theirs are taken.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ MAGIC = b"\x89MCAP0\r\n"
     HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT, ATTACHMENT_INDEX,
     STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END,
 ) = range(1, 16)  # fmt: skip
-OURS = frozenset((MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX, SUMMARY_OFFSET, DATA_END))  # made anew
+# kinds of records that are made anew
+OURS = frozenset((MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX, SUMMARY_OFFSET, DATA_END))
 _HEAD = struct.Struct("<BQ")  # of a record: its kind, how long it is
 _MESSAGE = struct.Struct("<BQHIQQ")  # .. and of a message: its channel, number, log time and time of publication
 MESSAGE_HEAD = _MESSAGE.size  # bytes before its data
@@ -80,8 +81,8 @@ def texts_of(data: bytes) -> dict[str, str]:
     return found
 
 
-class Schemas:
-    """The schemas and channels of a copy by their numbers; what is known under another number keeps that one."""
+class ChannelRegistry:
+    """The schemas and channels of a copy by their numbers; equal ones of several files are one."""
 
     def __init__(self) -> None:
         """Begin without any."""
@@ -89,12 +90,12 @@ class Schemas:
         self.channels: dict[int, tuple[int, bytes]] = {}  # number of the schema, and the rest of the record
 
     def add_schema(self, number: int | None, body: bytes) -> int:
-        """Return the number of a schema in the copy; body: name, encoding and data."""
-        return 0 if number == 0 else _numbered(self.schemas, number, body)  # 0 is none
+        """Register a schema and return its number in the copy; body: name, encoding and data."""
+        return 0 if number == 0 else _number_for(self.schemas, number, body)  # 0 is none
 
     def add_channel(self, number: int | None, schema: int, body: bytes) -> int:
-        """Return the number of a channel in the copy; body: topic, encoding and metadata."""
-        return _numbered(self.channels, number, (schema, body))
+        """Register a channel and return its number in the copy; body: topic, encoding and metadata."""
+        return _number_for(self.channels, number, (schema, body))
 
     def schema(self, number: int) -> tuple[str, str, str]:
         """Return name, encoding and definition of a type."""
@@ -102,7 +103,7 @@ class Schemas:
         return fields.text(), fields.text(), fields.data().decode(errors="replace")
 
     def channel(self, number: int) -> tuple[Channel, int, dict[str, str]]:
-        """Return a channel, the number of its schema, and what else is said of it."""
+        """Return a channel, the number of its schema, and its metadata."""
         schema, body = self.channels[number]
         fields = _Reader(body)
         topic, encoding = fields.text(), fields.text()
@@ -112,8 +113,8 @@ class Schemas:
         return Channel(topic, name, encoding), schema, texts_of(fields.data())
 
 
-def _numbered(known: dict[int, Value], number: int | None, value: Value) -> int:
-    """Return the number under which a value is known: its own where that is free, else that of an equal, or a new."""
+def _number_for(known: dict[int, Value], number: int | None, value: Value) -> int:
+    """Register a value under its own number if that is free, else under that of an equal one, or a new one."""
     if number is None or known.get(number, value) != value:
         number = next((other for other, each in known.items() if each == value), max(known, default=0) + 1)
     known[number] = value
@@ -142,9 +143,9 @@ class McapFile:
     head: the body of its first record; expected: how many messages there are, None where it does not say so
     """
 
-    def __init__(self, path: Path, schemas: Schemas) -> None:
-        """Begin before the first record; the schemas are those of the copy."""
-        self.path, self.known = path, schemas
+    def __init__(self, path: Path, registry: ChannelRegistry) -> None:
+        """Begin before the first record; the registry is that of the copy."""
+        self.path, self.registry = path, registry
         self.head = b""
         self.expected: int | None = None
         self._schemas = {0: 0}  # numbers here -> numbers in the copy
@@ -172,7 +173,7 @@ class McapFile:
                 self.expected = _Reader(body).number("Q")
             elif kind == HEADER:
                 self.head = body
-            elif kind not in OURS and not self._takes(kind, body):
+            elif kind not in OURS and not self._registers(kind, body):
                 yield OtherRecord(kind, body)
             if loose > FULL or kind == FOOTER:
                 loose = 0
@@ -185,15 +186,15 @@ class McapFile:
         if raw:
             yield Chunk(raw, self._entries(raw), is_same=self._is_same)
 
-    def _takes(self, kind: int, body: bytes) -> bool:
-        """Take a schema or a channel in."""
+    def _registers(self, kind: int, body: bytes) -> bool:
+        """Register a schema or a channel; tell whether the record is done with."""
         if kind == SCHEMA:
             number = int.from_bytes(body[:2], "little")
-            self._schemas[number] = self.known.add_schema(number, body[2:])
+            self._schemas[number] = self.registry.add_schema(number, body[2:])
         elif kind == CHANNEL:
             number, schema = struct.unpack_from("<HH", body)
-            self._channels[number] = self.known.add_channel(number, self._schemas[schema], body[4:])
-            self.known.channel(self._channels[number])  # raises for one that cannot be read
+            self._channels[number] = self.registry.add_channel(number, self._schemas[schema], body[4:])
+            self.registry.channel(self._channels[number])  # raises for one that cannot be read
         return kind in (SCHEMA, CHANNEL, FOOTER)
 
     def _chunk(self, body: bytes) -> Chunk:
@@ -225,11 +226,13 @@ class McapFile:
             if raw[at] == MESSAGE:
                 _, length, channel, _, log_ns, _ = unpack(raw, at)
                 behind = at + length + 9
+                if behind < at + size:
+                    raise ValueError("a message is shorter than its head")
                 add((channels[channel], log_ns, at, at + size, behind))
             else:
                 kind, length = _HEAD.unpack_from(raw, at)
                 behind = at + length + 9
-                self._takes(kind, raw[at + 9 : behind])
+                self._registers(kind, raw[at + 9 : behind])
             at = behind
         if at > end:
             raise ValueError(_CUT)
@@ -248,7 +251,7 @@ def message(channel: int, log_ns: int, data: bytes) -> bytes:
 
 
 def built(raw: bytes, changed: Iterable[tuple[Entry, bytes | None]]) -> tuple[bytes, list[Entry]]:
-    """Return the records of some messages of a chunk, with other data where these are told, and where each is now."""
+    """Return the records of some messages of a chunk, some of them with new data, and where each is now."""
     pieces: list[bytes] = []
     entries: list[Entry] = []
     at = 0
@@ -267,32 +270,32 @@ def built(raw: bytes, changed: Iterable[tuple[Entry, bytes | None]]) -> tuple[by
 
 
 class McapWriter:
-    """An MCAP file as pieces of bytes, with all that finds messages in it at its end."""
+    """An MCAP file that is written piece by piece, with its summary at the end."""
 
-    def __init__(self, schemas: Schemas, head: bytes) -> None:
+    def __init__(self, registry: ChannelRegistry, head: bytes) -> None:
         """Begin; head: the body of the first record."""
-        self.known = schemas
-        self.counts: dict[int, int] = dict.fromkeys(schemas.channels, 0)
+        self.registry = registry
+        self.counts: dict[int, int] = dict.fromkeys(registry.channels, 0)
         self.span: tuple[int, int] | None = None  # of log times
         self.size = 0
-        self.others: list[str] = []
         self._head = head
-        self._said: set[tuple[int, int]] = set()  # kinds and numbers of schemas and channels that are written
+        self._written: set[tuple[int, int]] = set()  # kinds and numbers of schemas and channels
         self._indexes: dict[int, list[bytes]] = {kind: [] for kind in (CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX)}
 
-    def _placed(self, *pieces: bytes) -> bytes:
+    def _counted(self, *pieces: bytes) -> bytes:
+        """Join pieces and count their bytes."""
         made = b"".join(pieces)
         self.size += len(made)
         return made
 
     def begin(self) -> bytes:
         """Return the first bytes."""
-        return self._placed(MAGIC, record(HEADER, self._head))
+        return self._counted(MAGIC, record(HEADER, self._head))
 
     def chunk(self, chunk: Chunk, changed: Sequence[tuple[Entry, bytes | None]] | None) -> bytes:
-        """Return a chunk with its index, as it was or with what is left of it.
+        """Return a chunk with its index, as it was or with some of its messages.
 
-        changed: the messages that are left, with their data where these are others
+        changed: these messages, with their data where it is new
         """
         raw, body, entries = chunk.raw, chunk.stored, chunk.entries
         if changed is None and not chunk.is_same:
@@ -311,16 +314,16 @@ class McapWriter:
         """Return the records of channels, and of their schemas, that are not written yet."""
         pieces = []
         for number in channels:
-            schema, body = self.known.channels[number]
-            if schema and (SCHEMA, schema) not in self._said:
+            schema, body = self.registry.channels[number]
+            if schema and (SCHEMA, schema) not in self._written:
                 pieces.append(self._schema(schema))
-            if (CHANNEL, number) not in self._said:
+            if (CHANNEL, number) not in self._written:
                 pieces.append(self._channel(number, schema, body))
-            self._said |= {(SCHEMA, schema), (CHANNEL, number)}
-        return self._placed(*pieces)
+            self._written |= {(SCHEMA, schema), (CHANNEL, number)}
+        return self._counted(*pieces)
 
     def _schema(self, number: int) -> bytes:
-        return record(SCHEMA, struct.pack("<H", number), self.known.schemas[number])
+        return record(SCHEMA, struct.pack("<H", number), self.registry.schemas[number])
 
     @staticmethod
     def _channel(number: int, schema: int, body: bytes) -> bytes:
@@ -351,10 +354,10 @@ class McapWriter:
             struct.pack("<Q", at - begin - len(made[0])), sized(compression),
             struct.pack("<QQ", fields.number("Q"), size),
         )))  # fmt: skip
-        return self._placed(*made)
+        return self._counted(*made)
 
     def other(self, other: OtherRecord) -> bytes:
-        """Return another record, and find it in the summary."""
+        """Return another record, and add it to the index."""
         made = record(other.kind, other.body)
         place = struct.pack("<QQ", self.size, len(made))
         fields = _Reader(other.body)
@@ -366,20 +369,20 @@ class McapWriter:
             self._indexes[ATTACHMENT_INDEX].append(b"".join((place, times, size, sized(name), sized(media))))
         elif other.kind == METADATA:
             self._indexes[METADATA_INDEX].append(place + sized(fields.data()))
-        return self._placed(made)
+        return self._counted(made)
 
     def end(self) -> bytes:
         """Return the rest: channels without messages, the summary, and what closes the file."""
-        data = self._announced(*sorted(self.known.channels)) + self._placed(record(DATA_END, bytes(4)))
+        data = self._announced(*sorted(self.registry.channels)) + self._counted(record(DATA_END, bytes(4)))
         first, last = self.span or (0, 0)
         counts = b"".join(struct.pack("<HQ", *pair) for pair in sorted(self.counts.items()))
-        totals = len(self.known.schemas), len(self.known.channels), *map(len, (
+        totals = len(self.registry.schemas), len(self.registry.channels), *map(len, (
             self._indexes[ATTACHMENT_INDEX], self._indexes[METADATA_INDEX], self._indexes[CHUNK_INDEX],
         ))  # fmt: skip
         statistics = struct.pack("<QHIIIIQQ", sum(self.counts.values()), *totals, first, last) + sized(counts)
         groups = {
-            SCHEMA: [self._schema(number) for number in self.known.schemas],
-            CHANNEL: [self._channel(number, *each) for number, each in self.known.channels.items()],
+            SCHEMA: [self._schema(number) for number in self.registry.schemas],
+            CHANNEL: [self._channel(number, *each) for number, each in self.registry.channels.items()],
             **{kind: [record(kind, body) for body in bodies] for kind, bodies in self._indexes.items()},
             STATISTICS: [record(STATISTICS, statistics)],
         }
@@ -391,7 +394,7 @@ class McapWriter:
         summary = b"".join((*chain.from_iterable(groups.values()), *offsets))
         footer = _HEAD.pack(FOOTER, 20) + struct.pack("<QQ", begin, at)
         checksum = struct.pack("<I", crc32(summary + footer))
-        return data + self._placed(summary, footer, checksum, MAGIC)
+        return data + self._counted(summary, footer, checksum, MAGIC)
 
 
 def _span(entries: Sequence[Entry]) -> tuple[int, int]:

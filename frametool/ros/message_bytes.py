@@ -109,7 +109,7 @@ class MessageFields:
         return bytes(self.made + rest)
 
 
-class Said(NamedTuple):
+class RawTransform(NamedTuple):
     """A transform as it was recorded, unchecked; numbers: tx, ty, tz, x, y, z, w; stamp: seconds and nanoseconds."""
 
     parent: str
@@ -129,14 +129,14 @@ class Transforms:
         self.fields = MessageFields(data, ros1=ros1)
         self.names = 0, 0
 
-    def __iter__(self) -> Iterator[Said]:
+    def __iter__(self) -> Iterator[RawTransform]:
         """Yield each transform."""
         fields = self.fields
         for _ in range(fields.integer()):
             stamp, begin = fields.stamp(), fields.at
             parent, child = fields.text(), fields.text()
             self.names = begin, fields.at
-            yield Said(parent, child, fields.pose(), stamp)
+            yield RawTransform(parent, child, fields.pose(), stamp)
 
 
 @cache

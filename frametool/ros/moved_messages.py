@@ -1,6 +1,6 @@
-"""Messages of poses and points moved into another frame, each at its stamp; what is not given in a frame stays.
+"""Messages of poses and points moved into another frame, each at its stamp.
 
-The twist of an Odometry is given in its child's frame and stays; covariances are turned along.
+Covariances are turned along; the twist of an Odometry is given in its child's frame and stays.
 """
 
 from __future__ import annotations

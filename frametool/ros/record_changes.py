@@ -1,4 +1,4 @@
-"""What becomes of the messages of a recording that is copied, and what is found in it when it is read first."""
+"""Which messages of a recording are copied and how they are changed, and what is in it."""
 
 from __future__ import annotations
 
@@ -18,47 +18,47 @@ if TYPE_CHECKING:
 
 
 class RecordChanges:
-    """What becomes of the messages of a recording, by the numbers of their channels.
+    """The changes to the messages of a recording.
 
-    window: the first and the last log time of those that are left; kept: channels of which all are
-    change: what becomes of the messages of a channel
+    window: the first and the last log time that is copied; always: channels that are copied whole
+    change: makes the new messages of a channel
     """
 
     def __init__(self, window: tuple[int, int] | None = None) -> None:
-        """Begin with nothing but a window."""
+        """Begin with a window alone."""
         self.window = window
-        self.kept: set[int] = set()
+        self.always: set[int] = set()
         self.change: dict[int, Change] = {}
 
-    def of(self, chunk: Chunk) -> list[tuple[Entry, bytes | None]] | None:
-        """Return the messages that are left of a chunk, with their data where these are new; None: all of it."""
+    def apply(self, chunk: Chunk) -> list[tuple[Entry, bytes | None]] | None:
+        """Return the messages of a chunk that are copied, with their data where it is new; None if nothing changes."""
         if self.window is None and not any(entry[0] in self.change for entry in chunk.entries):
             return None
-        entries = [entry for entry in chunk.entries if self.takes(entry)]
-        left: list[tuple[Entry, bytes | None]] = []
+        entries = [entry for entry in chunk.entries if self.keeps(entry)]
+        copied: list[tuple[Entry, bytes | None]] = []
         is_other = len(entries) < len(chunk.entries)
         for entry in entries:
             change = self.change.get(entry[0])
             if change is None:
-                left.append((entry, None))
+                copied.append((entry, None))
                 continue
             data = chunk.raw[entry[3] : entry[4]]
             new = change(data, entry[1])
             is_other |= new is not data
             if new is not None:
-                left.append((entry, None if new is data else new))
-        return left if is_other else None
+                copied.append((entry, None if new is data else new))
+        return copied if is_other else None
 
-    def takes(self, entry: Entry) -> bool:
-        """Tell whether a message is left by its log time."""
-        return self.window is None or self.window[0] <= entry[1] <= self.window[1] or entry[0] in self.kept
+    def keeps(self, entry: Entry) -> bool:
+        """Tell whether a message is copied, by its log time."""
+        return self.window is None or self.window[0] <= entry[1] <= self.window[1] or entry[0] in self.always
 
 
 class RecordContents:
-    """What is found in a recording when it is read first.
+    """What is in a recording: how many messages, and when.
 
-    counts: of messages, by the numbers of their channels; span: the first and the last log time
-    inside, outside: how many are in the window, and are left outside of it; first_ns: the first log time that is left
+    counts: of messages by channel; span: the first and the last log time
+    inside, outside: how many are copied in the window and outside of it; first_ns: the first log time that is copied
     """
 
     def __init__(self, recording: CopiedRecording, changes: RecordChanges) -> None:
@@ -70,9 +70,9 @@ class RecordContents:
         self.first_ns: int | None = None
 
     def read(self, advance: Advance, see: Callable[[Channel, bytes], None] | None = None) -> None:
-        """Read it all; raises FormatError for what is not whole.
+        """Read it all; raises FormatError for a recording that is not whole.
 
-        see: takes every message of transforms, with its channel
+        see: is called with every message of transforms and its channel
         """
         channels: dict[int, Channel] = {}
         for piece in self.recording.pieces():
@@ -81,7 +81,7 @@ class RecordContents:
             counted = Counter(entry[0] for entry in piece.entries)
             if not counted.keys() <= channels.keys():
                 channels = self.recording.channels
-                self.changes.kept = {number for number, each in channels.items() if each.is_static}
+                self.changes.always = {number for number, each in channels.items() if each.is_static}
             self.counts += counted
             self._time(piece)
             if see is not None and any(channels[number].type in TYPES for number in counted):
@@ -91,14 +91,14 @@ class RecordContents:
             advance(len(piece.entries), len(piece.stored or piece.raw))
 
     def _time(self, chunk: Chunk) -> None:
-        """Take the log times of a chunk in."""
+        """Look at the log times of a chunk."""
         times = [entry[1] for entry in chunk.entries]
         first, last = self.span or (times[0], times[0])
         self.span = min(first, *times), max(last, *times)
         window = self.changes.window
         if window is not None:
             inside = sum(window[0] <= each <= window[1] for each in times)
-            times = [entry[1] for entry in chunk.entries if self.changes.takes(entry)]
+            times = [entry[1] for entry in chunk.entries if self.changes.keeps(entry)]
             self.inside += inside
             self.outside += len(times) - inside
         if times:

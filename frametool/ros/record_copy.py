@@ -1,6 +1,6 @@
 """A recording copied with something changed: messages are bytes, and all that nobody asked to change stays as it is.
 
-It is read twice: first for what there is and whether it is whole, then to be written.  No messages are kept.
+It is read twice: first to see what there is and whether it is whole, then to be written.  No messages are kept.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from frametool.ros.bag1_chunks import Bag1File, Bag1Writer
 from frametool.ros.bag2_folder import INFORMATION, DatabaseFile, files_of, metadata_of, read_metadata
 from frametool.ros.bags import broken, check_files, refuse_empty
 from frametool.ros.chunks import NO_EXTRA, Channel, Chunk, OtherRecord, zstd
-from frametool.ros.mcap_chunks import McapFile, McapWriter, Schemas, built, mapping, sized, texts_of
+from frametool.ros.mcap_chunks import ChannelRegistry, McapFile, McapWriter, built, mapping, sized, texts_of
 from frametool.ros.recordings import BAG1, BAG2, METADATA, NAME, PIECE, FirstPiece
 
 if TYPE_CHECKING:
@@ -37,14 +37,14 @@ class CopiedRecording:
     """A recording that is to be copied: its channels by their numbers, and its chunks as often as they are asked for.
 
     metadata: of a folder
-    known: of all but ROS 1 bags, the schemas and channels of the copy; connections: of a ROS 1 bag, those of the copy
+    registry: the schemas and channels of the copy; of a ROS 1 bag it has connections instead
     undefined: types of messages that it does not define, and whether ROS 2 Humble does
     """
 
     def __init__(self, path: str, form: str, files: Sequence[Path], metadata: dict[str, Any]) -> None:
         """Take the files of a recording; `opened_recording` finds them."""
         self.path, self.form, self.files, self.metadata = path, form, files, metadata
-        self.known = Schemas()
+        self.registry = ChannelRegistry()
         self.connections: dict[int, Connection] = {}
         self.head = b""
         self.undefined: dict[str, bool] = {}
@@ -60,7 +60,7 @@ class CopiedRecording:
         """Return the channels by their numbers, once all was read."""
         if self.is_ros1:
             return {number: bag1_chunks.channel_of(each) for number, each in self.connections.items()}
-        return {number: self.known.channel(number)[0] for number in self.known.channels}
+        return {number: self.registry.channel(number)[0] for number in self.registry.channels}
 
     def pieces(self) -> Iterator[Chunk | OtherRecord]:
         """Yield chunks and other records in their order; raises FormatError for a recording that is not whole."""
@@ -101,10 +101,10 @@ class CopiedRecording:
             return Bag1File(file, self.connections)
         storage = self.metadata.get("storage_identifier") or ("sqlite3" if self.form == BAG2 else "mcap")
         if storage == "sqlite3":
-            return DatabaseFile(file, self.known, self.undefined)
+            return DatabaseFile(file, self.registry, self.undefined)
         if storage != "mcap":
             raise ValueError(f"storage {storage!r} is not known")
-        return McapFile(file, self.known)
+        return McapFile(file, self.registry)
 
     def _inflated(self, chunk: Chunk) -> Chunk:
         """Unpack the messages of a folder in which each is packed by itself."""
@@ -148,14 +148,14 @@ def copied(
         yield from _bag(recording, changes, added, first_ns, folder, advance)
         return
     with broken(recording.path):
-        writer = McapWriter(recording.known, recording.head)
+        writer = McapWriter(recording.registry, recording.head)
         first = writer.begin()
         yield FirstPiece(first, FILE) if form == BAG2 else first
         yield writer.chunk(_chunk_of(added, first_ns, mcap_chunks.message), None)
         itself = []
         for piece in recording.pieces():
             if isinstance(piece, Chunk):
-                yield writer.chunk(piece, changes.of(piece))
+                yield writer.chunk(piece, changes.apply(piece))
                 advance(len(piece.entries), len(piece.stored or piece.raw))
             elif piece.kind == mcap_chunks.METADATA and piece.body.startswith(SELF):
                 itself.append(piece)
@@ -195,7 +195,7 @@ def _bag(
         file.write(writer.chunk(_chunk_of(added, first_ns, bag1_chunks.message), None))
         for piece in recording.pieces():
             if isinstance(piece, Chunk):
-                file.write(writer.chunk(piece, changes.of(piece)))
+                file.write(writer.chunk(piece, changes.apply(piece)))
                 advance(len(piece.entries), len(piece.stored or piece.raw))
         index, first = writer.end()
         file.write(index)

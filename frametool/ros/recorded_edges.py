@@ -1,6 +1,6 @@
-"""The transforms of a recording as a copy needs them: which edges there are, and how they get along with others.
+"""The edges of a recording, and whether those of a tree can be added to them.
 
-Every message of transforms is looked at, and of each edge only what it was first is kept: memory does not grow.
+Of each edge only its first values are kept, and whether others follow: memory does not grow with the recording.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.ros.message_bytes import Said
+    from frametool.ros.message_bytes import RawTransform
 
 SAME = 1e-12  # metres, of positions a metre long, and radians: what composing and writing numbers leaves
 STATIC = "tf_static"
@@ -27,7 +27,7 @@ MOST_NAMED = 8  # edges
 
 
 class RecordedEdge:
-    """What a recording says of one frame: the topics it comes by, its parents, its numbers, and whether they change."""
+    """What a recording says of one frame: its parents, its topics, its first values, and whether others follow."""
 
     __slots__ = ("is_static", "numbers", "parents", "topics", "varies")
 
@@ -40,7 +40,7 @@ class RecordedEdge:
 
     @property
     def moves(self) -> bool:
-        """Tell whether it is another one at other times."""
+        """Tell whether the frame moves."""
         return self.varies and not self.is_static
 
 
@@ -56,8 +56,8 @@ class AddedEdge(NamedTuple):
         return f"{bare(self.parent)} -> {bare(self.child)}"
 
 
-class Planned(NamedTuple):
-    """What becomes of edges that are to be in a recording."""
+class EdgePlan(NamedTuple):
+    """The edges of a tree, by what is done with them in a recording that has them with the same values or others."""
 
     added: list[AddedEdge]
     same: list[AddedEdge]
@@ -78,7 +78,7 @@ class RecordedEdges:
         self._topic_of: dict[str, str] = {}  # frame -> the topic by which it came first
 
     def add(self, topic: str, data: bytes) -> None:
-        """Take the transforms of a message in; raises ValueInvalid for one that is none."""
+        """Add the transforms of a message; raises ValueInvalid if it cannot be read."""
         known = self._alike.get((topic, len(data)), [(0, 0, b".")])
         if all(data[begin:end] == text for begin, end, text in known):
             return  # most messages say nothing new
@@ -90,8 +90,8 @@ class RecordedEdges:
         message.fields.whole()
         self._alike[topic, len(data)] = found
 
-    def _added(self, topic: str, transform: Said) -> RecordedEdge:
-        """Take a transform in."""
+    def _added(self, topic: str, transform: RawTransform) -> RecordedEdge:
+        """Add a transform and return its edge."""
         parent, child, numbers = self.bare(transform.parent), self.bare(transform.child), transform.numbers
         edge = self.known.get(child)
         if edge is None:
@@ -123,14 +123,14 @@ class RecordedEdges:
         topic = next((self._topic_of[frame] for frame in line if frame in self._topic_of), "/tf")
         return f"{topic.rpartition('/')[0]}/{STATIC}"
 
-    def planned(self, tree: Frames, *, replace: bool) -> Planned:
-        """Say which edges of a tree are missing, and which are there, with the same values or with others.
+    def plan(self, tree: Frames, *, replace: bool) -> EdgePlan:
+        """Sort the edges of a tree: missing here, there with the same values, or there with others.
 
-        replace: those with others are to be replaced
-        Raises BadTopology for what does not fit: a frame that moves, in either of the two, another parent, a cycle,
-        and other values where nothing is to be replaced.
+        replace: the last may be there
+        Raises BadTopology for a frame that moves here or there, has another parent or would hang below itself, and for
+        other values without `replace`.
         """
-        found = Planned([], [], [])
+        found = EdgePlan([], [], [])
         for track in tree.tracks():
             child, parent = (self._called(frame) for frame in (track.child, track.parent))
             if not track.standing:
@@ -149,7 +149,7 @@ class RecordedEdges:
         return found
 
     def _called(self, frame: str) -> str:
-        """Return what a frame is called here: the Earth's has two names."""
+        """Return the name of a frame here: the Earth's has two."""
         if frame in EARTH_FRAMES and frame not in self._topic_of:
             return next((other for other in EARTH_FRAMES if other in self._topic_of), frame)
         return frame

@@ -1,4 +1,4 @@
-"""A recording with something changed: which edges come in, which messages move, what is left out, and what is told."""
+"""One copy of a recording: which edges are added or replaced, which messages move, and what is reported."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from frametool.ros.message_bytes import Transforms
 from frametool.ros.moved_messages import MOVED_TYPES, MessageMover
 from frametool.ros.record_changes import RecordChanges, RecordContents
 from frametool.ros.record_copy import copied
-from frametool.ros.recorded_edges import MOST_NAMED, STATIC, Planned, RecordedEdges, replaced
+from frametool.ros.recorded_edges import MOST_NAMED, STATIC, EdgePlan, RecordedEdges, replaced
 from frametool.ros.recordings import SECONDS_ROS2
 from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
 
@@ -45,11 +45,11 @@ LAST_STAMP = SECONDS_ROS2[1] * BILLION
 class RecordRequest(NamedTuple):
     """What is to be changed in a recording.
 
-    tree: whose edges are to be in it; replace: also where it has them with other values
-    into: the frame that the messages of some topics are moved into; topics: these, and those of transforms that count
-    window: the first and the last log time of what is left
-    on_error: STOP or SKIP, for messages that cannot be moved; tell: takes why
-    normalize: any non-zero quaternion is taken
+    tree: its edges are added; replace: they replace edges with other values
+    into: the frame that messages are moved into; topics: of these messages, and of the transforms that are used
+    window: the first and the last log time that is copied
+    on_error: STOP or SKIP, at a message that cannot be moved; report: is called with the reason
+    normalize: take any non-zero quaternion
     """
 
     tree: Frames | None = None
@@ -58,74 +58,74 @@ class RecordRequest(NamedTuple):
     topics: tuple[str, ...] = ()
     window: tuple[int, int] | None = None
     on_error: str = STOP
-    tell: Callable[[FrametoolError], None] = lambda _error: None
+    report: Callable[[FrametoolError], None] = lambda _error: None
     normalize: bool = False
 
 
 class RecordRun:
-    """One copy: `look` at the recording, then write its `pieces`; `told` and `finish` say what was done."""
+    """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done."""
 
-    def __init__(self, recording: CopiedRecording, asked: RecordRequest) -> None:
-        """Begin before the first look."""
-        self.recording, self.asked = recording, asked
-        self.changes = RecordChanges(asked.window)
+    def __init__(self, recording: CopiedRecording, request: RecordRequest) -> None:
+        """Begin with a recording that is not read yet."""
+        self.recording, self.request = recording, request
+        self.changes = RecordChanges(request.window)
         self.contents = RecordContents(recording, self.changes)
         self.edges = RecordedEdges(recording.path, ros1=recording.is_ros1)
-        self.planned = Planned([], [], [])
+        self.plan = EdgePlan([], [], [])
         self.added: dict[str, list[AddedEdge]] = {}  # by the topics they come on
-        self.transforms = {topic for topic in asked.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
+        self.transform_topics = {topic for topic in request.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
         self.mover: MessageMover | None = None
         self.moved: dict[str, int] = {}  # topic -> how many of its messages were looked at
         self.unmoved = self.skipped = self.rewritten = 0
 
     def look(self, advance: Advance) -> None:
-        """Read the recording once, and find out what is to be done.
+        """Read the recording once, and check that it can be changed as requested.
 
         Raises FormatError for a recording that is not whole and a topic that cannot be moved, BadTopology for edges
         that do not fit, LookupFailed for a frame that is not there and a window without messages.
         """
-        asked = self.asked
-        self.contents.read(advance, self._see if asked.tree is not None else None)
+        request = self.request
+        self.contents.read(advance, self._collect_edges if request.tree is not None else None)
         channels = self.recording.channels
         self._check_topics(channels)
-        if asked.window and not self.contents.inside:
-            raise NoDataAt(self._empty(asked.window))
-        if asked.tree is not None or asked.into:
+        if request.window and not self.contents.inside:
+            raise NoDataAt(self._empty(request.window))
+        if request.tree is not None or request.into:
             self._refuse_others(channels)
-        if asked.tree is not None:
-            self.planned = self.edges.planned(asked.tree, replace=asked.replace)
-            for edge in self.planned.added:
-                self.added.setdefault(self.edges.topic_for(edge, self.planned.added), []).append(edge)
+        if request.tree is not None:
+            self.plan = self.edges.plan(request.tree, replace=request.replace)
+            for edge in self.plan.added:
+                self.added.setdefault(self.edges.topic_for(edge, self.plan.added), []).append(edge)
         changes = self.changes.change
-        if self.planned.replaced:
+        if self.plan.replaced:
             change = self._replacer()
-            changes |= {number: change for number, each in channels.items() if self._counts(each)}
-        if asked.into:
-            ros1, normalize = self.recording.is_ros1, asked.normalize
-            self.mover = mover = MessageMover(self._frames(), asked.into, ros1=ros1, normalize=normalize)
+            changes |= {number: change for number, each in channels.items() if self._is_used(each)}
+        if request.into:
+            ros1, normalize = self.recording.is_ros1, request.normalize
+            self.mover = mover = MessageMover(self._frames(), request.into, ros1=ros1, normalize=normalize)
             named = {number: each for number, each in channels.items() if self._is_named(each)}
             changes |= {number: self._moving(each, mover) for number, each in named.items()}
 
-    def _counts(self, channel: Channel) -> bool:
-        """Tell whether a channel is one of transforms that count: all, or those of the topics that are named."""
-        return channel.type in TYPES and (not self.transforms or _is_among(channel.topic, self.transforms))
+    def _is_used(self, channel: Channel) -> bool:
+        """Tell whether the transforms of a channel are used: those of the topics that are named, or all."""
+        return channel.type in TYPES and (not self.transform_topics or _is_among(channel.topic, self.transform_topics))
 
     def _is_named(self, channel: Channel) -> bool:
         """Tell whether the messages of a channel are to be moved."""
-        return _is_among(channel.topic, {*self.asked.topics} - self.transforms)
+        return _is_among(channel.topic, {*self.request.topics} - self.transform_topics)
 
-    def _see(self, channel: Channel, data: bytes) -> None:
-        """Take a message of transforms in."""
-        if not self._counts(channel):
+    def _collect_edges(self, channel: Channel, data: bytes) -> None:
+        """Collect the edges of a message of transforms."""
+        if not self._is_used(channel):
             return
         with _on_topic(channel.topic, self.recording.path):
             self.edges.add(channel.topic, data)
 
     def _check_topics(self, channels: dict[int, Channel]) -> None:
-        """Raise FormatError for a topic that is not there or holds what does not move, Misused for one of no use."""
-        path, into = self.recording.path, self.asked.into
+        """Raise FormatError for a topic that is not there or cannot be moved, Misused where none is to be moved."""
+        path, into = self.recording.path, self.request.into
         known = {channel.topic for channel in channels.values()}
-        for topic in self.asked.topics:
+        for topic in self.request.topics:
             if not _is_among(topic, known):
                 raise FormatError(f"no topic {topic}{alternatives(topic, known, 'topics')}", source=path)
         named = [channel for channel in channels.values() if self._is_named(channel)]
@@ -138,7 +138,7 @@ class RecordRun:
             raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=path)
 
     def _refuse_others(self, channels: dict[int, Channel]) -> None:
-        """Raise FormatError for transforms that are not read here, and so would not count."""
+        """Raise FormatError for transforms that cannot be read here, as protobuf's."""
         for topic, kind, encoding in channels.values():
             if kind.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
                 raise FormatError(f"{topic} holds {kind}: no transforms of recordings", source=self.recording.path)
@@ -152,17 +152,17 @@ class RecordRun:
         return f"{self.recording.path}: no messages from {' to '.join(map(format_stamp, window))}; {there}"
 
     def _frames(self) -> Frames:
-        """Return the transforms of the recording as they are in the copy, all over time."""
-        more = [*self.planned.added, *self.planned.replaced]
+        """Return all transforms as they are in the copy."""
+        more = [*self.plan.added, *self.plan.replaced]
         channels = self.recording.channels
-        if not more and not any(self.contents.counts[number] for number in channels if self._counts(channels[number])):
+        if not more and not any(self.contents.counts[number] for number in channels if self._is_used(channels[number])):
             raise FormatError("no transforms in it; --with FILE brings some", source=self.recording.path)
-        source = TransformsOfCopy(self.recording, self.transforms, more)
-        return load_sources([source], Rules(normalize=self.asked.normalize))
+        source = TransformsOfCopy(self.recording, self.transform_topics, more)
+        return load_sources([source], Rules(normalize=self.request.normalize))
 
     def _replacer(self) -> Change:
-        """Return what puts other values into messages of transforms."""
-        edges = {edge.child: edge for edge in self.planned.replaced}
+        """Return a function that puts the new values into messages of transforms."""
+        edges = {edge.child: edge for edge in self.plan.replaced}
         names = [child.encode() for child in edges]
 
         def change(data: bytes, _log_ns: int) -> bytes:
@@ -175,7 +175,7 @@ class RecordRun:
         return change
 
     def _moving(self, channel: Channel, mover: MessageMover) -> Change:
-        """Return what moves the messages of a channel; one that cannot be moved is an error, or left out."""
+        """Return a function that moves the messages of a channel; one that cannot be moved is an error, or left out."""
 
         def change(data: bytes, _log_ns: int) -> bytes | None:
             number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
@@ -183,13 +183,13 @@ class RecordRun:
                 new = mover.moved(channel.type, data)
             except (LookupFailed, ValueInvalid) as error:
                 stamp = "" if mover.place is None else f", stamp {format_stamp(mover.place.stamp_ns)}"
-                fate = " (message skipped)" if self.asked.on_error == SKIP else ""
+                fate = " (message skipped)" if self.request.on_error == SKIP else ""
                 error.args = (f"{self.recording.path}: message {number} on {channel.topic}{stamp}: {error}{fate}",)
                 if not fate:
                     raise
                 self.skipped += 1
                 if self.skipped <= MOST:
-                    self.asked.tell(error)
+                    self.request.report(error)
                 return None
             self.unmoved += new is data
             return new
@@ -202,24 +202,24 @@ class RecordRun:
         added = added_messages(self.recording, self.added, first_ns if first_ns < LAST_STAMP else 0)
         yield from copied(self.recording, self.changes, added, first_ns, form, folder, advance)
 
-    def told(self) -> Iterator[str]:
-        """Yield a sentence for each thing that was done, or that was not needed."""
+    def summary(self) -> Iterator[str]:
+        """Yield a sentence for each thing that was done or not needed."""
         for topic, edges in self.added.items():
             yield f"added on {topic}: {_listed(edges)}"
-        if self.planned.replaced:
-            yield f"replaced in {_count(self.rewritten)}: {_listed(self.planned.replaced)}"
-        if self.planned.same:
-            yield f"there already with the same values: {_listed(self.planned.same)}"
+        if self.plan.replaced:
+            yield f"replaced in {_count(self.rewritten)}: {_listed(self.plan.replaced)}"
+        if self.plan.same:
+            yield f"there already with the same values: {_listed(self.plan.same)}"
         if self.moved:
-            total = sum(self.moved.values())
+            count, topics = sum(self.moved.values()) - self.skipped, first_of([*self.moved], MOST_NAMED)
             stayed = f", {self.unmoved} of them were in it" if self.unmoved else ""
-            yield f"{_count(total - self.skipped)} in {self.asked.into} ({first_of([*self.moved], MOST_NAMED)}){stayed}"
+            yield f"{_count(count)} in {self.request.into} ({topics}){stayed}"
         if self.contents.outside:
             yield f"kept outside of --between: {_count(self.contents.outside)} on {STATIC}"
-        for is_usual, said in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
+        for is_usual, how in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
             if kinds := sorted(kind for kind, usual in self.recording.undefined.items() if usual is is_usual):
-                yield f"types that it does not define are {said}: {first_of(kinds, MOST_NAMED)}"
-        if not (self.added or self.rewritten or self.moved or self.asked.window):
+                yield f"types that it does not define are {how}: {first_of(kinds, MOST_NAMED)}"
+        if not (self.added or self.rewritten or self.moved or self.request.window):
             yield f"nothing is changed: {_count(sum(self.contents.counts.values()))} copied"
 
     def remarks(self) -> Iterator[Remark]:
@@ -234,7 +234,7 @@ class RecordRun:
         total = sum(self.moved.values())
         more = f", {self.skipped - MOST} of them not shown" if self.skipped > MOST else ""
         message = f"{self.recording.path}: {self.skipped} of {total} messages skipped{more}"
-        self.asked.tell(RowsSkipped(message, source=self.recording.path, bad=self.skipped, messages=total))
+        self.request.report(RowsSkipped(message, source=self.recording.path, bad=self.skipped, messages=total))
         return ROWS_SKIPPED
 
 

@@ -96,13 +96,13 @@ def command(
     tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
-    asked = RecordRequest(
+    request = RecordRequest(
         edges, replace=replace, into=_bare(into or ""), topics=topics, window=between, on_error=on_error,
-        tell=lambda error: say_error(error, in_json=False), normalize=normalize,
+        report=lambda error: say_error(error, in_json=False), normalize=normalize,
     )  # fmt: skip
     quiet = settings().quiet
     with opened_recording(path, form, tally) as opened:
-        run = RecordRun(opened, asked)
+        run = RecordRun(opened, request)
         with ProgressBar(2 * opened.size, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
             with opened_place(copy, place, force=force) as write:
@@ -110,7 +110,7 @@ def command(
                     write(piece)
     for remark in (*tally.told(), *run.remarks()):
         warn(f"{path}: {remark.message}", rule=remark.rule)
-    for sentence in () if quiet else run.told():
+    for sentence in () if quiet else run.summary():
         say(f"{path}: {sentence}")
     return run.finish()
 
