@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import shutil
 import struct
 from pathlib import Path
@@ -269,6 +270,38 @@ def test_a_bag_keeps_equal_connections_apart_and_all_their_fields(tmp_path: Path
         assert new.read_bytes().count(field) >= 4
 
 
+def test_a_bag_may_order_the_fields_of_heads_in_any_way(tmp_path: Path, run: Run) -> None:
+    """As rosbag of C++ and of Python do, which sort them and do not; half of the messages are turned around here."""
+    path = recording(tmp_path, "bag")
+    data = path.read_bytes()
+    head = re.compile(rb"(\x04\0\0\0op=\x02)(\x09\0\0\0conn=.{4})(\x0d\0\0\0time=.{8})", re.DOTALL)
+    heads = iter(range(10**6))
+    path.write_bytes(head.sub(lambda found: found[3] + found[2] + found[1] if next(heads) % 2 else found[2] + found[1] + found[3], data))
+    assert path.read_bytes() != data
+    done, new = record(run, path, "--between", "1700000001,1700000002", form="bag")
+    assert done.status == 0, done.err
+    assert read(new) == [each for each in read(path) if START + SECOND <= each.log_ns <= START + 2 * SECOND or each.topic == "/tf_static"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (b"index_pos=", b"index_pos=\0\0\0\0\0\0\0\0", "ValueError: it was not closed; `rosbag reindex` mends it"),
+        (b"#ROSBAG V2.0\n", b"#ROSBAG V2.0 ", "ValueError: it does not begin as bags of version 2.0 do"),
+    ],
+)
+def test_a_bag_that_is_not_closed_or_of_another_version_says_so(old: bytes, new: bytes, said: str, tmp_path: Path, run: Run) -> None:
+    path = recording(tmp_path, "bag")
+    data = path.read_bytes()
+    at = data.index(old)
+    path.write_bytes(data[:at] + new + data[at + len(new) :])
+    done = run("record", str(path), "-o", "new.bag")
+    if old.startswith(b"#"):
+        assert done.status != 0  # it is no bag at all then
+    else:
+        assert done.err == f"frametool: {path}: the bag cannot be read; is it whole, and its suffix right? ({said})\n"
+
+
 # --- what only MCAP holds ------------------------------------------------------------------------------------------
 
 
@@ -335,6 +368,28 @@ def test_a_chunk_that_does_not_change_stays_as_it_is_packed(run: Run, tmp_path: 
         size = 9 + int.from_bytes(data[at + 1 : at + 9], "little")
         assert data[at] != 6 or data[at : at + size] in new
         at += size
+
+
+def test_what_rosbag2_says_of_a_file_in_it_is_brought_up_to_date(run: Run, tmp_path: Path) -> None:
+    path = recording(tmp_path, "mcap")
+    before = by_hand.McapContents(path.read_bytes()).others
+    for arguments, is_same in (((), True), (("--between", "1700000001,1700000002"), False)):
+        done = run("record", str(path), *arguments, "-o", "new.mcap", "--force")
+        assert done.status == 0, done.err
+        ((kind, body),) = after = by_hand.McapContents((tmp_path / "new.mcap").read_bytes()).others
+        assert (after == before) is is_same
+        assert kind == 12
+        count = len(read(tmp_path / "new.mcap"))
+        assert re.findall(rb"\nmessage_count: (\d+)\n", body) == [str(count).encode()]
+
+
+def test_a_count_in_the_summary_that_is_not_that_of_messages_is_an_error(run: Run, tmp_path: Path) -> None:
+    path = recording(tmp_path, "mcap")
+    data, count = path.read_bytes(), len(read(path))
+    at = data.rindex(b"\x0b" + struct.pack("<Q", 46 + 10 * 6) + struct.pack("<Q", count))
+    path.write_bytes(data[: at + 9] + struct.pack("<Q", count + 1) + data[at + 17 :])
+    done = run("record", str(path), "-o", "new.mcap")
+    assert (done.status, done.err) == (1, f"frametool: {path}: the bag is damaged: {count} of {count + 1} messages are there\n")
 
 
 def test_files_of_a_folder_are_joined_whatever_numbers_they_use(run: Run, tmp_path: Path) -> None:
