@@ -144,6 +144,7 @@ def loaded_by(*arguments: str, stdin: str = "") -> set[str]:
         (["convert", "--from", "lla", "48.1", "11.5", "520", "--to", "ecef,utm"], "", {"numpy", "rich", "yaml"}),
         (["convert", '{"lat": 48.1, "lon": 11.5, "alt": 1, "axes": "enu", "rpy": [0, 0, 1]}'], "", {"numpy", "rich"}),
         (["lookup", "examples/site.yaml", "map", "plane"], "", {"numpy", "rich"}),
+        (["record", "--help"], "", {"numpy", "rich", "yaml", "rosbags"}),
         (["apply", "examples/site.yaml", "map", "--from", "lla", "48.1", "11.5", "520"], "", {"numpy", "rich"}),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",

@@ -142,7 +142,8 @@ def test_a_folder_without_a_suffix_is_a_bag_of_ros2_again(folder: Path, run: Run
     assert done.status == 0
     assert sorted(each.name for each in (folder / "again").iterdir()) == ["metadata.yaml", "recording.mcap"]
     assert run("record", str(folder / "sqlite"), "-o", "again", "--force").status == 0
-    assert run("record", str(folder / "sqlite"), "-o", "again").status == 5
+    done = run("record", str(folder / "sqlite"), "--between", "1,2", "-o", "again")  # before anything is read
+    assert (done.status, done.err) == (5, "frametool: again: exists; give --force to replace it\n")
 
 
 def test_transforms_that_are_not_read_are_not_passed_over(run: Run, tmp_path: Path) -> None:

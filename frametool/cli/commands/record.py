@@ -9,7 +9,6 @@ import click
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FILE, LIMIT, TEXT, Command, Text, pose_options, reading_options, verbose_option
 from frametool.cli.recording import copied_as, folder_of, opened_place, refuse_input
-from frametool.cli.sink import refuse_existing
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
 from frametool.errors import FileProblem, FormatError, shown, warn
@@ -92,7 +91,6 @@ def command(
     form = _form_of(path)
     copy, place = copied_as(form, path, output, format_name)
     refuse_input(place, (path, *more))
-    refuse_existing(place, force=force)
     tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
@@ -101,13 +99,12 @@ def command(
         report=lambda error: say_error(error, in_json=False), normalize=normalize,
     )  # fmt: skip
     quiet = settings().quiet
-    with opened_recording(path, form, tally) as opened:
+    with opened_place(copy, place, force=force) as write, opened_recording(path, form, tally) as opened:
         run = RecordRun(opened, request)
         with ProgressBar(2 * opened.size, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
-            with opened_place(copy, place, force=force) as write:
-                for piece in run.pieces(copy, folder_of(place), progress.advance):
-                    write(piece)
+            for piece in run.pieces(copy, folder_of(place), progress.advance):
+                write(piece)
     for remark in (*tally.told(), *run.remarks()):
         warn(f"{path}: {remark.message}", rule=remark.rule)
     for sentence in () if quiet else run.summary():
