@@ -174,3 +174,9 @@ def test_frames_complete_from_the_recording(folder: Path) -> None:
     complete = ShellComplete(group, {}, "frametool", "_FRAMETOOL_COMPLETE")
     found = complete.get_completions(["record", str(folder / "run.mcap"), "--into"], "")
     assert [each.value for each in found] == ["map", "base"]
+
+
+def test_a_dot_is_the_tree_of_the_environment(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FRAMETOOL_TREE", "tree.yaml")
+    done = run("record", str(folder / "run.mcap"), "--with", ".", "-o", "new.mcap")
+    assert (done.status, done.err) == (0, f"frametool: {folder / 'run.mcap'}: added on /tf_static: base -> camera\n")

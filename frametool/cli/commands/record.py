@@ -90,7 +90,7 @@ def command(
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
     form = _form_of(path)
     copy, place = copied_as(form, path, output, format_name)
-    refuse_input(place, (path, *more))
+    refuse_input(place, (path, *map(tree_file, more)))
     tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
