@@ -51,6 +51,7 @@ class ArrowFile(ColumnFile):
     """A file that was opened: its schema is read, its rows are not."""
 
     gaps = False
+    source: Any  # what pyarrow reads
 
     def __init__(self, file: InputFile, form: str) -> None:
         """Read the schema; raises FormatError."""
@@ -75,10 +76,11 @@ class ArrowFile(ColumnFile):
         raise NotImplementedError
 
     def batches(self) -> Iterator[ArrowBatch]:
-        """Yield the rows; raises FormatError where the file is broken."""
-        for batch in self.read():
-            yield batch
-            batch.rows = None  # they keep their whole group in memory
+        """Yield the rows, and close the file behind them; raises FormatError where it is broken."""
+        with self.source:  # a thread of pyarrow may hold it longer than its reader
+            for batch in self.read():
+                yield batch
+                batch.rows = None  # they keep their whole group in memory
 
     def guarded(self, found: Iterator[Any]) -> Iterator[Any]:
         """Yield what pyarrow reads; raises FormatError where the file is broken."""
@@ -210,9 +212,11 @@ class IpcFile(ArrowFile):
         ipc = require_pyarrow(self.name, "ipc")
         self.codec = codec_in(file.head()[BODY_AT if self.form == "arrow" else 0 :])
         if self.form == "arrow":
-            self.reader = ipc.open_file(self.random_access(file))
+            self.source = self.random_access(file)
+            self.reader = ipc.open_file(self.source)
         else:
-            self.reader = ipc.open_stream(require_pyarrow(self.name).PythonFile(file.stream, mode="r"))
+            self.source = require_pyarrow(self.name).PythonFile(file.stream, mode="r")
+            self.reader = ipc.open_stream(self.source)
         return self.reader.schema
 
     def encoding(self) -> dict[str, Any]:
