@@ -295,11 +295,7 @@ class Output:
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
-        if is_folder(self.style.form) and self.path is not None:
-            from frametool.cli.folder_sink import filling
-
-            return filling(self.path, force=self.force)
-        return writing(self.path, force=self.force)
+        return opened_place(self.style.form, self.path, force=self.force)
 
     def _tell_of_suffix(self) -> None:
         """Say what a file holds whose suffix stands for no form, where none was told."""
@@ -358,6 +354,15 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
         instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
         raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
     return children[0]
+
+
+def opened_place(form: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
+    """Open the place where results of a form go."""
+    if is_folder(form) and path is not None:
+        from frametool.cli.folder_sink import filling
+
+        return filling(path, force=force)
+    return writing(path, force=force)
 
 
 PICTURES = (".svg", ".html", ".png")

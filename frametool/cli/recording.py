@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING
 from click import UsageError
 
 from frametool.cli.group import settings
-from frametool.cli.sink import writing
 from frametool.errors import FileProblem, printable, shown
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.grammar.result import Recorded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from contextlib import AbstractContextManager
-
-    from frametool.cli.sink import Write
 
 
 def recorded(form: str, output: str | None) -> Recorded:
@@ -75,12 +71,3 @@ def refuse_input(output: str, inputs: Iterable[str]) -> None:
             if os.path.isdir(outer) and inner.startswith(f"{outer}{os.sep}"):
                 inside = f"{printable(inner)} lies in {printable(outer)}"
                 raise FileProblem(f"{printable(output)}: {inside}; give another name")
-
-
-def opened_place(form: str, place: str, *, force: bool) -> AbstractContextManager[Write]:
-    """Open the place where a recording is written."""
-    if is_folder(form):
-        from frametool.cli.folder_sink import filling
-
-        return filling(place, force=force)
-    return writing(place, force=force)

@@ -130,7 +130,7 @@ def unnamed_beside(place: str, mode: int) -> BinaryIO | None:
 
 
 def give_name(stream: BinaryIO, name: str) -> None:
-    """Give a file that has none a name; raises FileExistsError for one that is taken."""
+    """Name a file that has no name; raises FileExistsError for one that is taken."""
     number = stream.fileno()
     os.link(f"{OPEN_FILES}/{number}", name, src_dir_fd=number)  # any descriptor makes it follow that link
 

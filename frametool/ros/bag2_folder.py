@@ -15,7 +15,7 @@ from frametool.documents.yaml_writer import dump
 from frametool.errors import FormatError, ValueInvalid
 from frametool.ros.chunks import FULL, Chunk, zstd
 from frametool.ros.mcap_chunks import MESSAGE_HEAD, mapping, message_head, sized
-from frametool.ros.recordings import BAG2, METADATA, typestore
+from frametool.ros.recordings import BAG2, METADATA, latched, typestore
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,19 +27,13 @@ if TYPE_CHECKING:
 INFORMATION = "rosbag2_bagfile_information"
 QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # what rosbag2 says of a channel of MCAP
 VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last that says policies by numbers
-# of a topic that is there for who comes late
-LATCHED = {"history": "keep_last", "depth": 1, "reliability": "reliable", "durability": "transient_local"}
-_POLICIES = ("keep_last", "reliable", "transient_local", "automatic")  # all of them 1, by numbers
-_FOR_EVER = {"sec": 9223372036, "nsec": 854775807}
 
 
 def latched_qos(*, by_numbers: bool) -> str:
     """Return the quality of service of a latched topic, as channels have it."""
-    profile: dict[str, Any] = {
-        **LATCHED, "deadline": _FOR_EVER, "lifespan": _FOR_EVER, "liveliness": "automatic",
-        "liveliness_lease_duration": _FOR_EVER, "avoid_ros_namespace_conventions": False,
-    }  # fmt: skip
-    return dump([{key: 1 if by_numbers and each in _POLICIES else each for key, each in profile.items()}])
+    from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
+
+    return str(dump_qos_v8([latched()])) if by_numbers else dump(dump_qos_v9([latched()]))
 
 
 def says_by_numbers(qos: str) -> bool:

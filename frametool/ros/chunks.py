@@ -9,12 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import FileProblem
+from frametool.ros.recordings import NO_EXTRA
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 FULL = 1 << 20  # bytes of messages that make a chunk where nobody else has made one
-NO_EXTRA = "recordings are copied with an extra; install it: pip install 'frametool[bag]'"
 
 # number of its channel, log time, and places in its chunk: where its record begins, where its data begin and end
 Entry: TypeAlias = tuple[int, int, int, int, int]

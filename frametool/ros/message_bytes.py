@@ -24,7 +24,7 @@ MOST_FILL = 3  # bytes behind the last field
 POSE = 7  # numbers
 
 
-class Place(NamedTuple):
+class MessageHeader(NamedTuple):
     """What a header says: in which frame and when."""
 
     frame: str
@@ -89,12 +89,12 @@ class MessageFields:
         except UnicodeDecodeError:
             raise ValueInvalid(f"{shown(raw)} is not UTF-8 text") from None
 
-    def header(self, frame: str | None = None) -> Place:
+    def header(self, frame: str | None = None) -> MessageHeader:
         """Take a header over, or with another frame in it, and return what it said."""
         seconds, nanoseconds = self.stamp()
         if problem := stamp_problem(seconds, nanoseconds, STAMPS[0]):
             raise problem
-        return Place(self.text(frame), seconds * BILLION + nanoseconds)
+        return MessageHeader(self.text(frame), seconds * BILLION + nanoseconds)
 
     def stamp(self) -> tuple[int, int]:
         """Take seconds and nanoseconds of a header over, and the counter that ROS 1 has before them."""

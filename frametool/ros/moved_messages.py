@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Tally
-from frametool.ros.message_bytes import MessageFields, Place
+from frametool.ros.message_bytes import MessageFields, MessageHeader
 from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ class MessageMover:
         self.frames, self.into = frames, frames.called(into)
         self.ros1, self.normalize = ros1, normalize
         self.tally = Tally()  # of names with a leading slash, and rough quaternions
-        self.place: Place | None = None  # of the message that was moved last, as far as it was read
-        self._last: tuple[Place, Rigid] | None = None
+        self.header: MessageHeader | None = None  # of the message that was moved last, as far as it was read
+        self._last: tuple[MessageHeader, Rigid] | None = None
         self._has_moved = False
 
     def moved(self, kind: str, data: bytes) -> bytes:
@@ -43,7 +43,7 @@ class MessageMover:
 
         Raises ValueInvalid for what cannot be read or is no pose, LookupFailed where no transform leads to the frame.
         """
-        self._has_moved, self.place = False, None
+        self._has_moved, self.header = False, None
         fields = MessageFields(data, ros1=self.ros1)
         MOVED_TYPES[kind](self, fields)
         made = fields.whole()
@@ -80,41 +80,41 @@ class MessageMover:
 
     def poses(self, fields: MessageFields) -> None:
         """Move a PoseArray."""
-        place = self._listed(fields)
+        header = self._listed(fields)
         for _ in range(fields.integer()):
-            self._pose(fields, self._pose_of(place))
+            self._pose(fields, self._pose_of(header))
 
     def path(self, fields: MessageFields) -> None:
         """Move a Path, each pose by its own header; what that leaves open is as the header of the path says."""
-        place = self._listed(fields)
+        header = self._listed(fields)
         for _ in range(fields.integer()):
             frame, stamp_ns = fields.header(self.into)
-            self._pose(fields, self._pose_of(Place(frame or place.frame, stamp_ns or place.stamp_ns)))
+            self._pose(fields, self._pose_of(MessageHeader(frame or header.frame, stamp_ns or header.stamp_ns)))
 
-    def _header(self, fields: MessageFields) -> Place:
+    def _header(self, fields: MessageFields) -> MessageHeader:
         """Take the header of the message over."""
-        self.place = fields.header(self.into)
-        return self.place
+        self.header = fields.header(self.into)
+        return self.header
 
-    def _listed(self, fields: MessageFields) -> Place:
+    def _listed(self, fields: MessageFields) -> MessageHeader:
         """Take the header of a list over, of which nothing may follow."""
-        place = self._header(fields)
-        self._has_moved = self._name(place) != self.into
-        return place
+        header = self._header(fields)
+        self._has_moved = self._name(header) != self.into
+        return header
 
-    def _name(self, place: Place) -> str:
-        return self.tally.names.bare(place.frame) if place.frame else ""
+    def _name(self, header: MessageHeader) -> str:
+        return self.tally.names.bare(header.frame) if header.frame else ""
 
-    def _pose_of(self, place: Place) -> Rigid | None:
-        """Return the pose that moves what is given at a place; None for what is in the frame already."""
-        name = self._name(place)
+    def _pose_of(self, header: MessageHeader) -> Rigid | None:
+        """Return the pose that moves what is given as a header says; None for what is in the frame already."""
+        name = self._name(header)
         if name == self.into:
             return None
         self._has_moved = True
         if not name:
             raise ValueInvalid("its header names no frame")
-        if self._last is None or self._last[0] != place:
-            self._last = place, self.frames.lookup_components(self.into, name, place.stamp_ns)
+        if self._last is None or self._last[0] != header:
+            self._last = header, self.frames.lookup_components(self.into, name, header.stamp_ns)
         return self._last[1]
 
     def _pose(self, fields: MessageFields, mover: Rigid | None) -> None:

@@ -16,9 +16,9 @@ from frametool.ros import bag1_chunks, mcap_chunks
 from frametool.ros.bag1_chunks import Bag1File, Bag1Writer
 from frametool.ros.bag2_folder import INFORMATION, DatabaseFile, files_of, metadata_of, read_metadata
 from frametool.ros.bags import broken, check_files, refuse_empty
-from frametool.ros.chunks import NO_EXTRA, Channel, Chunk, OtherRecord, zstd
+from frametool.ros.chunks import Channel, Chunk, OtherRecord, zstd
 from frametool.ros.mcap_chunks import ChannelRegistry, McapFile, McapWriter, built, mapping, sized, texts_of
-from frametool.ros.recordings import BAG1, BAG2, METADATA, NAME, PIECE, FirstPiece
+from frametool.ros.recordings import BAG1, BAG2, METADATA, NAME, NO_EXTRA, PIECE, FirstPiece
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence

@@ -37,7 +37,7 @@ BAG1, BAG2 = "bag1", "bag2"
 NAME = "recording"  # of the file in a bag2 folder, whatever that is called: two runs write the same bytes
 METADATA = "metadata.yaml"
 PIECE = 1 << 20  # bytes
-NO_EXTRA = "bags are written with an extra; install it: pip install 'frametool[bag]'"
+NO_EXTRA = "recordings are written with an extra; install it: pip install 'frametool[bag]'"
 SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; those of ROS 2 are int32
 SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
 
@@ -70,7 +70,7 @@ class FirstPiece(bytes):
     name: str
 
     def __new__(cls, piece: bytes, name: str) -> Self:
-        """Give a piece a name."""
+        """Take a piece and a name."""
         made = super().__new__(cls, piece)
         made.name = name
         return made
@@ -104,7 +104,7 @@ class RecordingFile:
         topic = topic or kind.topic
         if self.form == BAG1:
             return self._writer.add_connection(topic, kind.type, typestore=self._store, latching=int(kind.stays))
-        profiles = [_latched()] if kind.stays else []
+        profiles = [latched()] if kind.stays else []
         return self._writer.add_connection(topic, kind.type, typestore=self._store, offered_qos_profiles=profiles)
 
     def write(self, channel: Any, stamp_ns: int, message: bytes | memoryview) -> None:
@@ -146,7 +146,7 @@ def typestore(form: str) -> Any:
     return store
 
 
-def _latched() -> Any:
+def latched() -> Any:
     """Return what a topic offers that is there for who comes late."""
     from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 
@@ -202,7 +202,7 @@ def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
     return zip(*((frames, stamp, pose) for stamp, frames, pose in samples), strict=True)
 
 
-class Template:
+class MessageTemplate:
     """The bytes of a message about one frame, and where its stamp and numbers stand in them."""
 
     def __init__(self, kind: Kind, form: str, parent: str, child: str = "") -> None:

@@ -182,7 +182,7 @@ class RecordRun:
             try:
                 new = mover.moved(channel.type, data)
             except (LookupFailed, ValueInvalid) as error:
-                stamp = "" if mover.place is None else f", stamp {format_stamp(mover.place.stamp_ns)}"
+                stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header.stamp_ns)}"
                 fate = " (message skipped)" if self.request.on_error == SKIP else ""
                 error.args = (f"{self.recording.path}: message {number} on {channel.topic}{stamp}: {error}{fate}",)
                 if not fate:

@@ -10,7 +10,7 @@ from frametool.errors import ValueInvalid, first_of, listing, warn
 from frametool.formats.rows.pose_rows import MOST_NAMED
 from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.ros.recordings import KINDS, RecordingFile, Template, check_stamps, serialised
+from frametool.ros.recordings import KINDS, MessageTemplate, RecordingFile, check_stamps, serialised
 from frametool.stream.row_layout import AS_READ, POINT, POSE
 from frametool.stream.row_poses import plain_cells
 from frametool.stream.writers import refuse_scale_in
@@ -60,7 +60,7 @@ class RecordingWriter:
         self.file = RecordingFile(style.form, asked.folder)
         self.channels: dict[str, Any] = {}
         self.dropped = dict.fromkeys(extras)
-        self.templates: dict[tuple[str, str, str], Template] = {}
+        self.templates: dict[tuple[str, str, str], MessageTemplate] = {}
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
         self.is_named = True  # whether all rows say what they are seen from
@@ -176,10 +176,10 @@ class RecordingWriter:
             made |= zip(rows, self._template(name, *each).filled(stamps[rows], numbers[rows]), strict=True)
         return [made[row] for row in range(len(frames))]
 
-    def _template(self, name: str, parent: str, child: str) -> Template:
+    def _template(self, name: str, parent: str, child: str) -> MessageTemplate:
         key = (name, parent, child)
         if key not in self.templates:
-            self.templates[key] = Template(KINDS[name], self.style.form, parent, child)
+            self.templates[key] = MessageTemplate(KINDS[name], self.style.form, parent, child)
         return self.templates[key]
 
     def _write_path(self) -> None:

@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import ConnectionExtRosbag1, QosDurability, QosReliability
 
 from frametool.errors import ValueInvalid
-from frametool.ros.recordings import KINDS, Template, serialised
+from frametool.ros.recordings import KINDS, MessageTemplate, serialised
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,7 +101,7 @@ def test_bytes_that_are_filled_in_are_those_of_the_library(form: str, name: str,
     random = np.random.default_rng(1)
     kind = KINDS[name]
     numbers, stamps = random.normal(size=(5, kind.numbers)), np.array([0, 1, 10**9 - 1, 2**31 * 10**9 - 1, 5 * 10**9])
-    filled = Template(kind, form, parent, "child").filled(stamps, numbers)
+    filled = MessageTemplate(kind, form, parent, "child").filled(stamps, numbers)
     wanted = [serialised(kind, form, [(parent, "child")], [int(stamp)], [row]) for stamp, row in zip(stamps, numbers.tolist(), strict=True)]
     assert filled == wanted
 
@@ -249,7 +249,7 @@ def test_without_the_extra_it_is_named(run: Run, monkeypatch: pytest.MonkeyPatch
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rosbags", None)
     done = run("convert", "-i", "w.tum", "--quiet", "-o", "w.mcap", files={"w.tum": as_tum(*rows(2))})
-    assert (done.status, done.err) == (5, "frametool: bags are written with an extra; install it: pip install 'frametool[bag]'\n")
+    assert (done.status, done.err) == (5, "frametool: recordings are written with an extra; install it: pip install 'frametool[bag]'\n")
 
 
 @pytest.mark.parametrize("form", [*FORMS, "csv"])
@@ -268,4 +268,4 @@ def test_what_is_killed_while_it_writes_leaves_nothing(tmp_path: Path, form: str
 
 def test_a_name_that_is_no_text_is_refused() -> None:
     with pytest.raises(ValueInvalid, match="is no name that can be written"):
-        Template(KINDS["tf"], "mcap", "\udc80", "b")
+        MessageTemplate(KINDS["tf"], "mcap", "\udc80", "b")

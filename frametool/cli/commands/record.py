@@ -8,7 +8,8 @@ import click
 
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FILE, LIMIT, TEXT, Command, Text, pose_options, reading_options, verbose_option
-from frametool.cli.recording import copied_as, folder_of, opened_place, refuse_input
+from frametool.cli.output import opened_place
+from frametool.cli.recording import copied_as, folder_of, refuse_input
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
 from frametool.errors import FileProblem, FormatError, shown, warn
