@@ -346,7 +346,7 @@ class Stream:
 
     def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of records in another form than theirs."""
-        from frametool.stream.record_values import stream_results
+        from frametool.stream.record_results import stream_results
 
         self._jobs(f"records become {output.told} one after the other")
         if self.options["on_error"] == NULL and output.told not in ("csv", *RECORDS):

@@ -150,7 +150,7 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
         out.append(text[at : part.begin])
         at = part.after
         line = text.count(b"\n", 0, part.start)
-        template = attempt(text, part, form, request, source)
+        template = attempt(text, part, form, request, source, line)
         made = template if isinstance(template, (Fault, bytes)) else rendered(
             template, request, line, column_in(text, part.start)
         )

@@ -78,9 +78,11 @@ def null_of(record: bytes, *, json: bool) -> bytes:
     return (b"null" if text is None else text.encode()) + record[len(body) :]
 
 
-def attempt(text: bytes, part: Part, form: str, request: Request, source: str) -> Template | bytes | Fault:
-    """Learn from a record; return its text where nothing is in it, or say what is wrong; lines count from 0."""
-    line = text.count(b"\n", 0, part.start)
+def attempt(text: bytes, part: Part, form: str, request: Request, source: str, line: int) -> Template | bytes | Fault:
+    """Learn from a record; return its text where nothing is in it, or say what is wrong.
+
+    line: where the record begins, counted from 0
+    """
     if part.problem:
         return Fault(line, "", part.problem)
     record = text[part.start : part.end]

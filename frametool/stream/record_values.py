@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
 from frametool.documents.json import JSON_NUMBER, strict_json
-from frametool.documents.source import Source, Verbatim, decode
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, shown, warn
+from frametool.documents.source import Source, Verbatim
+from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.formats.table import has_no_text, is_recording
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Note, Reading, tell
-from frametool.grammar.result import NoResult, Result, with_entries
+from frametool.grammar.result import Result, with_entries
 from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
-from frametool.stream.record import STALE, placed, value_at
+from frametool.stream.record import placed, value_at
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_source import read_stamp
-from frametool.stream.template import cut, edits_of, filled
+from frametool.stream.template import cut, edits_of, filled, rest_of, used_keys
 from frametool.stream.text_parts import Const, Word
 
 if TYPE_CHECKING:
@@ -37,9 +37,7 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
     from frametool.stream.answers import Answer, Entry
-    from frametool.stream.faults import BadRows
     from frametool.stream.record import Record
-    from frametool.text.lines import ByteStream
 
     Value = Result | dict[str, Any]
 
@@ -47,7 +45,6 @@ MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message wit
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 SIX_BY_SIX = 36  # entries of the covariance of a pose
 MOST_TOLD = 3  # of what is odd by one rule in one text
-NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 
 
 def read_poses(source: Source, asked: Request) -> list[Pose]:
@@ -333,10 +330,10 @@ def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: 
     extras = _extras(made, request, 7) | _rest(node, unit, record)
     if request.operation.similar and isinstance(extras.get(SCALE), float):
         pose = pose._replace(scale=extras.pop(SCALE))
-    return Result(pose, _header_stamp(record) | _with_stamp_ns(extras, style.form))
+    return Result(pose, _header_stamp(record) | with_stamp_ns(extras, style.form))
 
 
-def _with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
+def with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
     """Read the stamp that a record says, in whole seconds and nanoseconds too, unless its form keeps it as it is.
 
     Raises ValueInvalid for what is no time.
@@ -374,37 +371,18 @@ def _read_stamp(key: str, value: Any) -> int:
     return read_stamp(str(value), in_ns=in_nanoseconds(key))
 
 
-def _used_keys(record: Record) -> set[str]:
-    """Return the keys of a record that say its pose, or what is no longer true of the result."""
-    halves = PARTS.get(record.shape.kind, ())
-    own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
-    return {*own, *halves, *NOT_PLAIN}
-
-
 def _says_no_more(record: Record, document: Document, unit: Path) -> bool:
     """Tell whether a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
     value = value_at(document.value, unit[1:])
     if record.path != unit or record.shape.kind != POSE or type(value) is not dict:
         return False
     names = {path[-1] for each in (record.name, record.parent) for path in each.paths if path[:-1] == unit}
-    return _used_keys(record).union(names).issuperset(value)
+    return used_keys(record).union(names).issuperset(value)
 
 
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     """Return what a record and the mappings around it say beside the pose, its frames and its stamp."""
-    used = _used_keys(record)
-    names = {path for each in (record.name, record.parent) for path in each.paths}
-    rest: dict[str, Any] = {}
-    for depth in range(len(unit), len(record.path) + 1):
-        path = record.path[:depth]
-        holder = node.at(path[len(unit) :])
-        if type(holder.value) is not dict:
-            continue
-        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
-        for key, (_, value) in holder.value.items():
-            if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
-                rest.setdefault(key, plain(value))
-    return rest
+    return {key: plain(value) for key, value in rest_of(node, unit, record).items()}
 
 
 def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, source: Source) -> dict[str, Any]:
@@ -426,7 +404,7 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, sou
     if is_recording(form) and request.operation.keeps_frames:
         holder = node.at(entry.record.path[len(unit) :])
         named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record, source)) else {}
-    rest = _with_stamp_ns(_rest(node, unit, entry.record), form)
+    rest = with_stamp_ns(_rest(node, unit, entry.record), form)
     return antenna | named | _header_stamp(entry.record) | beside | rest
 
 
@@ -475,70 +453,16 @@ def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) ->
         return found
     if node.quote or node.value is None:
         return node.value
-    if node.value in ("null", "~", ""):
+    return plain_scalar(node.value)
+
+
+def plain_scalar(text: str) -> str | Verbatim | None:
+    """Return a scalar without quotes as a plain value: numbers and truth values keep their text."""
+    if text in ("null", "~", ""):
         return None
-    is_plain = node.value in ("true", "false") or re.fullmatch(JSON_NUMBER, node.value)
-    return Verbatim(node.value) if is_plain else node.value
+    return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
 
 
 def _at(nodes: list[Node], path: Path) -> Node:
     """Return the node at a path that begins with the index of its document."""
     return nodes[int(path[0])].at(path[1:])
-
-
-def _no_result(record: bytes, form: str, style: Style) -> NoResult:
-    """Return what a bad record says beside its numbers; in a table those are empty cells under names of their own."""
-    from frametool.stream.template import nulled
-
-    try:
-        text = record.decode()
-        said = plain(parse_nodes(nulled(text, json=form == "json") or text)[0])
-    except (FormatError, UnicodeDecodeError, IndexError):
-        said = None
-    kept = said if type(said) is dict else {}
-    return NoResult(Pose(), {key: value for key, value in kept.items() if style.form != "csv" or _says(value)})
-
-
-def _says(value: Any) -> bool:
-    """Tell whether there is more than null in a value."""
-    inner = value.values() if type(value) is dict else value if type(value) is list else None
-    return value is not None if inner is None else any(map(_says, inner))
-
-
-def stream_results(
-    stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows
-) -> Iterator[Value]:
-    """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
-    from frametool.stream.faults import NULL, Fault
-    from frametool.stream.record_text import column_in, without_noise
-    from frametool.stream.run import tell_of_rounding
-    from frametool.stream.splitter import Splitter
-    from frametool.text.lines import read_blocks
-
-    splitter = Splitter(form)
-    line, rows = 1, 0
-    memory, teller = Memory(), Teller(most=1)
-    for block in read_blocks(stream, whole=splitter.whole):
-        for part in splitter.parts(block).parts:
-            rows += 1
-            at = line + block.count(b"\n", 0, part.start)
-            before = bad.count
-            if part.problem:
-                bad.take([Fault(at, "", part.problem)])
-            source = Source(bad.source, "", at)
-            try:
-                if not part.problem:
-                    text = decode(block[part.start : part.end], bad.source)
-                    plain_text = without_noise(text) if form == "yaml" else text
-                    source = Source(bad.source, plain_text, at, column_in(block, part.start))
-                    yield from results(source, request, style, memory, teller)
-            except FormatError as error:
-                below, column = source.place(max(error.line, 1), error.column)
-                bad.take([Fault(below, str(column) if error.column else "", error.message)])
-            except FrametoolError as error:
-                bad.take([Fault.of(at, "", error)])
-            if bad.count > before and bad.on_error == NULL and not part.outside:
-                yield _no_result(block[part.start : part.end], form, style)
-        line += block.count(b"\n")
-    tell_of_rounding(bad.source, teller.counts["rounded"], rows)
-    bad.finish(rows)

@@ -221,7 +221,7 @@ def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
     if any(stamped) and not all(stamped):
         raise ValueInvalid("some poses have a stamp and some have none; add it, or leave it out of all")
     poses = [result.pose for result in results]
-    numbers = np.array([pose.components[0 if placed else 3 :] for pose in poses])
+    numbers = np.array([pose.components[0 if placed else 3 :] for pose in poses]) + 0.0  # none is -0.0
     parents, names = [pose.parent for pose in poses], [pose.name for pose in poses]
     scales: list[dict[str, Any]] = [{} if pose.scale == 1.0 else {SCALE: pose.scale} for pose in poses]
     others = [scale | result.extras for scale, result in zip(scales, results, strict=True)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from itertools import accumulate, islice
+from itertools import accumulate, islice, pairwise
 from typing import TYPE_CHECKING
 
 from frametool.documents.document import Aliased, Document, Node, parse_documents, parse_nodes
@@ -16,12 +16,12 @@ from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
 from frametool.errors import FormatError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
-from frametool.grammar.pose import POSE_KEYS
+from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
-from frametool.stream.record import POINT_KEYS
-from frametool.stream.row_layout import POSE
+from frametool.stream.record import POINT_KEYS, STALE
+from frametool.stream.row_layout import PARTS, POSE
 from frametool.stream.splice import OURS, Splicer
 from frametool.stream.text_parts import Const, IfLocked, In, Out, Word
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Note, Path
     from frametool.stream.answers import Answer, Entry
+    from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.splice import Edit
@@ -57,8 +58,8 @@ DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME
 _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
 )  # fmt: skip
-
-
+TOLD = DESCRIPTIVE - {"frame"}  # whatever a number under these is, it tells of a result; null may be another record
+NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 MOST_LEAVES = 2000
 """Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
 
@@ -72,6 +73,8 @@ class Template:
     pieces: what the result is made of
     notes: what is worth telling about all of them; own_notes: about the record that was learned alone
     of_places: those of them that hold for all
+    header, rest: of a result that is written anew, the stretches of its header's stamp and of what else is said, by
+    key; says_apart: where none of them is in another one
     """
 
     def __init__(
@@ -101,12 +104,18 @@ class Template:
         number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
         self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
         self.values = tuple(value for entry in entries for value in entry.record.values)
-        cuts = sorted({*(slot for slot in slots if slot is not None), *(span for spans in stamps for span in spans)})
-        self.stretches, self.pieces = cut(len(text), cuts, edits)
+        cuts = {*(slot for slot in slots if slot is not None), *(span for spans in stamps for span in spans)}
+        header, rest = _said_beside(root, entries) if request.canonical else ([], {})
+        more = {(node.start, node.end) for node in (*header, *rest.values())}
+        self.says_apart = all(end <= start for (_, end), (start, _) in pairwise(sorted(cuts | more)))
+        cuts |= more if self.says_apart else set()
+        self.stretches, self.pieces = cut(len(text), sorted(cuts), edits)
         at = {stretch: index for index, stretch in enumerate(self.stretches)}
         self.numbers = tuple(at[slot] for slot in slots if slot is not None)
         self.known = {at[slot] for slot in known if slot is not None}
         self.stamps = tuple(tuple(at[span] for span in spans) for spans in stamps)
+        self.header = [at[node.start, node.end] for node in header if self.says_apart]
+        self.rest = {key: (at[node.start, node.end], node) for key, node in rest.items() if self.says_apart}
         first = min((slot[0] for slot in slots if slot is not None), default=0)
         self.line = text.count("\n", 0, first)
 
@@ -207,6 +216,7 @@ class Template:
         words = _WORDS if poses else _WORDS - {"scale"}  # of points that is data
         fixed = {path for entry in self.entries for path in (*entry.record.numbers, *entry.record.unknown)}
         placed = {(*entry.record.path, key) for entry in self.entries for key in entry.record.placed}
+        number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
         stamps = {path: STAMP[at % 2] for entry in self.entries for at, path in enumerate(entry.record.stamps)}
         for path, leaf in _leaves(self._root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
@@ -219,10 +229,48 @@ class Template:
                 continue  # they say a covariance or a place, and are no numbers of ours
             elif key in LISTED_WORDS and depth == len(path):
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
+            elif key in TOLD and depth == len(path) and path not in fixed and number.fullmatch(leaf.value):
+                yield leaf, f"{leaf.quote}{number.pattern}{leaf.quote}"
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue
             else:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
+
+
+def _said_beside(root: Node, entries: Sequence[Entry]) -> tuple[list[Node], dict[str, Node]]:
+    """Return the stamp in the header of a record that is alone in its text, and what else is said beside it."""
+    record = entries[0].record
+    if len(entries) > 1 or type(root.at(record.path[:1]).value) is not dict:
+        return [], {}
+    stamp = record.stamps[:2] if record.stamp_ns is not None else ()
+    return [root.at(path) for path in stamp], rest_of(root.at(record.path[:1]), record.path[:1], record)
+
+
+def used_keys(record: Record) -> set[str]:
+    """Return the keys of a record that say its pose, or what is no longer true of the result."""
+    halves = PARTS.get(record.shape.kind, ())
+    own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
+    return {*own, *halves, *NOT_PLAIN}
+
+
+def rest_of(node: Node, unit: Path, record: Record) -> dict[str, Node]:
+    """Return what a record and the mappings around it say beside the pose, its frames and its stamp, by key.
+
+    node: the thing that the record's result is; unit: the path of that
+    """
+    used = used_keys(record)
+    names = {path for each in (record.name, record.parent) for path in each.paths}
+    rest: dict[str, Node] = {}
+    for depth in range(len(unit), len(record.path) + 1):
+        path = record.path[:depth]
+        holder = node.at(path[len(unit) :])
+        if type(holder.value) is not dict:
+            continue
+        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
+        for key, (_, value) in holder.value.items():
+            if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
+                rest.setdefault(key, value)
+    return rest
 
 
 def _notes(entries: Sequence[Entry]) -> Iterator[RowNote]:

@@ -26,7 +26,7 @@ from frametool.stream import stamp_columns
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
-from frametool.stream.record_values import stream_results
+from frametool.stream.record_results import stream_results
 from frametool.stream.request import Operation, Request
 from frametool.stream.run import Outcome, run
 from frametool.stream.table import open_table

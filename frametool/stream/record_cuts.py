@@ -1,0 +1,281 @@
+"""Records in bulk found in text: those written alike are cut by one expression, learned from the first of them."""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from frametool.stream.evaluate import Plan
+from frametool.stream.faults import NULL, SKIP, Fault
+from frametool.stream.record import KEYS_REMEDY
+from frametool.stream.record_text import attempt, column_in
+from frametool.stream.rows import Block
+from frametool.stream.splitter import DOCUMENTS, LINES, Part
+from frametool.stream.text_parts import In
+from frametool.text.cells import without_quotes
+from frametool.text.spans import MARGIN, Spans, framed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import TypeAlias
+
+    from frametool.stream.request import Request
+    from frametool.stream.splitter import Splitter
+    from frametool.stream.template import Template
+    from frametool.text.spans import Bytes, Ints
+
+    Places: TypeAlias = Sequence[tuple[int, int]]
+
+MOST_TEMPLATES = 256  # kept in mind
+MOST_TRIED = 8  # of them tried on whole blocks
+MOST_LOOKED = 1 << 16  # bytes in which the first record of what is left is looked for
+WORTH_CUTTING = 1 << 12  # bytes
+
+
+class Cut(NamedTuple):
+    """Records of one template found in a block: where each stretch of each begins and ends.
+
+    The last two columns are what follows a record and what stands before it.
+    """
+
+    template: Template
+    starts: Ints
+    ends: Ints
+
+
+class RecordCutter:
+    """Cut one block of records after the other; keeps the templates it has met.
+
+    closed: whether an array ended in the last block
+    """
+
+    def __init__(self, splitter: Splitter, form: str, request: Request, source: str) -> None:
+        """Start without templates."""
+        self.splitter = splitter
+        self.form = form
+        self.request = request
+        self.source = source
+        self.templates: list[Template] = []
+        self.closed = False
+        self._long: tuple[bytes, Template] | None = None  # the last record that was too long to be looked for again
+
+    def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
+        """Return the records of a block that templates find, and what is left between them."""
+        self.closed = False
+        cuts: list[Cut] = []
+        rest = [(0, len(text))]
+        if self.splitter.layout in (LINES, DOCUMENTS) and is_text(text):
+            rest = self._cut(text, rest, self.templates[-MOST_TRIED:][::-1], cuts)
+            rest = self._learn_and_cut(text, rest, cuts)
+        return cuts, rest
+
+    def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
+        """Learn templates from the first records that are left, a few, and cut by them too."""
+        for _ in range(MOST_TRIED):
+            if len(rest) != 1 or rest[0][1] - rest[0][0] < WORTH_CUTTING:
+                return rest
+            start, end = rest[0]
+            looked = text[start : min(end, start + MOST_LOOKED)]
+            parts = self.splitter.parts(looked).parts[:1]
+            if not parts or parts[0].problem:
+                return rest
+            record = looked[parts[0].start : parts[0].end]
+            known = len(self.templates)
+            if self.match(record, 0, len(record)) is None:
+                self.learn(looked, parts[0])
+                if len(self.templates) == known:
+                    return rest
+            rest = self._cut(text, rest, self.templates[-1:], cuts)
+        return rest
+
+    def _cut(
+        self, text: bytes, rest: list[tuple[int, int]], templates: Sequence[Template], cuts: list[Cut]
+    ) -> list[tuple[int, int]]:
+        """Cut what is left of a block by templates; return what is then left."""
+        for template in templates:
+            left = []
+            for start, end in rest:
+                cut, gaps = _cut_chunk(template, text[start:end], start)
+                if cut is not None:
+                    cuts.append(cut)
+                left += gaps
+            rest = left
+        return rest
+
+    def singly(self, text: bytes, start: int, end: int) -> Iterator[tuple[Part, tuple[Template, Places] | None]]:
+        """Yield the records of what is left one by one, each with the template that finds it alone, if one does."""
+        chunk = text[start:end]
+        matches: dict[int, tuple[Template, Places]] = {}
+
+        def match(at: int) -> int | None:
+            """Match the template used last, which most records follow."""
+            hit = self.templates[-1].pattern.match(chunk, at) if self.templates and clean else None
+            if hit is None:
+                return None
+            matches[at] = self.templates[-1], hit.regs[1:]
+            return hit.end()
+
+        clean = is_text(chunk)
+        parts, self.closed = self.splitter.parts(chunk, match)
+        for own in parts:
+            begin, first, last, after = (place + start for place in own[:4])
+            part = Part(begin, first, last, after, own.problem, own.outside)
+            if (hit := matches.get(own.start)) is not None:
+                yield part, (hit[0], [(a + start, b + start) for a, b in hit[1]])
+            else:
+                yield part, None if part.problem else self.match(text, first, last)
+
+    def own_places(self, learned: Template, text: bytes, part: Part) -> tuple[Template, Places] | None:
+        """Return where the stretches of the record stand from which a template was learned."""
+        if not learned.is_long:
+            return self.match(text, part.start, part.end)
+        return learned, [(begin + part.start, end + part.start) for begin, end in learned.places()]
+
+    def match(self, text: bytes, begin: int, stop: int) -> tuple[Template, Places] | None:
+        """Find the template that a record follows."""
+        if not is_text(text[begin:stop]):
+            return None
+        for template in reversed(self.templates):
+            found = template.pattern.fullmatch(text, begin, stop)
+            if found is not None:
+                return template, found.regs[1:]
+        return None
+
+    def learn(self, text: bytes, part: Part, line: int = 0) -> Fault | bytes | Template:
+        """Return the template of a record, or why it has none; keep it in mind unless it is long, not too many."""
+        record = text[part.start : part.end]
+        if self._long is not None and self._long[0] == record:
+            return self._long[1]
+        learned = attempt(text, part, self.form, self.request, self.source, line)
+        if isinstance(learned, (Fault, bytes)):
+            return learned
+        if learned.is_long:
+            self._long = record, learned
+        else:
+            self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], learned]
+        return learned
+
+
+def block_of(cut: Cut, data: Bytes, text: bytes) -> Block:
+    """Describe the records of one template as rows."""
+    template = cut.template
+    starts, ends = cut.starts + MARGIN, cut.ends + MARGIN
+    parts = [Spans(data, starts[:, index], ends[:, index]) for index in range(starts.shape[1])]
+
+    def line_of(row: int) -> int:
+        return text.count(b"\n", 0, int(cut.starts[row, 0])) + template.line
+
+    def place_of(row: int, number: int) -> tuple[int, str]:
+        if not template.regular:
+            return line_of(row), ""
+        start = int(starts[row, template.numbers[number]]) - MARGIN
+        return text.count(b"\n", 0, start), str(column_in(text, start))
+
+    stamps = [tuple(without_quotes(parts[index]) for index in each) for each in template.stamps]
+    numbers = _numbers(template, data, starts, ends)
+    return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps, place_of=place_of)
+
+
+def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
+    """Say what is done to the records of one template."""
+    after = len(template.stretches)
+    plan = Plan(
+        template.shapes,
+        tuple(entry.target for entry in template.entries),
+        request.operation,
+        (In(after + 1), *template.pieces, In(after)),
+        template.names,
+        b"null",
+        edges=tuple(entry.edge for entry in template.entries),
+    )
+    return plan._replace(
+        normalize=request.normalize,
+        precision=request.precision,
+        on_error=SKIP if request.on_error == NULL else request.on_error,
+        unwrap=request.unwrap,
+        yaml=yaml,
+        timed=template.timed(request),
+        beside=template.beside if request.extra_column is not None else "",
+        gathered=request.gathered,
+        window=request.window,
+        remedies=tuple(
+            KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in template.entries
+        ),
+        sources=tuple(entry.record.parent.text for entry in template.entries),
+    )
+
+
+def is_text(block: bytes) -> bool:
+    """Tell whether bytes are UTF-8: an expression for bytes would let others pass."""
+    if block.isascii():
+        return True
+    try:
+        block.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | None, list[tuple[int, int]]]:
+    """Cut a chunk of lines by one expression; give the records, and the gaps between them."""
+    stretches = len(template.stretches) + 1
+    pieces = template.block_pattern.split(chunk)
+    count = len(pieces) // (stretches + 1)
+    if not count:
+        return None, [(offset, offset + len(chunk))]
+    ends = np.cumsum(np.fromiter(map(len, pieces), np.int64, len(pieces))) + offset
+    starts = np.empty_like(ends)
+    starts[0], starts[1:] = offset, ends[:-1]
+    between = np.arange(0, len(pieces), stretches + 1)
+    gaps = [(int(starts[at]), int(ends[at])) for at in between[starts[between] < ends[between]]]
+    rows = slice(0, count * (stretches + 1))
+    shape = (count, stretches + 1)
+    begins, stops = starts[rows].reshape(shape)[:, 1:], ends[rows].reshape(shape)[:, 1:]
+    first = begins[:, :1]  # nothing stands before a record
+    return Cut(template, np.concatenate([begins, first], axis=1), np.concatenate([stops, first], axis=1)), gaps
+
+
+def as_cut(template: Template, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
+    """Return records of one template that were found one by one: where their stretches begin and end."""
+    found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
+    return Cut(template, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
+
+
+def by_template(cuts: Sequence[Cut]) -> list[Cut]:
+    """Join the cuts of each template, whose records then follow each other as in the text."""
+    found: dict[Template, list[Cut]] = {}
+    for cut in cuts:
+        found.setdefault(cut.template, []).append(cut)
+    joined = []
+    for template, each in found.items():
+        starts, ends = (np.concatenate(parts) for parts in ([cut.starts for cut in each], [cut.ends for cut in each]))
+        order = np.argsort(starts[:, 0], kind="stable") if len(each) > 1 else slice(None)
+        joined.append(Cut(template, starts[order], ends[order]))
+    return joined
+
+
+def in_order(cuts: Sequence[Cut]) -> list[Cut]:
+    """Part cuts of several sorts so that their records follow each other as in the text."""
+    if not cuts:
+        return []
+    sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
+    rows = np.concatenate([np.arange(len(cut.starts)) for cut in cuts])
+    order = np.argsort(np.concatenate([cut.starts[:, 0] for cut in cuts]), kind="stable")
+    changes = np.flatnonzero(np.diff(sorts[order])) + 1
+    parts = [(cuts[sorts[part[0]]], rows[part]) for part in np.split(order, changes)]
+    return [Cut(cut.template, cut.starts[part], cut.ends[part]) for cut, part in parts]
+
+
+def _numbers(template: Template, data: Bytes, starts: Ints, ends: Ints) -> Spans:
+    """Return the spans of our numbers; those that a template does not write as plain numbers are its own."""
+    rows = len(starts)
+    if template.regular:
+        columns = list(template.numbers)
+        return Spans(data, np.ascontiguousarray(starts[:, columns]), np.ascontiguousarray(ends[:, columns]))
+    texts = [repr(value).encode() for value in template.values]
+    own = framed(b" ".join(texts))
+    lengths = np.array([len(text) for text in texts], np.int64)
+    first = np.cumsum(lengths + 1) - lengths - 1 + MARGIN
+    return Spans(own, np.tile(first, (rows, 1)), np.tile(first + lengths, (rows, 1)))
