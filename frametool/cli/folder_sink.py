@@ -36,7 +36,8 @@ def filling(path: str, *, force: bool) -> Iterator[Write]:
                     part = part or created(place, os.mkdir)[0]
                     stream = open(os.path.join(part, name), "xb", buffering=0)  # noqa: SIM115 - closed below
                 files[name] = stream
-            writer_into(files[next(reversed(files))], path)(piece)
+            if piece:  # nothing comes before the first name
+                writer_into(files[next(reversed(files))], path)(piece)
 
     try:
         yield fill

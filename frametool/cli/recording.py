@@ -23,6 +23,8 @@ def recorded(form: str, output: str | None) -> Recorded:
     frames = tuple(name.strip() for name in told.split(",")) if told else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
+    if len({*frames}) < len(frames):
+        raise UsageError(f"--frames {told}: no frame is its own parent; give two names")
     chosen.inputs = (*chosen.inputs, *[("", ("frames",))] * bool(chosen.named_frames))
     return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
@@ -33,6 +35,9 @@ def _place(form: str, output: str | None) -> str:
         raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
     if is_folder(form) and output.endswith(FORMATS[form].suffixes):
         raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
+    named = None if is_folder(form) else by_name(output, writers("recording"))
+    if named not in (None, form):
+        raise UsageError(f"-o {output} is the name of {named}, -f says {form}; give -o NEW{FORMATS[form].suffixes[0]}")
     return output
 
 

@@ -333,7 +333,7 @@ class InputFile:
         self.form = ""
         self.beside: Sequence[InputFile] = ()  # all files that are read together
         self.scopes: list[str] = []  # what stands before its names, once for each, where another file says so
-        self.stream: BinaryIO = BytesIO() if folder else stream or opened(path)
+        self.stream: BinaryIO = BufferedReader(BytesIO()) if folder else stream or opened(path)
 
     def head(self) -> bytes:
         """Return the first bytes, and leave them to be read."""

@@ -7,20 +7,20 @@ for one and for a million alike.  Messages are logged at their stamps, or at the
 from __future__ import annotations
 
 import struct
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from heapq import merge
 from itertools import chain, groupby
 from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
-from tempfile import mkdtemp
+from tempfile import gettempdir, mkdtemp
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self, TypeAlias
 from weakref import finalize
 
 import numpy as np
 
-from frametool.errors import FileProblem, ValueInvalid, shown
+from frametool.errors import FileProblem, ValueInvalid, printable, shown
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, quaternion
 
@@ -89,12 +89,15 @@ class RecordingFile:
 
         self.form = form
         self.log_ns = 0
+        self._folder = folder
         self._store = typestore(form)
-        self._home = Path(mkdtemp(".part", ".frametool.", folder or None))
-        bag = self._home / NAME
-        self._writer: Any = Writer1(bag) if form == BAG1 else Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP)
-        self._writer.open()
-        self._file = (bag if form == BAG1 else bag / f"{NAME}.mcap").open("rb")
+        with _naming(folder):
+            self._home = Path(mkdtemp(".part", ".frametool.", folder or None))
+            bag = self._home / NAME
+            made = Writer1(bag) if form == BAG1 else Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP)
+            self._writer: Any = made
+            self._writer.open()
+            self._file = (bag if form == BAG1 else bag / f"{NAME}.mcap").open("rb")
         self._discard = finalize(self, _discarded, self._writer, self._file, self._home)
         with suppress(OSError):  # Windows does not let go of the name of an open file
             rmtree(self._home)
@@ -110,14 +113,19 @@ class RecordingFile:
     def write(self, channel: Any, stamp_ns: int, message: bytes | memoryview) -> None:
         """Write one message; what comes late is logged with the one before."""
         self.log_ns = max(self.log_ns, stamp_ns)
-        self._writer.write(channel, self.log_ns, message)
+        try:
+            self._writer.write(channel, self.log_ns, message)
+        except OSError as error:
+            raise _named(error, self._folder) from None
 
     def pieces(self) -> Iterator[bytes]:
         """End the recording and yield its bytes; of a folder file after file, each begun by a FirstPiece."""
         bag = self._home / NAME
-        bag.mkdir(parents=True, exist_ok=True)
-        self._writer.close()
-        metadata = b"" if self.form == BAG1 else (bag / METADATA).read_bytes()
+        with _naming(self._folder):
+            bag.mkdir(parents=True, exist_ok=True)
+            self._writer.close()
+            metadata = b"" if self.form == BAG1 else (bag / METADATA).read_bytes()
+        rmtree(self._home, ignore_errors=True)
         piece = self._file.read(PIECE)
         if self.form == BAG2:
             yield FirstPiece(metadata, METADATA)
@@ -133,6 +141,19 @@ def _discarded(writer: Any, file: IO[bytes], folder: Path) -> None:
     writer.abort()
     file.close()
     rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _naming(folder: str) -> Iterator[None]:
+    """Name the folder in which something cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise _named(error, folder) from None
+
+
+def _named(error: OSError, folder: str) -> FileProblem:
+    return FileProblem(f"{printable(folder or gettempdir())}: {(error.strerror or str(error)).lower()}")
 
 
 @lru_cache
@@ -171,6 +192,8 @@ def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     topics = {"tf_static": any(track.standing for track in tree.tracks()), "tf": tree.moves}
     if asked.topic and all(topics.values()):
         raise ValueInvalid(f"the tree stands and moves, on two topics; {asked.topic} names one")
+    if not any(topics.values()):
+        raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
     file = RecordingFile(form, asked.folder)
     moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.standing), key=itemgetter(0))
     messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))

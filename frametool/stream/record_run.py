@@ -135,7 +135,8 @@ class RecordRun:
         if into and not named:
             movable = sorted({each.topic for each in channels.values() if each.type in MOVED_TYPES})
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
-            raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=path)
+            beside = f" beside {first_of(sorted(self.transform_topics), MOST_NAMED)}" if self.transform_topics else ""
+            raise Misused(f"--into moves the messages of topics that are named{beside}; {remedy}", source=path)
 
     def _refuse_others(self, channels: dict[int, Channel]) -> None:
         """Raise FormatError for transforms that cannot be read here, as protobuf's."""

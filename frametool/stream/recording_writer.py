@@ -28,7 +28,7 @@ FRAMES = "world", "body"  # where nothing says them
 NAME = "name"
 ANTENNA = "gps"  # the frame of a fix is that of its antenna
 LLA = "lla"
-NO_STAMPS = "{}: the rows have no stamps, and messages need them; --stamps FILE says them, one a line"
+NO_STAMPS = "{}: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line"
 
 
 class RecordingWriter:
@@ -125,7 +125,7 @@ class RecordingWriter:
         if not all(block.parents) and not said:
             self.is_named = False
         if "tf" in self.kinds and not all(block.names) and not said:
-            raise ValueInvalid("--messages tf needs the names of both frames; --frames A,B says them")
+            raise ValueInvalid("--messages tf needs the names of both frames; `convert --frames A,B` says them")
         if "tf" not in self.kinds:
             self.lost |= dict.fromkeys(filter(None, block.names))
         size = max(len(block.parents), len(block.names))

@@ -13,7 +13,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
-from frametool.formats.detect import detect
+from frametool.formats.detect import by_sign, detect
 from frametool.formats.load import Recording, Rules, load_sources, opened_together
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import FURTHEST_NS
@@ -120,13 +120,15 @@ def read_stamps(path: str, report: Report, say: Callable[[str], None]) -> list[i
     """Return the stamps of a file in its order: times one a line, a table's, a trajectory's, a recording's (sorted).
 
     Nanoseconds are known by the name of their column, or by their size, which `say` tells.
-    report: takes the errors of lines that are no time
+    path: a file or a folder, or FILE:TOPIC; report: takes the errors of lines that are no time
     """
+    if path != "-" and not os.path.isfile(path) and (os.path.isdir(path) or ":" in path):
+        return _stamps_of_tree(*split_name(path))
     file = InputFile(path)
     try:
         head = file.head()
         words = next((line.split() for line in head.splitlines() if line.strip() and line.lstrip()[:1] != b"#"), [])
-        is_list = len(words) < 2 and not re.search(rb"[,;:{\[<\0]", b"".join(words))
+        is_list = len(words) < 2 and not re.search(rb"[,;:{\[<\0]", b"".join(words)) and by_sign(head, "tree") is None
         form = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)[0]
         known = FORMATS[form]
         if not known.is_table or form == "kitti":
@@ -181,14 +183,20 @@ NO_TIMES = "no times in it; write one a line"
 def _stamps_of_poses(path: str, form: str, *, is_tree: bool) -> list[int]:
     """Return the stamps of a form that lists poses or records, or of all that moves in a recording."""
     if is_tree or ("tree" in FORMATS[form].reads and "records" not in FORMATS[form].reads):
-        found = {edge.stamp_ns for edge in Recording(path, form=form).edges() if edge.stamp_ns is not None}
-        if found:
-            return sorted(found)
-    else:
-        trajectory = read_trajectory(path, form=form)
-        if trajectory.stamps_ns is not None:
-            return [int(stamp) for stamp in trajectory.stamps_ns]
-    raise FormatError(f"no stamps in it ({FORMATS[form].summary})", source=path)
+        return _stamps_of_tree(path, form=form)
+    trajectory = read_trajectory(path, form=form)
+    if trajectory.stamps_ns is None:
+        raise FormatError(f"no stamps in it ({FORMATS[form].summary})", source=path)
+    return [int(stamp) for stamp in trajectory.stamps_ns]
+
+
+def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, form: str | None = None) -> list[int]:
+    """Return the stamps of all that moves in a tree or recording, or of what came by a topic."""
+    recording = Recording(path, form=form, topics=topics)
+    found = {edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None}
+    if not found:
+        raise FormatError(f"no stamps in it ({FORMATS[recording.form].summary})", source=path)
+    return sorted(found)
 
 
 def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:

@@ -75,7 +75,7 @@ REFUSED = {
     ("sqlite/sqlite.db3", "-f", "bag2", "-o", "sqlite", "--force"): (5, "sqlite: PLACE/sqlite/sqlite.db3 lies in PLACE/sqlite; give another name"),
     ("run.mcap", "-o", "./run.mcap", "--force"): (5, "./run.mcap: is run.mcap, which is read; give another name"),
     ("run.mcap", "--with", "tree.yaml", "-o", "tree.yaml", "-f", "mcap", "--force"): (5, "tree.yaml: is tree.yaml, which is read; give another name"),
-    ("run.mcap", "-o", "run.bag", "-f", "mcap"): (5, "run.bag: exists; give --force to replace it"),
+    ("run.mcap", "-o", "run.bag", "-f", "mcap"): (2, f"record: -o run.bag is the name of bag1, -f says mcap; give -o NEW.mcap{USAGE}"),
 }  # fmt: skip
 
 

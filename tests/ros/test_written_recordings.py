@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import ConnectionExtRosbag1, QosDurability, QosReliability
 
 from frametool.errors import ValueInvalid
+from frametool.ros import recordings
 from frametool.ros.recordings import KINDS, MessageTemplate, serialised
 
 if TYPE_CHECKING:
@@ -210,22 +212,26 @@ def test_points_with_stamps_become_points_of_their_frame(run: Run, tmp_path: Pat
     (["convert", "-i", "w.tum", "-o", "w.mcap", "--precision", "3"], 2, "convert: --precision is not used: mcap holds numbers, not their text; usage: "),
     (["convert", "-i", "w.tum", "-o", "w.mcap", "--messages", "psoe"], 2, "convert: invalid value for '--messages': 'psoe' is none of pose, tf, path, point, fix; did you mean 'pose'?; usage: "),
     (["convert", "-i", "w.tum", "-o", "w.mcap", "--messages", "point"], 1, "--messages point is not made of poses; these are pose, tf, path, fix\n"),
-    (["convert", "-i", "w.tum", "-o", "w.mcap", "--messages", "tf"], 1, "--messages tf needs the names of both frames; --frames A,B says them\n"),
+    (["convert", "-i", "w.tum", "-o", "w.mcap", "--messages", "tf"], 1, "--messages tf needs the names of both frames; `convert --frames A,B` says them\n"),
     (["convert", "-i", "w.tum", "-o", "w.mcap", "--messages", "pose,path", "--topic-out", "/a"], 1, "there are 2 topics (pose, path); /a names one\n"),
     (["convert", "-i", "w.tum", "-o", "w.mcap", "--to", "rpy"], 1, "mcap writes rotations in its own way; leave --to out\n"),
-    (["convert", "-i", "n.csv", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; --stamps FILE says them, one a line\n"),
-    (["convert", "-i", "k.txt", "--in", "kitti", "--quiet", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; --stamps FILE says them, one a line\n"),
+    (["convert", "-i", "n.csv", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line\n"),
+    (["convert", "-i", "k.txt", "--in", "kitti", "--quiet", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line\n"),
     (["convert", "-i", "v.csv", "-o", "w.mcap", "--as", "twist"], 2, "convert: no such option '--as'"),
     (["tree", "t.yaml", "-o", "t.mcap", "--topic-out", "/a"], 1, "the tree stands and moves, on two topics; /a names one\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", "w.tum"], 5, "w.tum: exists; give --force to replace it\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", "w.tum", "--force"], 5, "w.tum: is a file; a folder is to be written there\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", ".", "--force"], 5, ".: holds more than a bag ('k.txt'); it is not replaced\n"),
+    (["convert", "-i", "w.tum", "-o", "w.mcap", "--frames", "map,map"], 2, "convert: --frames map,map: no frame is its own parent; give two names; usage: "),
+    (["convert", "-i", "w.tum", "-o", "w.mcap", "-f", "bag1"], 2, "convert: -o w.mcap is the name of mcap, -f says bag1; give -o NEW.bag; usage: "),
+    (["convert", "-i", "w.tum", "-o", "w.bag", "-f", "mcap"], 2, "convert: -o w.bag is the name of bag1, -f says mcap; give -o NEW.mcap; usage: "),
+    (["tree", "one.yaml", "-o", "t.mcap"], 1, "mcap holds transforms, and there is none in the tree\n"),
     (["convert", "-i", "w.tum", "-o", "none/w.mcap"], 5, "none/w.mcap: no such file or directory\n"),
 ])  # fmt: skip
 def test_what_cannot_be_written_is_told_in_one_line(run: Run, tmp_path: Path, arguments: list[str], status: int, said: str) -> None:
     files = {
         "w.tum": as_tum(*rows(2)), "n.csv": "x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n", "k.txt": "1 0 0 0 0 1 0 0 0 0 1 0\n",
-        "t.yaml": TREE, "v.csv": "t,linear_x\n",
+        "t.yaml": TREE, "v.csv": "t,linear_x\n", "one.yaml": "frames: [{name: a}]\n",
     }  # fmt: skip
     before = {*files}
     done = run(*arguments, files=files)
@@ -233,6 +239,32 @@ def test_what_cannot_be_written_is_told_in_one_line(run: Run, tmp_path: Path, ar
     assert said in done.err
     assert done.err.count("\n") - done.err.count("warning") - done.err.count("note") == 1
     assert {each.name for each in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("arguments", [
+    ("lookup", "drive.yaml", "map", "lidar", "--times", "0:4:1"), ("lookup", "drive.yaml", "map", "lidar", "--at", "2"),
+    ("resample", "walk.tum", "--rate", "5"), ("echo", "drive.yaml", "map", "lidar"), ("align", "truth.tum", "odometry.tum"),
+    ("invert", "-i", "walk.tum"), ("convert", "-i", "walk.json"), ("invert", "-i", "walk.json"), ("tree", "drive.yaml"),
+    ("relative", "-i", "walk.json", "--first"),
+])  # fmt: skip
+def test_every_command_writes_every_recording(run: Run, tmp_path: Path, form: str, arguments: tuple[str, ...]) -> None:
+    for each in EXAMPLES.iterdir():
+        if each.suffix in (".tum", ".yaml"):
+            (tmp_path / each.name).write_bytes(each.read_bytes())
+    run("convert", "-i", "walk.tum", "-f", "json", "-o", "walk.json")
+    done = run(*arguments, "-f", form, "-o", FORMS[form])
+    assert done.status == 0, done.err
+    assert messages(tmp_path / FORMS[form])
+
+
+def test_a_disk_without_room_is_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_room(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(recordings, "mkdtemp", no_room)
+    done = run("convert", "-i", "w.tum", "--quiet", "-o", "w.mcap", files={"w.tum": as_tum(*rows(2))})
+    assert (done.status, done.err.rpartition("/")[2].partition(": ")[2]) == (5, "no space left on device\n")
 
 
 def test_a_folder_is_replaced_whole(run: Run, tmp_path: Path) -> None:
