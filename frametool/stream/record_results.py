@@ -114,7 +114,7 @@ class AlikeRecords:
         (entry,) = template.entries
         record, target, shape = entry.record, entry.target, entry.record.shape
         extras = shape.covariance or self.request.operation.extras(shape)
-        if extras or shape.multiple or shape.place or record.placed or entry.lost or target.place:
+        if extras or shape.multiple or shape.place or record.placed or target.place:
             return None
         if any(type(node.value) in (dict, list) and self.is_yaml for _, node in template.rest.values()):
             return None  # it could not be read without what stands around it

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 SIX_BY_SIX = 36  # entries of the covariance of a pose
+LOST = "lost"  # rule of frames that results cannot name
 MOST_TOLD = 3  # of what is odd by one rule in one text
 
 
@@ -189,7 +190,8 @@ def _answer(
 ) -> Answer | None:
     """Apply the operation to one record; the first of all has no velocity and so no result."""
     record = entry.record
-    if entry.lost:
+    own.counts[LOST] += bool(entry.lost)
+    if entry.lost and own.counts[LOST] == 1:
         warn(f"{source.name}: frame {shown(entry.lost)} is left out: the frames of the result are not known")
     try:
         asked = request.for_kind(record.shape.kind)

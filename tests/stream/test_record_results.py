@@ -138,6 +138,13 @@ def test_what_is_told_of_a_result_makes_no_other_record_of_it(form: str) -> None
     assert len(cutter.templates) <= 2  # the last document of YAML ends in no line of its own
 
 
+def test_a_frame_that_is_left_out_is_told_once(run: Callable[..., Any]) -> None:
+    line = '{"parent": "map", "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n'
+    done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "-f", "csv", stdin=line * 100)
+    assert done.err == "frametool: warning: stdin: frame 'map' is left out: the frames of the result are not known\n"
+    assert done.out.count("\n") == 101
+
+
 def test_a_broken_record_whose_key_is_a_mapping_is_null(run: Callable[..., Any]) -> None:
     done = run("convert", "-f", "csv", "--on-error", "null", stdin='{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n{"a": nan , {"b": 1}: 2}\n')
     assert (done.status, done.out) == (3, "x,y,z,qx,qy,qz,qw\n1.0,2.0,3.0,0.0,0.0,0.0,1.0\n,,,,,,\n")
