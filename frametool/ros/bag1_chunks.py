@@ -60,12 +60,6 @@ def number_of(value: bytes) -> int:
     return int.from_bytes(value, "little")
 
 
-def time_of(value: bytes) -> int:
-    """Read a time in nanoseconds."""
-    seconds, nanoseconds = struct.unpack("<II", value)
-    return int(seconds) * BILLION + int(nanoseconds)
-
-
 def time_bytes(time_ns: int) -> bytes:
     """Write a time."""
     return struct.pack("<II", *divmod(time_ns, BILLION))

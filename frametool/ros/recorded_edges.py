@@ -15,7 +15,7 @@ from frametool.grammar.edges import Names, Topics
 from frametool.ros.message_bytes import Transforms
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -122,6 +122,13 @@ class RecordedEdges:
         line = [*to_root(edge.parent, parents.get), edge.child]
         topic = next((self._topic_of[frame] for frame in line if frame in self._topic_of), "/tf")
         return f"{topic.rpartition('/')[0]}/{STATIC}"
+
+    def apart(self, added: Sequence[AddedEdge]) -> list[str]:
+        """Return the roots of edges that are added and hang together with nothing that is here."""
+        parents, known = {each.child: each.parent for each in added}, self._topic_of.keys()
+        root_of = {edge: to_root(edge.parent, parents.get)[-1] for edge in added}
+        held = {root for edge, root in root_of.items() if not known.isdisjoint((edge.parent, edge.child))}
+        return sorted({*root_of.values()} - held) if known else []
 
     def plan(self, tree: Frames, *, replace: bool) -> EdgePlan:
         """Sort the edges of a tree: missing here, there with the same values, or there with others.

@@ -189,8 +189,8 @@ def covariance_columns(
 def _refuse_beside(table: Table, axes: str, others: str, source: str) -> None:
     """Raise FormatError for the columns of a covariance that would stay along axes which a result does not have."""
     if any(find_columns(table.names or (), size)[0] for size in (9, 36)):
-        given = f"along {axes}" if axes else "along the axes there"
-        message = f"the covariance is {given}, the result along {others}; leave its columns out, or --local-axes"
+        given, remedy = (f"along {axes}", "") if axes else ("along the axes there", f", or say --local-axes {others}")
+        message = f"the covariance is {given}, the result along {others}; leave its columns out{remedy}"
         raise FormatError(message, source=source, line=1)
 
 

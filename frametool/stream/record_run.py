@@ -12,7 +12,10 @@ from frametool.errors import (
     NoDataAt,
     ValueInvalid,
     alternatives,
+    did_you_mean,
     first_of,
+    shown,
+    warn,
 )
 from frametool.formats.load import Recording, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
@@ -96,6 +99,9 @@ class RecordRun:
             self.plan = self.edges.plan(request.tree, replace=request.replace)
             for edge in self.plan.added:
                 self.added.setdefault(self.edges.topic_for(edge, self.plan.added), []).append(edge)
+            for root in self.edges.apart(self.plan.added):
+                near = did_you_mean(root, self.edges.frames)
+                warn(f"{self.recording.path}: frame {shown(root)} is in none of its transforms{near}")
         changes = self.changes.change
         if self.plan.replaced:
             change = self._replacer()
