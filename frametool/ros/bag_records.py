@@ -7,22 +7,23 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
+from functools import cache, lru_cache
 from io import BufferedReader, RawIOBase
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump
-from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, Unanswered, first_of, listing
 from frametool.ros.bags import TYPES, check_count, opened_bag
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from frametool.grammar.edges import Tally
 
+PIECE = 1 << 16  # bytes
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -57,7 +58,7 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
         reader = opened.enter_context(opened_bag(path, tally))
         topics = record_topics(reader, chosen, path)
         if topics:
-            return BufferedReader(_Lines(_lines(reader, topics, path), opened.pop_all()))
+            return BufferedReader(_Lines(_pieces(_lines(reader, topics, path)), opened.pop_all()))
         wanted = {topic.strip("/") for topic in chosen}
         clouds = [each.topic.strip("/") for each in reader.connections if each.msgtype == CLOUD]
         if any(not wanted or topic in wanted for topic in clouds):
@@ -77,8 +78,27 @@ def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[bytes]:
     messages = reader.messages(connections=connections)
     while (message := _next(reader, messages, number + 1, path)) is not None:
         number += 1
-        yield dump(_plain(message)).encode() + b"\n"
+        yield _text(message) + "\n"
     check_count(reader, connections, number, path)
+
+
+def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
+    """Join lines to pieces, which are read faster than one line each; an error comes behind the lines before it."""
+    held: list[str] = []
+    size = 0
+    problem = None
+    try:
+        for line in lines:
+            held.append(line)
+            size += len(line)
+            if size >= PIECE:
+                yield "".join(held).encode()
+                held, size = [], 0
+    except FormatError as error:
+        problem = error
+    yield "".join(held).encode()
+    if problem is not None:
+        raise problem
 
 
 def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> Any:
@@ -92,19 +112,36 @@ def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> Any:
         raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=path) from None
 
 
-def _plain(value: Any) -> Any:
-    """Return a message, or a part of one, as a plain value."""
+def _text(value: Any) -> str:
+    """Return a message, or a part of one, as JSON."""
+    if (write := _WRITTEN.get(type(value))) is not None:
+        return write(value)
     if is_dataclass(value):
-        return {each.name: _plain(getattr(value, each.name)) for each in fields(value) if _is_data(each.name)}
+        members = [f"{start}{_text(getattr(value, name))}" for start, name in _members(type(value))]
+        return "{" + "".join(members) + "}"
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    if isinstance(value, bool) or value is None or isinstance(value, str):
-        return value
-    if isinstance(value, float) and not isfinite(value):
-        return str(value)
-    return Verbatim(repr(value))
+        return _text(value.tolist())
+    return dump(value)
+
+
+def _float(value: float) -> str:
+    """Return a number, or its name where JSON has none for it."""
+    return repr(value) if isfinite(value) else f'"{value}"'
+
+
+_WRITTEN: dict[type, Callable[[Any], str]] = {
+    float: _float,
+    int: repr,
+    str: lru_cache(1024)(dump),
+    list: lambda values: "[" + ", ".join(map(_text, values)) + "]",
+}
+
+
+@cache
+def _members(kind: type) -> list[tuple[str, str]]:
+    """Return the fields of a type of messages, each behind what stands before its value."""
+    names = [each.name for each in fields(kind) if _is_data(each.name)]
+    return [(f'{", " * bool(at)}"{name}": ', name) for at, name in enumerate(names)]
 
 
 def _is_data(name: str) -> bool:
