@@ -7,14 +7,17 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from io import BufferedReader, RawIOBase
 from math import isfinite
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump
 from frametool.errors import FormatError, Unanswered, first_of, listing
-from frametool.ros.bags import TYPES, check_count, opened_bag
+from frametool.ros.bags import TYPES, check_count, opened_bag, refuse_foreign
+from frametool.ros.messages import PATH
+from frametool.ros.pose_lists import POSE_ARRAY, posed_messages
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 
@@ -28,7 +31,7 @@ FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
 RECORDS = frozenset((
-    FIX, "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField", "nav_msgs/msg/Odometry",
+    FIX, PATH, POSE_ARRAY, "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField", "nav_msgs/msg/Odometry",
     *(f"geometry_msgs/msg/{name}Stamped" for name in STAMPED),
 ))  # fmt: skip
 
@@ -56,6 +59,7 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_bag(path, tally))
+        refuse_foreign(reader, chosen, path)
         topics = record_topics(reader, chosen, path)
         if topics:
             return BufferedReader(_Lines(_pieces(_lines(reader, topics, path)), opened.pop_all()))
@@ -71,14 +75,15 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
     raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
 
 
-def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[bytes]:
-    """Yield each message as a line; there must be as many as the bag says."""
+def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[str]:
+    """Yield each message, or each pose of a list, as a line; there must be as many messages as the bag says."""
     connections = [each for each in reader.connections if each.topic in topics]
     number = 0
     messages = reader.messages(connections=connections)
-    while (message := _next(reader, messages, number + 1, path)) is not None:
+    while (found := _next(reader, messages, number + 1, path)) is not None:
         number += 1
-        yield _text(message) + "\n"
+        for message in posed_messages(*found):
+            yield _text(message) + "\n"
     check_count(reader, connections, number, path)
 
 
@@ -101,27 +106,41 @@ def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
         raise problem
 
 
-def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> Any:
-    """Return the next message; None behind the last."""
+def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> tuple[Any, str] | None:
+    """Return the next message and its type; None behind the last."""
     try:
         if (found := next(messages, None)) is None:
             return None
         connection, _, data = found
-        return reader.deserialize(data, connection.msgtype)
+        return reader.deserialize(data, connection.msgtype), connection.msgtype
     except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything
         raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=path) from None
 
 
 def _text(value: Any) -> str:
     """Return a message, or a part of one, as JSON."""
-    if (write := _WRITTEN.get(type(value))) is not None:
-        return write(value)
-    if is_dataclass(value):
-        members = [f"{start}{_text(getattr(value, name))}" for start, name in _members(type(value))]
-        return "{" + "".join(members) + "}"
-    if hasattr(value, "tolist"):
-        return _text(value.tolist())
-    return dump(value)
+    kind = type(value)
+    write = _WRITERS.get(kind) or _WRITERS.setdefault(kind, _writer(kind))
+    return write(value)
+
+
+def _writer(kind: type) -> Callable[[Any], str]:
+    """Return what writes values of a type: of messages that hold plain ones as one template, for speed."""
+    if is_dataclass(kind):
+        names = [each.name for each in fields(kind) if _is_data(each.name)]
+        template = "{{" + ", ".join(f'"{name}": {{}}' for name in names) + "}}"
+        return _members_writer(names, template.format)
+    if hasattr(kind, "tolist"):
+        return lambda value: _text(value.tolist())
+    return dump
+
+
+def _members_writer(names: Sequence[str], write: Callable[..., str]) -> Callable[[Any], str]:
+    """Return what writes an object of members."""
+    if len(names) == 1:
+        return lambda value: write(_text(getattr(value, names[0])))
+    members = attrgetter(*names)
+    return lambda value: write(*map(_text, members(value)))
 
 
 def _float(value: float) -> str:
@@ -129,19 +148,12 @@ def _float(value: float) -> str:
     return repr(value) if isfinite(value) else f'"{value}"'
 
 
-_WRITTEN: dict[type, Callable[[Any], str]] = {
+_WRITERS: dict[type, Callable[[Any], str]] = {
     float: _float,
     int: repr,
     str: lru_cache(1024)(dump),
     list: lambda values: "[" + ", ".join(map(_text, values)) + "]",
 }
-
-
-@cache
-def _members(kind: type) -> list[tuple[str, str]]:
-    """Return the fields of a type of messages, each behind what stands before its value."""
-    names = [each.name for each in fields(kind) if _is_data(each.name)]
-    return [(f'{", " * bool(at)}"{name}": ', name) for at, name in enumerate(names)]
 
 
 def _is_data(name: str) -> bool:
