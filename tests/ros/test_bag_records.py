@@ -195,3 +195,18 @@ def test_a_path_that_was_written_is_read_again(suffix: str, tmp_path: Path, run:
     assert found[0] == found[1] != ""
     moved = run("lookup", f"{tmp_path}/path.{suffix}", "world", "path", "--topic", "/path", "--at", "2", "-f", "csv")
     assert moved.out.splitlines()[1].startswith("path,world,4.0,5.0,6.0"), moved.err
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("name", "part", "key"), [("PointStamped", "Point", "point"), ("Vector3Stamped", "Vector3", "vector")])
+def test_points_and_vectors_get_no_rotation(name: str, part: str, key: str, form: str, tmp_path: Path, run: Run) -> None:
+    made, kind = Maker(form), f"geometry_msgs/msg/{name}"
+    said = [made.part(kind, made.header("map", START), made.part(part, at, 2.0, 3.0)) for at in (1.0, 4.0)]
+    sent = [Sent("/it", kind, each, START) for each in said]
+    bag = str(write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent))
+    text = run("convert", "-i", bag).out
+    assert json.loads(text.splitlines()[0])[key] == {"x": 1.0, "y": 2.0, "z": 3.0}
+    rows = run("convert", "-i", bag, "-f", "csv").out
+    assert rows == f"frame,x,y,z,stamp_ns\nmap,1.0,2.0,3.0,{START}\nmap,4.0,2.0,3.0,{START}\n"
+    assert rows == run("convert", "-f", "csv", stdin=text).out
+    assert "roll,pitch,yaw" in run("convert", "-i", bag, "-f", "csv", "--to", "rpy").out  # asked for
