@@ -120,27 +120,32 @@ def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> tuple
 def _text(value: Any) -> str:
     """Return a message, or a part of one, as JSON."""
     kind = type(value)
-    write = _WRITERS.get(kind) or _WRITERS.setdefault(kind, _writer(kind))
+    write = _WRITERS.get(kind) or _WRITERS.setdefault(kind, _writer(value))
     return write(value)
 
 
-def _writer(kind: type) -> Callable[[Any], str]:
-    """Return what writes values of a type: of messages that hold plain ones as one template, for speed."""
-    if is_dataclass(kind):
-        names = [each.name for each in fields(kind) if _is_data(each.name)]
-        template = "{{" + ", ".join(f'"{name}": {{}}' for name in names) + "}}"
-        return _members_writer(names, template.format)
-    if hasattr(kind, "tolist"):
+def _writer(value: Any) -> Callable[[Any], str]:
+    """Return what writes values of the type of one: messages as one template of all that is in them, for speed."""
+    if is_dataclass(value):
+        template, names = _template(value)
+        if len(names) == 1:
+            return lambda value: template.format(_text(attrgetter(names[0])(value)))
+        members, write = attrgetter(*names), template.format
+        return lambda value: write(*map(_text, members(value)))
+    if hasattr(value, "tolist"):
         return lambda value: _text(value.tolist())
     return dump
 
 
-def _members_writer(names: Sequence[str], write: Callable[..., str]) -> Callable[[Any], str]:
-    """Return what writes an object of members."""
-    if len(names) == 1:
-        return lambda value: write(_text(getattr(value, names[0])))
-    members = attrgetter(*names)
-    return lambda value: write(*map(_text, members(value)))
+def _template(value: Any) -> tuple[str, list[str]]:
+    """Return how a message is written, and where what is put into that stands: below it, where types are fixed."""
+    parts, names = [], []
+    for name in (each.name for each in fields(value) if _is_data(each.name)):
+        inner = getattr(value, name)
+        below, more = _template(inner) if is_dataclass(inner) and hasattr(value, "__msgtype__") else ("{}", [])
+        parts.append(f'"{name}": {below}')
+        names += [f"{name}.{each}" for each in more] if below != "{}" else [name]
+    return "{{" + ", ".join(parts) + "}}", names
 
 
 def _float(value: float) -> str:
