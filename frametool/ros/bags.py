@@ -17,9 +17,10 @@ from frametool.grammar.readers import Note
 from frametool.ros.message_bytes import RawTransform
 from frametool.ros.messages import POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components
+from frametool.ros.pose_lists import posed_messages
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from frametool.documents.source import InputFile
     from frametool.grammar.edges import Options, Tally
@@ -112,6 +113,7 @@ def _check_database(file: Path) -> None:
 
 def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
     """Walk the messages of every topic with transforms; there must be as many as the bag says."""
+    refuse_foreign(reader, options.topics.chosen, path)
     topics = [connection for connection in reader.connections if _is_read(connection, options)]
     options.topics.seen |= {connection.topic for connection in reader.connections}
     for other in reader.connections:
@@ -119,20 +121,29 @@ def _transforms(reader: Any, path: str, options: Options) -> Iterator[Edge]:
             raise FormatError(f"{other.topic} holds {other.msgtype} and no transforms; is it damaged?", source=path)
     if not topics:
         poses = sorted({connection.topic for connection in reader.connections if connection.msgtype in POSES})
-        known = ", ".join(sorted(options.topics.seen))
+        foreign = {f"{topic} ({encoding})" for topic, encoding in reader.foreign.items()}
+        known = ", ".join(sorted(options.topics.seen | foreign))
         hint = f"; --topic {poses[0]} reads its poses" if poses else ""
         what = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
         raise FormatError(what, source=path)
     number = 0
     for number, (topic, received_ns, data) in enumerate(reader.messages(connections=topics), 1):
         message = reader.deserialize(data, topic.msgtype)
-        for transform in [message] if topic.msgtype in POSES else message.transforms:
+        for transform in posed_messages(message, topic.msgtype) if topic.msgtype in POSES else message.transforms:
             said = _said(transform, topic.topic, options)
             if edge := recorded_edge(said, number, topic.topic, received_ns, path, options):
                 yield edge
     check_count(reader, topics, number, path)
     if not number:
         raise FormatError(f"no messages on {', '.join(topic.topic for topic in topics)}", source=path)
+
+
+def refuse_foreign(reader: Any, chosen: Collection[str], path: str) -> None:
+    """Raise FormatError for a topic that is asked for and whose messages are in another encoding than ROS's."""
+    wanted = {topic.strip("/") for topic in chosen}
+    for topic, encoding in reader.foreign.items():
+        if topic.strip("/") in wanted:
+            raise FormatError(f"the messages of {topic} are encoded as {shown(encoding)}; cdr is read", source=path)
 
 
 def check_count(reader: Any, topics: list[Any], number: int, path: str) -> None:

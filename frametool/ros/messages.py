@@ -120,9 +120,10 @@ def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) ->
 
 
 HAS = "a message with a pose has header, pose"
-POSES = frozenset(
-    ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry")
-)
+PATH = "nav_msgs/msg/Path"
+POSES = frozenset((  # over time
+    "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry", PATH,
+))  # fmt: skip
 
 
 def is_pose(value: Any) -> bool:

@@ -460,7 +460,8 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         raise Misfit(f"expected one position, found {shown_both}", (flat.position.names[0],), key=True)
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
-    kind = _kind(key, turned or (not request.operation.moves and _turns_in_doubt(value)), request)
+    turns = turned or (not request.operation.moves and _turns_in_doubt(value))
+    kind = key if not turns and _stays_point(value, key, request) else _kind(key, turns, request)
     record = Record(path, Shape(kind, None), key=key)
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
@@ -692,6 +693,14 @@ def _kind(key: str, rotations: object, request: Request) -> str:
             raise Misfit(f"a record has a rotation and cannot be taken for a {request.kind}")
         return POSE
     return request.kind or (VECTOR if key == "vector" else POINT)
+
+
+def _stays_point(value: dict[str, Any], key: str, request: Request) -> bool:
+    """Tell a PointStamped or Vector3Stamped that is written anew and for which nobody asked for a rotation."""
+    operation = request.operation
+    is_kept = operation.changes_nothing and operation.formula is None and request.gathered is None
+    is_usual = not (request.kind or request.given) and {each.spec for each in request.notations} <= {"quaternion"}
+    return "header" in value and key in (POINT, VECTOR) and is_kept and is_usual
 
 
 def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -> Record:

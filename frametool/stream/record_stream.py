@@ -8,7 +8,7 @@ from io import BufferedReader, RawIOBase
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FrametoolError
+from frametool.errors import FormatError, FrametoolError
 from frametool.stream import stamp_source
 from frametool.stream.answers import Outside
 from frametool.stream.faults import SKIP, STOP, Fault, RowNote
@@ -50,7 +50,12 @@ def _outcomes(
     first = next(blocks, None)
     if first is None:
         return
-    second = next(blocks, None) if len(first) < SMALL and _has_ended(stream) else b""
+    second: bytes | None = b""
+    if len(first) < SMALL and _has_ended(stream):
+        try:
+            second = next(blocks, None)
+        except FormatError as error:  # comes behind the results of what is whole
+            blocks = _raising(error)
     few = second is None and not request.in_order
     if few and len((found := splitter.parts(first)).parts) <= FEW:
         outcome = _singly(first, found.parts, form, request, source)
@@ -67,6 +72,12 @@ def _outcomes(
             stream, extent, taken, name=source, size=size or BLOCK_BYTES, whole=lambda: splitter.whole
         )
     yield from mapped(process, chain(begun, following), jobs)
+
+
+def _raising(error: FormatError) -> Iterator[bytes]:
+    """Yield nothing and raise an error."""
+    raise error
+    yield b""
 
 
 class _Pieces(RawIOBase):

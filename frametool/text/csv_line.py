@@ -32,4 +32,5 @@ def split_line(line: str) -> list[LineCell]:
 
 def quoted(text: str) -> str:
     """Write a cell, in quotes where a reader would split it."""
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+    is_split = "," in text or '"' in text or "\r" in text or "\n" in text
+    return '"' + text.replace('"', '""') + '"' if is_split else text

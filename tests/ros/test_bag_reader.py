@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from contextlib import closing
 from sqlite3 import connect
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 pytest.importorskip("rosbags")
-from recorded import FORMS, START, TF, Maker, Sent, read, write
+import mcap_bytes as mcap
+from recorded import FORMS, START, TF, Maker, Sent, read, store, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,3 +71,60 @@ def test_types_without_a_definition_are_those_of_ros2(tmp_path: Path, run: Run) 
     assert static.definition.startswith("geometry_msgs/TransformStamped[] transforms\n")
     assert (odd.definition, odd.data) == ("", b"1234")
     assert run("lookup", "new.mcap", "map", "base", "-f", "csv").status == 0
+
+
+POSE, OTHERS = "geometry_msgs/msg/PoseStamped", ("jsonschema", "protobuf", "flatbuffer", "ros1msg", "")
+
+
+def with_foreign(folder: Path, encoding: str, *, summary: bool) -> Path:
+    """Write MCAP with a topic of ROS 2 between two others; a summary repeats what they are, as most writers have it."""
+    made, store_ = Maker("mcap"), store("mcap")
+    defined = store_.generate_msgdef(POSE, ros_version=2)[0]
+    about = b"".join((
+        mcap.schema(1, POSE, "ros2msg", defined), mcap.schema(2, "foxglove.Log", encoding, "\0" * 3 if not encoding else "{}"),
+        mcap.record(3, (3).to_bytes(2, "little") + mcap.text("foxglove.Grid") + mcap.text(encoding) + mcap.text(b"\xff\xfe")),
+        mcap.channel(1, 2, "/log", "json"), mcap.channel(2, 1, "/pose", offered_qos_profiles="never: [said"),
+        mcap.channel(3, 3, "/grid", "protobuf", offered_qos_profiles="so"), mcap.channel(4, 1, "/odd", offered_qos_profiles="so"),
+    ))  # fmt: skip
+    sent = made.serialised(*made.pose("map", START, STILL))
+    data = b"".join((mcap.message(1, b"{}", START, START), mcap.message(2, sent, START, START), mcap.message(3, b"1", START, START)))
+    path = folder / "mixed.mcap"
+    path.write_bytes(mcap.whole(mcap.header(), about, data))
+    if summary:
+        body = mcap.MAGIC + mcap.header() + about + data + mcap.record(15, bytes(4))
+        counts = b"".join(struct.pack("<HQ", number, 1) for number in (1, 2, 3))
+        said = struct.pack("<QHIIIIQQI", 3, 3, 4, 0, 0, 0, START, START, len(counts)) + counts
+        footer = struct.pack("<QQI", len(body), 0, 0)
+        path.write_bytes(body + about + mcap.record(11, said) + mcap.record(2, footer) + mcap.MAGIC)
+    return path
+
+
+@pytest.mark.parametrize("summary", [False, True])
+@pytest.mark.parametrize("encoding", OTHERS)
+def test_topics_in_other_encodings_are_in_nobodys_way(encoding: str, summary: bool, tmp_path: Path, run: Run) -> None:  # noqa: FBT001
+    path = with_foreign(tmp_path, encoding, summary=summary)
+    done = run("convert", "-i", str(path), "--topic", "/pose", "-f", "csv")
+    assert done.status == 0, done.err
+    assert done.out.splitlines()[1] == f"map,1.0,2.0,3.0,0.0,0.0,0.0,1.0,{START}"
+    assert run("lookup", str(path), "map", "pose", "--topic", "/pose").status == 0
+
+
+@pytest.mark.parametrize("call", [("convert", "-i", "BAG", "--topic", "/log"), ("lookup", "BAG", "a", "b", "--topic", "log")])
+def test_a_topic_in_another_encoding_that_is_asked_for_says_which(call: tuple[str, ...], tmp_path: Path, run: Run) -> None:
+    path = str(with_foreign(tmp_path, "jsonschema", summary=True))
+    done = run(*(path if each == "BAG" else each for each in call))
+    assert (done.status, done.out) == (1, "")
+    assert done.err == f"frametool: {path}: the messages of /log are encoded as 'json'; cdr is read\n"
+
+
+@pytest.mark.parametrize("form", ["folder", "sqlite"])
+def test_a_quality_of_service_that_says_nothing_is_in_nobodys_way(form: str, tmp_path: Path, run: Run) -> None:
+    path = recording(tmp_path, form)
+    metadata = path / "metadata.yaml"
+    said = re.sub(r"offered_qos_profiles:.*", 'offered_qos_profiles: "never: [said"', metadata.read_text())
+    metadata.write_text(said)
+    for database in path.glob("*.db3"):
+        with closing(connect(database)) as opened, opened:
+            opened.execute("UPDATE topics SET offered_qos_profiles = 'so'")
+    done = run("lookup", str(path), "map", "base", "-f", "csv")
+    assert done.status == 0, done.err

@@ -12,9 +12,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
+from recorded import FORMS, START, Maker, Sent, write
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
+
+from frametool.grammar.edges import Tally
+from frametool.ros.bag_records import open_records
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -116,3 +120,93 @@ def test_a_bag_that_is_damaged_midway_is_one_error_behind_its_whole_messages(bag
     assert done.status == 1
     assert done.err.splitlines()[-1].startswith(f"frametool: {bag}: {said}")
     assert json.loads(done.out.splitlines()[0])["lat"] == pytest.approx(48.137, abs=1e-9)
+
+
+POSES = [(float(at), 0.5, -1e-7, 0.0, 0.0, 0.0, 1.0) for at in range(300)]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_poses_of_a_recording_are_computed_as_those_of_its_text_are(form: str, tmp_path: Path, run: Run) -> None:
+    made = Maker(form)
+    sent = [Sent("/pose", *made.pose("map", START + at, numbers), START + at) for at, numbers in enumerate(POSES)]
+    path = write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent)
+    text = run("convert", "-i", str(path), "--on-error", "skip").out
+    for wanted in ("csv", "yaml", "tum"):
+        assert run("convert", "-i", str(path), "-f", wanted).out == run("convert", "-f", wanted, stdin=text).out
+    lines = text.splitlines()
+    assert len(lines) == len(POSES)
+    assert [json.loads(line)["pose"]["position"]["x"] for line in lines] == [each[0] for each in POSES]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_recording_is_read_in_pieces_of_many_messages(form: str, tmp_path: Path) -> None:
+    made = Maker(form)
+    sent = [Sent("/pose", *made.pose("map", START + at, numbers), START + at) for at, numbers in enumerate(POSES)]
+    path = write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent)
+    stream = open_records(str(path), (), Tally())
+    assert stream is not None
+    with stream:
+        assert stream.read1(1 << 19).count(b"\n") == len(POSES)
+
+
+@pytest.mark.parametrize("seconds", [1 << 31, (1 << 32) - 1])
+def test_seconds_of_ros1_have_no_sign(seconds: int, tmp_path: Path, run: Run) -> None:
+    made, stamp_ns = Maker("bag"), seconds * 10**9 + 5
+    sent = [
+        Sent("/pose", *made.pose("map", START, POSES[0]), START),
+        *(Sent("/tf", *made.transforms(("map", "base", POSES[0], START + each)), START) for each in (-10**9, 0)),
+    ]
+    said = [each._replace(data=made.serialised(each.kind, each.data)) for each in sent]  # the library has int32
+    now, then = (np.array(divmod(each, 10**9), "<u4").tobytes() for each in (START, stamp_ns))
+    path = write(tmp_path / "run.bag", "bag", [each._replace(data=each.data.replace(now, then)) for each in said])
+    done = run("convert", "-i", str(path), "--topic", "/pose", "-f", "csv")
+    assert done.out.splitlines()[1].endswith(f",{stamp_ns}"), done.err
+    assert f"stamp_ns: {stamp_ns}" in run("lookup", str(path), "map", "base").out
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_poses_of_a_path_have_their_own_headers_and_what_these_leave_open_is_that_of_the_path(
+    form: str, tmp_path: Path, run: Run
+) -> None:
+    made = Maker(form)
+    poses = [made.pose("odom", START + 1, POSES[1])[1], made.pose("", 0, POSES[2])[1]]
+    path = made.part("nav_msgs/msg/Path", made.header("map", START + 9), poses)
+    place = tmp_path / ("run.bag" if form == "bag" else "run")
+    bag = write(place, form, [Sent("/path", "nav_msgs/msg/Path", path, START)])
+    rows = [line.split(",") for line in run("convert", "-i", str(bag), "-f", "csv").out.splitlines()[1:]]
+    assert [(row[0], float(row[1]), int(row[-1])) for row in rows] == [("odom", 1.0, START + 1), ("map", 2.0, START + 9)]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_poses_of_an_array_have_its_header(form: str, tmp_path: Path, run: Run) -> None:
+    made, kind = Maker(form), "geometry_msgs/msg/PoseArray"
+    array = made.part(kind, made.header("map", START), [made.posed(POSES[1]), made.posed(POSES[2])])
+    bag = write(tmp_path / ("run.bag" if form == "bag" else "run"), form, [Sent("/some", kind, array, START)])
+    rows = [line.split(",") for line in run("convert", "-i", str(bag), "-f", "csv").out.splitlines()[1:]]
+    assert [(row[0], float(row[1]), int(row[-1])) for row in rows] == [("map", 1.0, START), ("map", 2.0, START)]
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "bag"])
+def test_a_path_that_was_written_is_read_again(suffix: str, tmp_path: Path, run: Run) -> None:
+    rows = "t,x,y,z,qx,qy,qz,qw\n1,1,2,3,0,0,0,1\n2,4,5,6,0,0,1,0\n"
+    for kind in ("path", "pose"):
+        assert run("convert", "--messages", kind, "-o", f"{tmp_path}/{kind}.{suffix}", stdin=rows).status == 0
+    found = [run("convert", "-i", f"{tmp_path}/{kind}.{suffix}", "-f", "csv").out for kind in ("path", "pose")]
+    assert found[0] == found[1] != ""
+    moved = run("lookup", f"{tmp_path}/path.{suffix}", "world", "path", "--topic", "/path", "--at", "2", "-f", "csv")
+    assert moved.out.splitlines()[1].startswith("path,world,4.0,5.0,6.0"), moved.err
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("name", "part", "key"), [("PointStamped", "Point", "point"), ("Vector3Stamped", "Vector3", "vector")])
+def test_points_and_vectors_get_no_rotation(name: str, part: str, key: str, form: str, tmp_path: Path, run: Run) -> None:
+    made, kind = Maker(form), f"geometry_msgs/msg/{name}"
+    said = [made.part(kind, made.header("map", START), made.part(part, at, 2.0, 3.0)) for at in (1.0, 4.0)]
+    sent = [Sent("/it", kind, each, START) for each in said]
+    bag = str(write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent))
+    text = run("convert", "-i", bag).out
+    assert json.loads(text.splitlines()[0])[key] == {"x": 1.0, "y": 2.0, "z": 3.0}
+    rows = run("convert", "-i", bag, "-f", "csv").out
+    assert rows == f"frame,x,y,z,stamp_ns\nmap,1.0,2.0,3.0,{START}\nmap,4.0,2.0,3.0,{START}\n"
+    assert rows == run("convert", "-f", "csv", stdin=text).out
+    assert "roll,pitch,yaw" in run("convert", "-i", bag, "-f", "csv", "--to", "rpy").out  # asked for

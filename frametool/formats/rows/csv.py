@@ -28,15 +28,15 @@ HALVES = ("linear", "angular", "force", "torque")
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return a header and one row a result."""
-    return _table([_pose_row(result, style) for result in results], style)
+    return _table([pose_cells(result, style) for result in results], style)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return a header and one row a record; a point's coordinates are x, y, z."""
-    return _table([dict(_record_cells(record)) for record in records], style)
+    return _table([dict(record_cells(record)) for record in records], style)
 
 
-def _pose_row(result: Result, style: Style) -> dict[str, Any]:
+def pose_cells(result: Result, style: Style) -> dict[str, Any]:
     """Return a pose's cells by column name.
 
     An extra that a notation says already (the angle beside an axis) is left out; raises ValueInvalid where two
@@ -64,12 +64,12 @@ def _pose_row(result: Result, style: Style) -> dict[str, Any]:
     extras = {
         name: cell
         for key, value in in_columns(result.said(style)).items()
-        for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
+        for name, cell in (record_cells({key: value}) if key in SIX else ((key, value),))
     }
     return cells | {key: value for key, value in extras.items() if key not in cells}
 
 
-def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+def record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the cells of a record: three of each vector; what else is no scalar is one cell of JSON."""
     for key, value in in_columns(record).items():
         if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
@@ -78,7 +78,7 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         elif key == "utm" and isinstance(value, dict):
             yield from ((f"utm_{name}" if name == "zone" else name, cell) for name, cell in value.items())
         elif key in SIX and isinstance(value, dict):
-            for name, cell in _record_cells(value):
+            for name, cell in record_cells(value):
                 yield name if name.startswith(HALVES) else f"{key}_{name}", cell
         else:
             yield key, value
