@@ -14,7 +14,7 @@ from frametool.ros.message_bytes import MessageFields, MessageHeader
 from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -85,11 +85,21 @@ class MessageMover:
             self._pose(fields, self._pose_of(header))
 
     def path(self, fields: MessageFields) -> None:
-        """Move a Path, each pose by its own header; what that leaves open is as the header of the path says."""
+        """Move a Path, each pose by its own header; what that leaves open is as `pose_lists` has it."""
         header = self._listed(fields)
+        has_stamps = any(self._stamps_of_path(fields.data))
         for _ in range(fields.integer()):
             frame, stamp_ns = fields.header(self.into)
-            self._pose(fields, self._pose_of(MessageHeader(frame or header.frame, stamp_ns or header.stamp_ns)))
+            stamp_ns = stamp_ns if stamp_ns or (has_stamps and frame) else header.stamp_ns
+            self._pose(fields, self._pose_of(MessageHeader(frame or header.frame, stamp_ns)))
+
+    def _stamps_of_path(self, data: bytes) -> Iterator[int]:
+        """Yield the stamp of each pose."""
+        fields = MessageFields(data, ros1=self.ros1)
+        fields.header()
+        for _ in range(fields.integer()):
+            yield fields.header().stamp_ns
+            fields.pose()
 
     def _header(self, fields: MessageFields) -> MessageHeader:
         """Take the header of the message over."""

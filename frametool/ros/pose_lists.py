@@ -24,19 +24,18 @@ class Posed:
 def posed_messages(message: Any, kind: str) -> Sequence[Any] | Iterator[Any]:
     """Return the poses of a message that is a list of them, each with its header; else the message itself.
 
-    A pose of a Path has its own header; the frame and the stamp that it leaves open are those of the path.
+    A pose of a Path has its own header; frame and stamp that it leaves open are those of the path.  The stamp 0 beside
+    a frame is one where other poses have stamps.
     """
     if kind == POSE_ARRAY:
         return (Posed(message.header, pose) for pose in message.poses)
     if kind == PATH:
-        return (Posed(_completed(each.header, message.header), each.pose) for each in message.poses)
+        has_stamps = any(each.header.stamp.sec or each.header.stamp.nanosec for each in message.poses)
+        return (Posed(_completed(each.header, message.header, has_stamps), each.pose) for each in message.poses)
     return (message,)
 
 
-def _completed(header: Any, outer: Any) -> Any:
-    """Return a header with the frame and the stamp of the one around it, where it has none."""
-    if not header.frame_id:
-        header = replace(header, frame_id=outer.frame_id)
-    if not (header.stamp.sec or header.stamp.nanosec):
-        header = replace(header, stamp=outer.stamp)
-    return header
+def _completed(own: Any, outer: Any, has_stamps: bool) -> Any:  # noqa: FBT001 - it reads so
+    """Return a header with the frame, and the stamp, of the one around it where it has none."""
+    says_when = own.stamp.sec or own.stamp.nanosec or (has_stamps and own.frame_id)
+    return replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)

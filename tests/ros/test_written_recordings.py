@@ -258,6 +258,13 @@ def test_every_command_writes_every_recording(run: Run, tmp_path: Path, form: st
     assert messages(tmp_path / FORMS[form])
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_a_path_comes_back_with_the_stamp_0_among_others(run: Run, form: str) -> None:
+    run("convert", "-i", "w.tum", "-f", form, "--messages", "path", "-o", FORMS[form], files={"w.tum": as_tum([0, 5 * 10**8], rows(2)[1])})
+    back, given = (run("convert", "-i", name, "-f", "tum") for name in (FORMS[form], "w.tum"))
+    assert back.out == given.out
+
+
 def test_a_disk_without_room_is_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_room(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
