@@ -119,7 +119,7 @@ class AlikeRecords:
         if any(type(node.value) in (dict, list) and self.is_yaml for _, node in template.rest.values()):
             return None  # it could not be read without what stands around it
         plan = plan_of(template, self.request, yaml=self.is_yaml)._replace(pieces=())
-        if shape.kind in (POSE, ROTATION):
+        if shape.kind in (POSE, ROTATION) and (record.key != VECTOR or target.notations):
             return plan._replace(targets=(QUATERNIONS,)) if self.form not in MESSAGES else None
         is_flat = shape.kind in (POINT, VECTOR) and (self.form == "csv" or has_no_text(self.form))
         return plan if is_flat else None

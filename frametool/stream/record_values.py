@@ -24,7 +24,7 @@ from frametool.grammar.result import Result, with_entries
 from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import placed, value_at
 from frametool.stream.request import Memory, Request
-from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, checked_rotation
+from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled, rest_of, used_keys
@@ -322,14 +322,17 @@ def _header_stamp(record: Record) -> dict[str, int]:
     return {} if record.stamp_ns is None else {"stamp_ns": record.stamp_ns}
 
 
-def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: Style) -> Result:
-    """Return a pose with its frames and what else its record says."""
+def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: Style) -> Value:
+    """Return a pose with its frames and what else its record says; a vector that nothing turns stays one."""
     entry = made.entry
     record = entry.record
     pose = Pose.of(made.parts[:7], entry.name, entry.parent)
     placed, turned = entry.target.unit is not None or entry.target.whole, bool(entry.target.notations)
     pose = pose._replace(position=pose.position if placed else None, rotation=pose.rotation if turned else None)
     extras = _extras(made, request, 7) | _rest(node, unit, record)
+    if record.key == VECTOR and placed and not turned and request.operation.keeps_frames:  # it is at no place
+        named = {} if entry.parent is None else {"frame": entry.parent}
+        return named | {VECTOR: [*made.parts[:3]]} | _header_stamp(record) | with_stamp_ns(extras, style.form)
     if request.operation.similar and isinstance(extras.get(SCALE), float):
         pose = pose._replace(scale=extras.pop(SCALE))
     return Result(pose, _header_stamp(record) | with_stamp_ns(extras, style.form))

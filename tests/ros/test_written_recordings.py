@@ -217,6 +217,7 @@ def test_points_with_stamps_become_points_of_their_frame(run: Run, tmp_path: Pat
     (["convert", "-i", "w.tum", "-o", "w.mcap", "--to", "rpy"], 1, "mcap writes rotations in its own way; leave --to out\n"),
     (["convert", "-i", "n.csv", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line\n"),
     (["convert", "-i", "k.txt", "--in", "kitti", "--quiet", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line\n"),
+    (["convert", "-i", "v.jsonl", "-o", "w.mcap"], 1, "mcap is not written of rows of a vector; write csv, json or yaml\n"),
     (["convert", "-i", "v.csv", "-o", "w.mcap", "--as", "twist"], 2, "convert: no such option '--as'"),
     (["tree", "t.yaml", "-o", "t.mcap", "--topic-out", "/a"], 1, "the tree stands and moves, on two topics; /a names one\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", "w.tum"], 5, "w.tum: exists; give --force to replace it\n"),
@@ -232,6 +233,7 @@ def test_what_cannot_be_written_is_told_in_one_line(run: Run, tmp_path: Path, ar
     files = {
         "w.tum": as_tum(*rows(2)), "n.csv": "x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n", "k.txt": "1 0 0 0 0 1 0 0 0 0 1 0\n",
         "t.yaml": TREE, "v.csv": "t,linear_x\n", "one.yaml": "frames: [{name: a}]\n",
+        "v.jsonl": '{"t": 1, "frame": "a", "vector": [1, 2, 3]}\n' * 3,
     }  # fmt: skip
     before = {*files}
     done = run(*arguments, files=files)
