@@ -9,7 +9,7 @@ import os
 import re
 import sys
 from importlib import import_module
-from itertools import chain, islice
+from itertools import islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
@@ -205,17 +205,14 @@ class Output:
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
-        remaining = iter(values)
         if self._in_blocks:
             self._refuse_place()
-            self.pieces(self._blocks(remaining))
+            self.pieces(self._blocks(iter(values)))
             return
-        found = list(islice(remaining, BLOCK)) if self.style.form == "csv" else list(remaining)
-        if len(found) == BLOCK:
-            from frametool.formats.rows.csv_spool import table_pieces
-
-            self.pieces(table_pieces(chain(found, remaining), self.style))
+        if self.style.form == "csv":
+            self.pieces(self._module("").table_pieces(iter(values), self.style))
             return
+        found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
             self.poses(poses)

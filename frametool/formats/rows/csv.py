@@ -8,35 +8,37 @@ Metres, radians unless the column says degrees; the pose of `name` in `parent`.
 
 from __future__ import annotations
 
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
-from frametool.grammar.result import NoResult, carries_position, in_columns, pose_numbers, without_frame
+from frametool.grammar.result import NoResult, Result, carries_position, in_columns, pose_numbers, without_frame
 from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.grammar.result import Result, Style
+    from frametool.grammar.result import Style
 
 
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
 SIX = ("twist", "wrench")
+FEW = 1 << 13  # rows of a table that is made at once
 HALVES = ("linear", "angular", "force", "torque")
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
     """Return a header and one row a result."""
-    return _table([pose_cells(result, style) for result in results], style)
+    return _table([_pose_cells(result, style) for result in results], style)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return a header and one row a record; a point's coordinates are x, y, z."""
-    return _table([dict(record_cells(record)) for record in records], style)
+    return _table([dict(_record_cells(record)) for record in records], style)
 
 
-def pose_cells(result: Result, style: Style) -> dict[str, Any]:
+def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
     """Return a pose's cells by column name.
 
     An extra that a notation says already (the angle beside an axis) is left out; raises ValueInvalid where two
@@ -64,12 +66,12 @@ def pose_cells(result: Result, style: Style) -> dict[str, Any]:
     extras = {
         name: cell
         for key, value in in_columns(result.said(style)).items()
-        for name, cell in (record_cells({key: value}) if key in SIX else ((key, value),))
+        for name, cell in (_record_cells({key: value}) if key in SIX else ((key, value),))
     }
     return cells | {key: value for key, value in extras.items() if key not in cells}
 
 
-def record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the cells of a record: three of each vector; what else is no scalar is one cell of JSON."""
     for key, value in in_columns(record).items():
         if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
@@ -78,10 +80,33 @@ def record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         elif key == "utm" and isinstance(value, dict):
             yield from ((f"utm_{name}" if name == "zone" else name, cell) for name, cell in value.items())
         elif key in SIX and isinstance(value, dict):
-            for name, cell in record_cells(value):
+            for name, cell in _record_cells(value):
                 yield name if name.startswith(HALVES) else f"{key}_{name}", cell
         else:
             yield key, value
+
+
+def table_pieces(values: Iterator[Result | dict[str, Any]], style: Style) -> Iterator[str]:
+    """Yield the table of results, poses or mappings; of many it waits in a file until all columns are known."""
+    cells = (_pose_cells(each, style) if isinstance(each, Result) else dict(_record_cells(each)) for each in values)
+    rows = list(islice(cells, FEW))
+    if len(rows) < FEW:
+        yield _table(rows, style)
+        return
+    from json import dumps, loads
+    from tempfile import TemporaryFile
+
+    columns: list[str] = []  # in the order they are first met, so that a row lacks only the last of them
+    with TemporaryFile("w+", encoding="ascii") as waiting:
+        for each in chain(rows, cells):
+            if [*each] != columns:
+                columns += [name for name in each if name not in columns]
+            waiting.write(f"{len(columns)} {dumps(row([each.get(name, '') for name in columns], style))}\n")
+        yield row(columns, style)
+        waiting.seek(0)
+        for line in waiting:
+            count, _, text = line.partition(" ")
+            yield loads(text)[:-1] + "," * (len(columns) - int(count)) + "\n"
 
 
 def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:

@@ -1,4 +1,4 @@
-"""Tables whose rows come one after the other are those of all rows at once."""
+"""Tables of results: those whose rows wait in a file are those of all rows at once."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from frametool.formats.rows import csv_spool
-from frametool.formats.rows.csv import write_points, write_poses
+from frametool.formats.rows import csv
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
@@ -22,12 +21,15 @@ SEQUENCES: list[list[Any]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("batch", [1, 2, 1000])
+@pytest.mark.parametrize("few", [1, 2, 4])
 @pytest.mark.parametrize("values", SEQUENCES)
-def test_rows_one_by_one_are_the_table_of_all_at_once(values: list[Any], batch: int, monkeypatch: Any) -> None:
-    monkeypatch.setattr(csv_spool, "BATCH", batch)
-    if all(isinstance(each, Result) for each in values):
-        expected = write_poses(values, STYLE)
-    else:
-        expected = write_points([each.mapping(STYLE) if isinstance(each, Result) else each for each in values], STYLE)
-    assert "".join(csv_spool.table_pieces(iter(values), STYLE)) == expected
+def test_rows_that_wait_in_a_file_are_the_table_of_all_at_once(values: list[Any], few: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    at_once = "".join(csv.table_pieces(iter(values), STYLE))
+    monkeypatch.setattr(csv, "FEW", few)
+    assert "".join(csv.table_pieces(iter(values), STYLE)) == at_once
+
+
+def test_poses_and_points_stand_in_columns_of_their_own() -> None:
+    assert "".join(csv.table_pieces(iter([PLAIN, POINT]), STYLE)) == (
+        "parent,x,y,z,qx,qy,qz,qw,stamp_ns,frame\nmap,1.0,2.0,3.0,0.0,0.0,0.0,1.0,5,\n,1.0,2.0,3.0,,,,,7,map\n"
+    )
