@@ -9,13 +9,13 @@ import struct
 from typing import TYPE_CHECKING, BinaryIO, TypeAlias
 
 from frametool.frames.stamps import BILLION
-from frametool.ros.chunks import Channel, Chunk, packed, unpacked
+from frametool.ros.message_chunks import Channel, Chunk, packed, unpacked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from frametool.ros.chunks import Entry
+    from frametool.ros.message_chunks import Entry
 
 Fields: TypeAlias = dict[bytes, bytes]  # of a header
 Connection: TypeAlias = tuple[Fields, Fields]  # the header of its record, and its data, which are a header too

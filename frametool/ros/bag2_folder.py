@@ -13,16 +13,16 @@ from frametool.documents.document import parse_documents
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import dump
 from frametool.errors import FormatError, ValueInvalid
-from frametool.ros.chunks import FULL, Chunk, zstd
 from frametool.ros.mcap_chunks import MESSAGE_HEAD, mapping, message_head, sized
+from frametool.ros.message_chunks import FULL, Chunk, zstd
 from frametool.ros.recordings import BAG2, METADATA, latched, typestore
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from contextlib import ExitStack
 
-    from frametool.ros.chunks import Entry
     from frametool.ros.mcap_chunks import ChannelRegistry, McapWriter
+    from frametool.ros.message_chunks import Entry
 
 INFORMATION = "rosbag2_bagfile_information"
 QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # what rosbag2 says of a channel of MCAP

@@ -91,7 +91,6 @@ def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
     """Join lines to pieces, which are read faster than one line each; an error comes behind the lines before it."""
     held: list[str] = []
     size = 0
-    problem = None
     try:
         for line in lines:
             held.append(line)
@@ -99,11 +98,10 @@ def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
             if size >= PIECE:
                 yield "".join(held).encode()
                 held, size = [], 0
-    except FormatError as error:
-        problem = error
+    except FormatError:
+        yield "".join(held).encode()
+        raise
     yield "".join(held).encode()
-    if problem is not None:
-        raise problem
 
 
 def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> tuple[Any, str] | None:

@@ -11,13 +11,13 @@ from itertools import chain
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 from zlib import crc32
 
-from frametool.ros.chunks import FULL, Channel, Chunk, OtherRecord, packed, unpacked
+from frametool.ros.message_chunks import FULL, Channel, Chunk, OtherRecord, packed, unpacked
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from frametool.ros.chunks import Entry
+    from frametool.ros.message_chunks import Entry
 
     Value = TypeVar("Value")
 

@@ -6,12 +6,12 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from frametool.ros.bags import TYPES
-from frametool.ros.chunks import Chunk
+from frametool.ros.message_chunks import Chunk
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.ros.chunks import Channel, Entry
+    from frametool.ros.message_chunks import Channel, Entry
     from frametool.ros.record_copy import Advance, CopiedRecording
 
     Change = Callable[[bytes, int], bytes | None]  # of a message and its log time; None leaves it out

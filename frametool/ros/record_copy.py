@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from tempfile import TemporaryFile, gettempdir
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.yaml_writer import dump
-from frametool.errors import FileProblem, FormatError, FrametoolError
+from frametool.errors import FileProblem, FormatError
 from frametool.ros import bag1_chunks, mcap_chunks
 from frametool.ros.bag1_chunks import Bag1File, Bag1Writer
 from frametool.ros.bag2_folder import INFORMATION, DatabaseFile, files_of, metadata_of, read_metadata
 from frametool.ros.bags import broken, check_files, refuse_empty
-from frametool.ros.chunks import Channel, Chunk, OtherRecord, zstd
 from frametool.ros.mcap_chunks import ChannelRegistry, McapFile, McapWriter, built, mapping, sized, texts_of
-from frametool.ros.recordings import BAG1, BAG2, METADATA, NAME, NO_EXTRA, PIECE, FirstPiece
+from frametool.ros.message_chunks import Channel, Chunk, OtherRecord, zstd
+from frametool.ros.recordings import BAG1, BAG2, METADATA, NAME, NO_EXTRA, PIECE, FirstPiece, room_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -190,7 +190,7 @@ def _bag(
 ) -> Iterator[bytes]:  # fmt: skip
     """Yield the bytes of a ROS 1 bag, whose first ones are known last."""
     writer = Bag1Writer(recording.connections)
-    with _room(folder), TemporaryFile(dir=folder or None) as file:
+    with room_in(folder), TemporaryFile(dir=folder or None) as file:
         file.write(writer.begin())
         file.write(writer.chunk(_chunk_of(added, first_ns, bag1_chunks.message), None))
         for piece in recording.pieces():
@@ -204,14 +204,3 @@ def _bag(
         file.seek(0)
         while data := file.read(PIECE):
             yield data
-
-
-@contextmanager
-def _room(folder: str) -> Iterator[None]:
-    """Name the folder in which there is no room, or what else the system says of it."""
-    try:
-        yield
-    except FrametoolError:
-        raise
-    except OSError as error:
-        raise FileProblem(f"{folder or gettempdir()}: {(error.strerror or str(error)).lower()}") from None

@@ -20,7 +20,7 @@ from weakref import finalize
 
 import numpy as np
 
-from frametool.errors import FileProblem, ValueInvalid, printable, shown
+from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable, shown
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, quaternion
 
@@ -91,7 +91,7 @@ class RecordingFile:
         self.log_ns = 0
         self._folder = folder
         self._store = typestore(form)
-        with _naming(folder):
+        with room_in(folder):
             self._home = Path(mkdtemp(".part", ".frametool.", folder or None))
             bag = self._home / NAME
             made = Writer1(bag) if form == BAG1 else Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP)
@@ -121,7 +121,7 @@ class RecordingFile:
     def pieces(self) -> Iterator[bytes]:
         """End the recording and yield its bytes; of a folder file after file, each begun by a FirstPiece."""
         bag = self._home / NAME
-        with _naming(self._folder):
+        with room_in(self._folder):
             bag.mkdir(parents=True, exist_ok=True)
             self._writer.close()
             metadata = b"" if self.form == BAG1 else (bag / METADATA).read_bytes()
@@ -144,10 +144,12 @@ def _discarded(writer: Any, file: IO[bytes], folder: Path) -> None:
 
 
 @contextmanager
-def _naming(folder: str) -> Iterator[None]:
-    """Name the folder in which something cannot be written."""
+def room_in(folder: str) -> Iterator[None]:
+    """Name the folder in which there is no room, or what else the system says of it."""
     try:
         yield
+    except FrametoolError:
+        raise
     except OSError as error:
         raise _named(error, folder) from None
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from frametool.stream.answers import Outside
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, STOP, Fault, RowNote
-from frametool.stream.record_cuts import RecordCutter, as_cut, block_of, by_template, in_order, plan_of
+from frametool.stream.record_cuts import RecordCutter, block_of, in_order, plan_of
 from frametool.stream.record_text import Rendered, column_in, null_of, rendered
 from frametool.stream.rows import texts_as_rows, written
 from frametool.stream.run import Outcome
@@ -19,19 +19,18 @@ from frametool.stream.template import Template
 from frametool.text.spans import framed
 
 if TYPE_CHECKING:
-    from frametool.stream.record_cuts import Cut, Places
+    from collections.abc import Sequence
+
+    from frametool.stream.record_cuts import Cut, FoundRecords, Places
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part, Splitter
-    from frametool.text.spans import Bytes
 
 
 class Found:
-    """What one block holds: records by template, and what passes or is wrong, by place."""
+    """What one block holds beside the records that templates find: what passes or is wrong, by place."""
 
     def __init__(self) -> None:
         """Create an empty one."""
-        self.cuts: list[Cut] = []
-        self.singles: dict[Template, list[tuple[tuple[int, int], ...]]] = {}
         self.odd: list[tuple[int, bytes]] = []
         self.faults: list[tuple[int, Fault]] = []
         self.notes: list[RowNote] = []
@@ -57,14 +56,13 @@ class RecordBlocks:
     def __call__(self, text: bytes) -> Outcome:
         """Process one block."""
         found = Found()
-        found.cuts, rest = self.cutter.cut(text)
+        records, rest = self.cutter.cut(text)
         for start, end in rest:
-            self._take_singly(text, start, end, found)
-        cuts = by_template(found.cuts + [as_cut(template, spans) for template, spans in found.singles.items()])
-        found.cuts = in_order(cuts) if self.request.in_order else cuts
-        return self._outcome(text, framed(text), found)
+            self._take_singly(text, start, end, records, found)
+        cuts = records.by_template()
+        return self._outcome(text, in_order(cuts) if self.request.in_order else cuts, found)
 
-    def _take_singly(self, text: bytes, start: int, end: int, found: Found) -> None:
+    def _take_singly(self, text: bytes, start: int, end: int, records: FoundRecords, found: Found) -> None:
         """Take records one by one, learning new templates; what stands between them passes."""
         at, line, counted = start, 0, 0
         for part, hit in self.cutter.singly(text, start, end):
@@ -74,8 +72,7 @@ class RecordBlocks:
             line, counted = line + text.count(b"\n", counted, part.start), part.start
             template, places = hit or self._learned(text, part, line, found)
             if template is not None:
-                spans = (*places, (part.end, part.after), (part.begin, part.start))
-                found.singles.setdefault(template, []).append(spans)
+                records.add(part, template, places)
         if at < end:
             found.odd.append((at, text[at:end]))
 
@@ -99,12 +96,12 @@ class RecordBlocks:
         found.odd.append((part.begin, text[part.begin : part.start] + row + text[part.end : part.after]))
         return None, ()
 
-    def _outcome(self, text: bytes, data: Bytes, found: Found) -> Outcome:
+    def _outcome(self, text: bytes, cuts: Sequence[Cut], found: Found) -> Outcome:
         """Run every template's records, and put all of it in order."""
         stops, skips = self.request.on_error == STOP, self.request.on_error != NULL
         faults, odd, notes = list(found.faults), found.odd, found.notes
-        runs = []
-        for cut in found.cuts:
+        data, runs = framed(text), []
+        for cut in cuts:
             plan = plan_of(cut.template, self.request, yaml=self.form == "yaml")
             run = Run(plan, block_of(cut, data, text), self.state)
             runs.append(run)
@@ -121,7 +118,7 @@ class RecordBlocks:
         odd = [(place, piece) for place, piece in odd if end is None or place < end]
         if odd:
             groups.append(texts_as_rows(odd))
-        rows = sum(len(cut.starts) for cut in found.cuts) + len(found.faults) + found.alone
+        rows = sum(len(cut.starts) for cut in cuts) + len(found.faults) + found.alone
         return Outcome(
             written(groups),
             [fault for _, fault in sorted(faults)],

@@ -45,6 +45,32 @@ class Cut(NamedTuple):
     ends: Ints
 
 
+class FoundRecords:
+    """The records of a block that templates find: many at once, and one by one."""
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self.cuts: list[Cut] = []
+        self._singles: dict[Template, list[Places]] = {}
+
+    def add(self, part: Part, template: Template, places: Places) -> None:
+        """Add a record that was found alone, and where its stretches are."""
+        spans = (*places, (part.end, part.after), (part.begin, part.start))
+        self._singles.setdefault(template, []).append(spans)
+
+    def by_template(self) -> list[Cut]:
+        """Return all records, those of each template as they follow each other in the text."""
+        found: dict[Template, list[Cut]] = {}
+        for cut in chain(self.cuts, (_as_cut(*each) for each in self._singles.items())):
+            found.setdefault(cut.template, []).append(cut)
+        joined = []
+        for template, each in found.items():
+            starts, ends = (np.concatenate(parts) for parts in zip(*(cut[1:] for cut in each), strict=True))
+            order = np.argsort(starts[:, 0], kind="stable") if len(each) > 1 else slice(None)
+            joined.append(Cut(template, starts[order], ends[order]))
+        return joined
+
+
 class RecordCutter:
     """Cut one block of records after the other; keeps the templates it has met.
 
@@ -61,15 +87,15 @@ class RecordCutter:
         self.closed = False
         self._long: tuple[bytes, Template] | None = None  # the last record that was too long to be looked for again
 
-    def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
+    def cut(self, text: bytes) -> tuple[FoundRecords, list[tuple[int, int]]]:
         """Return the records of a block that templates find, and what is left between them."""
         self.closed = False
-        cuts: list[Cut] = []
+        found = FoundRecords()
         rest = [(0, len(text))]
         if self.splitter.layout in (LINES, DOCUMENTS) and is_text(text):
-            rest = self._cut(text, rest, self.templates[-MOST_TRIED:][::-1], cuts)
-            rest = self._learn_and_cut(text, rest, cuts)
-        return cuts, rest
+            rest = self._cut(text, rest, self.templates[-MOST_TRIED:][::-1], found.cuts)
+            rest = self._learn_and_cut(text, rest, found.cuts)
+        return found, rest
 
     def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
         """Learn templates from the first records that are left, a few, and cut by them too."""
@@ -237,23 +263,9 @@ def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | Non
     return Cut(template, np.concatenate([begins, first], axis=1), np.concatenate([stops, first], axis=1)), gaps
 
 
-def as_cut(template: Template, spans: Sequence[tuple[tuple[int, int], ...]]) -> Cut:
-    """Return records of one template that were found one by one: where their stretches begin and end."""
+def _as_cut(template: Template, spans: Sequence[Places]) -> Cut:
     found = np.fromiter(chain.from_iterable(chain.from_iterable(spans)), np.int64).reshape(len(spans), -1, 2)
     return Cut(template, np.ascontiguousarray(found[:, :, 0]), np.ascontiguousarray(found[:, :, 1]))
-
-
-def by_template(cuts: Sequence[Cut]) -> list[Cut]:
-    """Join the cuts of each template, whose records then follow each other as in the text."""
-    found: dict[Template, list[Cut]] = {}
-    for cut in cuts:
-        found.setdefault(cut.template, []).append(cut)
-    joined = []
-    for template, each in found.items():
-        starts, ends = (np.concatenate(parts) for parts in ([cut.starts for cut in each], [cut.ends for cut in each]))
-        order = np.argsort(starts[:, 0], kind="stable") if len(each) > 1 else slice(None)
-        joined.append(Cut(template, starts[order], ends[order]))
-    return joined
 
 
 def in_order(cuts: Sequence[Cut]) -> list[Cut]:

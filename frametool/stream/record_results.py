@@ -16,7 +16,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.result import NoResult, Result
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import DEGREES, NULL, Fault
-from frametool.stream.record_cuts import RecordCutter, as_cut, block_of, by_template, plan_of
+from frametool.stream.record_cuts import FoundRecords, RecordCutter, block_of, plan_of
 from frametool.stream.record_text import column_in, without_noise
 from frametool.stream.record_values import MESSAGES, Teller, plain, plain_scalar, results, with_stamp_ns
 from frametool.stream.request import Memory
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.template import Template
     from frametool.text.lines import ByteStream
+    from frametool.text.spans import Bytes
 
 MOST_LEARNED = 64  # records that are learned from one by one: of a stream in which none are alike, that is lost time
 ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
@@ -70,24 +71,23 @@ class AlikeRecords:
 
     def of_block(self, text: bytes, told: Mapping[str, int]) -> list[RecordResult]:
         """Return all records of a block in their order; told: how often things were told, by their rules."""
-        cuts, rest = self.cutter.cut(text) if self.is_bulk else ([], [(0, len(text))])
+        records, rest = self.cutter.cut(text) if self.is_bulk else (FoundRecords(), [(0, len(text))])
         found: list[RecordResult] = []
-        singles: dict[Template, list[tuple[tuple[int, int], ...]]] = {}
         for start, end in rest:
             for part, hit in self.cutter.singly(text, start, end):
                 if hit is not None:
-                    spans = (*hit[1], (part.end, part.after), (part.begin, part.start))
-                    singles.setdefault(hit[0], []).append(spans)
+                    records.add(part, *hit)
                     continue
                 found.append(RecordResult(part))
                 if self.is_bulk and self.left and not part.problem:
                     self.left -= 1
                     self.cutter.learn(text, part)
-        for cut in by_template(cuts + [as_cut(template, spans) for template, spans in singles.items()]):
-            found += self._of_cut(cut, text, told)
+        data = framed(text)
+        for cut in records.by_template():
+            found += self._of_cut(cut, data, text, told)
         return sorted(found, key=lambda each: each.part.start)
 
-    def _of_cut(self, cut: Cut, text: bytes, told: Mapping[str, int]) -> list[RecordResult]:
+    def _of_cut(self, cut: Cut, data: Bytes, text: bytes, told: Mapping[str, int]) -> list[RecordResult]:
         """Return the records of one template; those that are odd, and the first that tells something, stay open."""
         template = cut.template
         begins, ends = cut.starts[:, 0].tolist(), cut.ends[:, -3].tolist()
@@ -97,7 +97,7 @@ class AlikeRecords:
             self._plans[template] = self._plan(template)
         if (plan := self._plans[template]) is None:
             return found
-        run = Run(plan, block_of(cut, framed(text), text), State())
+        run = Run(plan, block_of(cut, data, text), State())
         mended = {*run.mended}
         left = {*([0] if is_new else []), *(row for row, _, _ in run.doubted[:1] if not told[DEGREES])}
         left |= {*run.mended[:1]} if not told[ROUNDED] else set()
@@ -167,9 +167,7 @@ def _cells(cut: Cut, at: int, node: Node, text: bytes) -> list[Any]:
     return [known[each] for each in texts]
 
 
-def stream_results(
-    stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows
-) -> Iterator[Value]:
+def stream_results(stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows) -> Iterator[Value]:
     """Yield the results of a stream of records in another form than theirs; bad ones are reported as rows are."""
     splitter = Splitter(form)
     alike = AlikeRecords(splitter, form, request, style, bad.source)
@@ -204,7 +202,6 @@ def stream_results(
         line += block.count(b"\n", at)
     tell_of_rounding(bad.source, teller.counts[ROUNDED], rows)
     bad.finish(rows)
-
 
 
 def _no_result(record: bytes, form: str, style: Style) -> NoResult:

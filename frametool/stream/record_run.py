@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
-    from frametool.ros.chunks import Channel
+    from frametool.ros.message_chunks import Channel
     from frametool.ros.record_changes import Change
     from frametool.ros.record_copy import Advance, CopiedRecording
     from frametool.ros.recorded_edges import AddedEdge
