@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from oracles_of_use import Tool
 
 if not hasattr(os, "fork"):  # terminals, signals and processes as only POSIX has them
-    collect_ignore = ["calc/test_prompt.py", "cli/test_jobs.py", "cli/test_signals.py", "cli/test_terminal.py", "test_sim_commands.py"]
+    collect_ignore = ["calc/test_prompt.py", "cli/test_jobs.py", "cli/test_signals.py", "cli/test_terminal.py", "sim/test_sim_commands.py"]
 # the same examples in every run, however busy the machine is
 settings.register_profile("steady", deadline=None, derandomize=True, max_examples=60)  # more: -m fuzz, -m large
 settings.load_profile("steady")

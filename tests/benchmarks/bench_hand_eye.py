@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[2])]
+sys.path[:0] = [str(Path(__file__).parents[1] / "support"), str(Path(__file__).parents[2])]
 from rigs import Rig, rig  # noqa: E402
 
 from frametool.fit.hand_eye import solve_hand_eye  # noqa: E402

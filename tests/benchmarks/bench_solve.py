@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 from worlds import World, world  # noqa: E402 - found on the path above
 
@@ -71,7 +71,7 @@ def cost(frames: int, rows: int, wrong: int, near: int, solve: str) -> tuple[flo
 
 def main() -> None:
     """Print both tables."""
-    os.environ.update(PYTHONPATH=f"{ROOT}:{ROOT / 'tests'}", OPENBLAS_NUM_THREADS="1")
+    os.environ.update(PYTHONPATH=f"{ROOT}:{ROOT / 'tests' / 'support'}", OPENBLAS_NUM_THREADS="1")
     print("frames  rows          named     error of a spanning tree / ours, m rad; of one without the wrong row")
     for frames, rows, sigmas in KINDS:
         print(quality(frames, rows, sigmas=sigmas), flush=True)

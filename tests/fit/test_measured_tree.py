@@ -471,7 +471,7 @@ print([found.pose(name).components for name in found.frames], found.sigma, found
 
 
 def test_the_same_bytes_in_every_run() -> None:
-    environment = {"PYTHONPATH": f"{Path(__file__).parents[2]}:{Path(__file__).parents[1]}", "OPENBLAS_NUM_THREADS": "1"}
+    environment = {"PYTHONPATH": f"{Path(__file__).parents[2]}:{Path(__file__).parents[1]}/support", "OPENBLAS_NUM_THREADS": "1"}
     runs = [
         subprocess.run([sys.executable, "-c", SCRIPT], env={**environment, "PYTHONHASHSEED": seed}, capture_output=True, check=True)
         for seed in ("1", "2")

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING
 
 import pytest
-from oracles_of_use import HOSTILE, cases
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parents[1] / "stream"))
 from clouds import cloud, pcd, ply
+from oracles_of_use import HOSTILE, cases
 
 if TYPE_CHECKING:
     from random import Random

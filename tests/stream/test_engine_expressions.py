@@ -1,4 +1,4 @@
-"""A transform written out as SQL: a text that says what is computed; engines evaluate it in tests/test_beyond.py."""
+"""A transform written out as SQL: a text that says what is computed; engines evaluate it in test_beyond.py."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ import pytest
 
 from frametool import __version__
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 ADDRESS = "https://example.org/frametool"
 CHANGES = "# Changelog\n\n## {}\n\n- All new.\n\n## 0.1.0 (2025-01-01)\n"
 

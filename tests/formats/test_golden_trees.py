@@ -10,7 +10,7 @@ import pytest
 
 from frametool import FrameTree, Transform
 
-TREES = json.loads((Path(__file__).parent / "golden" / "static_trees.json").read_text())["trees"]
+TREES = json.loads((Path(__file__).parents[1] / "golden" / "static_trees.json").read_text())["trees"]
 
 
 def tree_of(edges: list[Any]) -> FrameTree:
