@@ -1,4 +1,4 @@
-"""What the tests share: the command line in this process, and the seeded generator."""
+"""What the tests share: the command line in this process."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from oracles_of_use import Tool
 
-if not hasattr(os, "fork"):  # terminals, signals and processes as only POSIX has them
-    collect_ignore = ["calc/test_prompt.py", "cli/test_jobs.py", "cli/test_signals.py", "cli/test_terminal.py", "sim/test_sim_commands.py"]
+pytest_plugins = ["selection"]  # what runs by default
 # the same examples in every run, however busy the machine is
 settings.register_profile("steady", deadline=None, derandomize=True, max_examples=60)  # more: -m fuzz, -m large
 settings.load_profile("steady")

@@ -20,7 +20,7 @@ MAP_FROM_BASE = "{name: base, parent: map, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 MOVE = ("apply", "--transform", MAP_FROM_BASE)
 TEXTS: dict[str, tuple[Callable[[Any], str], Callable[[str], Any]]] = {
     "json": (line, json.loads),
-    "yaml": (document, yaml.safe_load),
+    "yaml": (document, lambda text: yaml.load(text, yaml.CSafeLoader)),
 }
 
 

@@ -6,13 +6,17 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import pytest
 from count_code import rooms
 
 import frametool
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
@@ -24,10 +28,16 @@ MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or p
 TREE = "{name: camera, parent: base, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """Parse a module, once."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports(path: Path) -> set[str]:
     """Name the modules that a file imports, wherever in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -40,36 +50,31 @@ def layer(path: Path) -> str:
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
 
-@pytest.mark.parametrize("path", MODULES, ids=[str(path.relative_to(ROOT)) for path in MODULES])
-def test_a_module_imports_only_from_layers_before_its_own(path: Path) -> None:
-    allowed = LAYERS[: LAYERS.index(layer(path)) + 1]
-    used = {name.split(".")[1] for name in imports(path) if name.startswith("frametool.")} - {"__version__"}
-    assert used <= set(allowed)
+def up_from(path: Path, names: Iterable[str]) -> set[str]:
+    """Name the modules of a later layer among those that a file uses."""
+    allowed = {*LAYERS[: LAYERS.index(layer(path)) + 1], "__version__"}
+    return {name for name in names if name.startswith("frametool.") and name.split(".")[1] not in allowed}
 
 
-@pytest.mark.parametrize("path", MODULES, ids=[str(path.relative_to(ROOT)) for path in MODULES])
-def test_click_rich_and_yaml_stay_in_their_rooms(path: Path) -> None:
-    used = {name.split(".")[0] for name in imports(path)}
-    assert {HOMES[name] for name in used & set(HOMES)} <= {layer(path)}
+def test_a_module_imports_only_from_layers_before_its_own() -> None:
+    assert {str(path): up for path in MODULES if (up := up_from(path, imports(path)))} == {}
+
+
+def test_click_rich_and_yaml_stay_in_their_rooms() -> None:
+    used = {(HOMES[name], layer(path)) for path in MODULES for name in {each.split(".")[0] for each in imports(path)} & set(HOMES)}
+    assert [pair for pair in used if pair[0] != pair[1]] == []
 
 
 def named(path: Path) -> set[str]:
-    """Find the layers of the modules that the strings of a file name, docstrings apart."""
-    texts = [node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant)]
-    found = {text.split(".")[1] for text in texts if isinstance(text, str) and re.fullmatch(r"frametool(?:\.\w+)+", text)}
-    return found & set(LAYERS)
+    """Find the modules that the strings of a file name, docstrings apart."""
+    texts = [node.value for node in ast.walk(tree_of(path)) if isinstance(node, ast.Constant)]
+    found = {text for text in texts if isinstance(text, str) and re.fullmatch(r"frametool(?:\.\w+)+", text)}
+    return {name for name in found if name.split(".")[1] in LAYERS}
 
 
-def broken_in(*rooms: str, reason: str) -> list[Any]:
-    """Give all rooms; those that break a law today are marked."""
-    mark = pytest.mark.xfail(strict=True, reason=f"seam: {reason}")
-    return [pytest.param(room, marks=mark if room in rooms else []) for room in LAYERS]
-
-
-@pytest.mark.parametrize("room", broken_in("formats", reason="FORMATS names frametool.stream.table_samples in a string"))
-def test_a_string_names_only_modules_of_layers_before_its_own(room: str) -> None:
-    used = {name for path in MODULES if layer(path) == room for name in named(path)}
-    assert used <= set(LAYERS[: LAYERS.index(room) + 1])
+@pytest.mark.xfail(strict=True, reason="seam: FORMATS names frametool.stream.table_samples in a string")
+def test_a_string_names_only_modules_of_layers_before_its_own() -> None:
+    assert {str(path): up for path in MODULES if (up := up_from(path, named(path)))} == {}
 
 
 def at_run_time(node: ast.AST) -> set[str]:
@@ -90,15 +95,14 @@ def circles(room: str) -> list[tuple[str, ...]]:
     """Find the modules of a room that lead back to themselves, those of one circle together."""
     paths = [path for path in MODULES if layer(path) == room]
     names = {".".join(("frametool", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__"): path for path in paths}
-    leads = {name: at_run_time(ast.parse(path.read_text())) & set(names) - {name} for name, path in names.items()}
+    leads = {name: at_run_time(tree_of(path)) & set(names) - {name} for name, path in names.items()}
     for _ in names:
         leads = {name: found | {far for near in found for far in leads[near]} for name, found in leads.items()}
     return sorted({tuple(sorted(far for far in found if name in leads[far])) for name, found in leads.items() if name in found})
 
 
-@pytest.mark.parametrize("room", LAYERS)
-def test_no_imports_inside_a_room_run_in_a_circle(room: str) -> None:
-    assert circles(room) == []
+def test_no_imports_inside_a_room_run_in_a_circle() -> None:
+    assert {room: found for room in LAYERS if (found := circles(room))} == {}
 
 
 def test_the_package_stays_as_small_as_it_can_be_read() -> None:
@@ -197,13 +201,16 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert not {"click", "rich", "yaml", "numpy"} & set(names)
 
 
-@pytest.mark.parametrize("name", frametool.__all__)
-def test_every_public_name_is_there_and_says_what_it_is_for(name: str) -> None:
+def says_what_it_is_for(name: str) -> bool:
+    """Return True if a public name is there and described."""
     value = getattr(frametool, name)
     if name.isupper():  # a plain dict says nothing of itself
-        assert f"`{name}` is" in str(frametool.__doc__)
-    else:
-        assert name == "__version__" or value.__doc__.strip().splitlines()[0].endswith((".", ";", ":"))
+        return f"`{name}` is" in str(frametool.__doc__)
+    return name == "__version__" or value.__doc__.strip().splitlines()[0].endswith((".", ";", ":"))
+
+
+def test_every_public_name_is_there_and_says_what_it_is_for() -> None:
+    assert [name for name in frametool.__all__ if not says_what_it_is_for(name)] == []
 
 
 def test_an_unknown_public_name_is_an_attribute_error() -> None:

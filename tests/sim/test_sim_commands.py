@@ -42,7 +42,7 @@ HELP_EXAMPLES = [
 
 def test_the_default_run_is_the_tutorial(run: Run) -> None:
     outcome = run("sim", "follow")
-    documents = [each for each in yaml.safe_load_all(outcome.out) if each]
+    documents = [each for each in yaml.load_all(outcome.out, yaml.CSafeLoader) if each]
     assert (outcome.status, len(documents)) == (0, 201)
     assert documents[0]["linear"]["x"] == pytest.approx(1.933158, abs=1e-6)
     assert documents[0]["angular"] == {"x": 0.0, "y": 0.0, "z": pytest.approx(4.639467, abs=1e-6)}

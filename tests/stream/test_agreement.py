@@ -119,7 +119,7 @@ def ways(record: dict[str, Any], request: Request) -> Iterator[tuple[str, int, S
 
 def values(text: str, form: str, name: str) -> list[Any]:
     if form == "yaml":
-        return [each for each in yaml.safe_load_all(text) if each is not None]
+        return [each for each in yaml.load_all(text, yaml.CSafeLoader) if each is not None]
     if name.startswith("array"):
         return list(json.loads(text))
     decode = json.JSONDecoder().raw_decode

@@ -360,7 +360,7 @@ def test_a_fix_is_moved_with_its_covariance(ros: int, form: str, run: Callable[.
     if form == "csv":
         rows = [list(map(float, cells[4:16])) for cells in numbers(done.out)]
     else:
-        found = [json.loads(each) for each in done.out.splitlines()] if form == "json" else list(filter(None, yaml.safe_load_all(done.out)))
+        found = [json.loads(each) for each in done.out.splitlines()] if form == "json" else list(filter(None, yaml.load_all(done.out, yaml.CSafeLoader)))
         assert [(each["frame"], each["name"], each["stamp_ns"]) for each in found] == [("map", "gps", 1700000000000000005)] * 2
         rows = [[*each["point"], *each["covariance"]] for each in found]
     map_from_ecef = base("enu", 48.1, 11.5).T

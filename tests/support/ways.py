@@ -119,7 +119,7 @@ def readings(text: str, form: str = "json") -> list[Reading]:
 def values(text: str, form: str = "json") -> Iterator[Any]:
     """Read the documents of an output, parted by whatever parts them."""
     if form == "yaml":
-        yield from (each for each in yaml.safe_load_all(text) if each is not None)
+        yield from (each for each in yaml.load_all(text, yaml.CSafeLoader) if each is not None)
         return
     decode, at = json.JSONDecoder().raw_decode, 0
     while at < len(text.rstrip()):
