@@ -7,11 +7,13 @@ import os
 import pathlib
 import re
 import sys
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import chromium
 import pytest
 from hypothesis import settings
+from sized import set_sizes
 
 from frametool import cli
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from oracles_of_use import Tool
+
+    Sizes = Callable[..., None]
 
 pytest_plugins = ["selection"]  # what runs by default
 # the same examples in every run, however busy the machine is
@@ -63,6 +67,12 @@ def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcom
         return Outcome(status, texts["out"], texts["err"])
 
     return call
+
+
+@pytest.fixture
+def sizes(monkeypatch: pytest.MonkeyPatch) -> Sizes:
+    """Set sizes of the run by their names in lower case, as in `sizes(block=7)`."""
+    return partial(set_sizes, monkeypatch)
 
 
 @pytest.fixture(autouse=True)

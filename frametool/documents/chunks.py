@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool import sizes
 from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
 from frametool.errors import FormatError
 
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import BinaryIO
 
-BLOCK = 1 << 20
 
 
 class Piece(NamedTuple):
@@ -47,8 +47,8 @@ def _end_of_documents(data: bytearray, start: int) -> int:
 def _pieces(stream: BinaryIO, name: str, end_of: Callable[[bytearray, int], int]) -> Iterator[Piece]:
     """Read blocks and pass on what is whole; the rest waits for the next block."""
     line = 1
-    waiting = bytearray()
-    while block := stream.read1(BLOCK):  # type: ignore[attr-defined]
+    waiting, size = bytearray(), sizes.PIECE
+    while block := stream.read1(size):  # type: ignore[attr-defined]
         seen = len(waiting)
         waiting += block
         whole = 0 if waiting.startswith(UTF16) else end_of(waiting, max(0, seen - 4))

@@ -30,6 +30,7 @@ from yaml.events import (
     StreamEndEvent,
 )
 
+from frametool import sizes
 from frametool.documents.source import (
     DEEPEST,
     END,
@@ -58,7 +59,6 @@ if TYPE_CHECKING:
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
 
-LEAST = 1 << 16  # characters: shorter texts are not worth a second way
 # plain words and numbers that mean themselves in YAML and hold nothing that JSON would need to escape
 _WORD = r"(?:(?!(?:null|Null|NULL)[^\w./-])[A-Za-z_/][\w./-]*+|[-+]?(?:[0-9]+\.?[0-9]*+|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
 _LIST = rf"\[{_WORD}(?:, {_WORD})*+\]"
@@ -79,7 +79,7 @@ def split_run(text: str) -> tuple[str, list[Any]] | None:
 
     Returns the text with STANDIN as the list's one item, and the items; None where the text has no such end.
     """
-    begin = re.search(r"(?m)^ *- (\{?)", text) if len(text) >= LEAST else None
+    begin = re.search(r"(?m)^ *- (\{?)", text) if len(text) >= sizes.ASIDE else None
     run = begin and re.compile(_FLOWS if begin[1] else _BLOCKS).match(text, begin.start())
     if not begin or not run:
         return None
@@ -109,7 +109,7 @@ def split_brackets(text: str) -> tuple[str, list[Any]] | None:
 
     Returns the text with BRACKETS in their places, and the values in order; None where a text is short or not plain.
     """
-    if len(text) < LEAST or BRACKETS in text or re.search(_NOT_PLAIN, text):
+    if len(text) < sizes.ASIDE or BRACKETS in text or re.search(_NOT_PLAIN, text):
         return None
     found: list[str] = []
 

@@ -11,6 +11,7 @@ from bisect import bisect_left, bisect_right
 from itertools import chain, pairwise
 from operator import itemgetter
 
+from frametool import sizes
 from frametool.geometry import floats, rigid
 
 TYPE_CHECKING = False
@@ -102,7 +103,6 @@ class Page:
         self.segments.clear()
 
 
-PAGE = 512  # samples: a longer page is cut when a late one falls into it
 DEFAULT_AUTHORITY = "default_authority"
 
 
@@ -245,7 +245,7 @@ class MovingTrack:
         page = self.pages[number]
         page.late.append((stamp_ns, parent, components))
         self.table = None
-        if len(page.stamps) + len(page.late) > PAGE:
+        if len(page.stamps) + len(page.late) > sizes.PAGE:
             self._cut(number)
 
     def _page(self, at_ns: int) -> Page:
@@ -263,7 +263,7 @@ class MovingTrack:
         page = self.pages[number]
         page.settle()
         page.unpack()
-        count = 2 * len(page.stamps) // PAGE
+        count = 2 * len(page.stamps) // sizes.PAGE
         ends = [part * len(page.stamps) // count for part in range(count + 1)]
         cut = [
             Page(page.stamps[begin:end], page.parents[begin:end], page.samples[begin:end])
@@ -306,7 +306,7 @@ class MovingTrack:
         oldest = min(stamp_ns, self.last_ns)
         if oldest <= self.begins[0]:
             return
-        if len(self.pages[self._number(oldest - 1)].stamps) > PAGE:
+        if len(self.pages[self._number(oldest - 1)].stamps) > sizes.PAGE:
             self._cut(self._number(oldest - 1))
         number = self._number(oldest - 1)
         page = self._page(oldest - 1)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool import sizes
 from frametool.documents.chunks import Piece, counted_from, documents, lines
 from frametool.documents.document import parse_documents
 from frametool.documents.json import strict_json
@@ -243,15 +244,12 @@ def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Messa
 _HEADER = re.compile(r"\bheader\b")
 
 
-STRETCH = 1 << 17  # characters read at once
-
-
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of every message, in the order they were recorded."""
     if file.form in {"echo", "jsonl"} and not options.raw and (file.form == "echo" or not options.topics.chosen):
         cut, end = (documents, "---\n") if file.form == "echo" else (lines, "\n")
         for piece in cut(file.stream, file.name):
-            for stretch in _cut(piece, end, STRETCH):
+            for stretch in _cut(piece, end, sizes.STRETCH):
                 yield from _plain(stretch, end, file, options)
     else:
         for message in read_messages(file.stream, file.name, file.form, options.tally):

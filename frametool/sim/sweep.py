@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from frametool import sizes
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION
 from frametool.geometry import arrays
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 NUMBERS = ("gain_linear", "gain_angular", "max_linear", "max_angular")
-BLOCK = 16384  # followers at a time; smaller blocks spend their time on calls
 
 
 class SweepResult(NamedTuple):
@@ -78,8 +78,8 @@ def simulate_many(
     steps = simulate(tutorial(leader=leader, followers=0, duration=duration, seed=seed))
     track = [(step.states["turtle1"], step.poses["turtle1"]) for step in steps if step.is_tick]
     blocks = [
-        _follow([column[at : at + BLOCK] for column in flat], track, law_itself, reach)
-        for at in range(0, max(flat[0].size, 1), BLOCK)
+        _follow([column[at : at + sizes.FOLLOWERS] for column in flat], track, law_itself, reach)
+        for at in range(0, max(flat[0].size, 1), sizes.FOLLOWERS)
     ]
     return SweepResult(*(np.concatenate(parts).reshape(shape) for parts in zip(*blocks, strict=True)))
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frametool import sizes
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid, listing, shown, warn
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.stream.row_poses import Cells, RowPoses
 
-WAITING = 1 << 18  # rows whose cells say what the types of columns are
 SPARE = 64  # characters that a text may have where not all rows were seen
 DOUBLE, FLAG = np.dtype(np.float64), np.dtype(np.bool_)
 EXACT = 1 << 53  # whole numbers below are floats to the bit
@@ -76,7 +76,7 @@ class ColumnsWriter:
         self.waiting.append((size, made))
         if self.writer is None:
             is_open = any(not _is_typed(each.values) for each in made.values())
-            if not size or (is_open and sum(count for count, _ in self.waiting) < WAITING):
+            if not size or (is_open and sum(count for count, _ in self.waiting) < sizes.TYPED):
                 return b""
         return b"".join(self._written(is_all=False))
 
@@ -222,10 +222,10 @@ def _in_columns(name: str, cells: Cells) -> dict[str, Made]:
     from frametool.grammar.covariance import columns
 
     values = plain_cells(cells)
-    sizes = {len(each) if isinstance(each, list) else 0 for each in values if each is not None}
-    if sizes not in ({36}, {9}):
+    lengths = {len(each) if isinstance(each, list) else 0 for each in values if each is not None}
+    if lengths not in ({36}, {9}):
         return {name: Made(cells)}
-    size = sizes.pop()
+    size = lengths.pop()
     rows = np.array([[np.nan] * size if each is None else each for each in values], np.float64)
     return {column: Made(each, not_finite(each)) for column, each in zip(columns(size), rows.T, strict=True)}
 

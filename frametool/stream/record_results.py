@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from frametool import sizes
 from frametool.documents.document import parse_nodes
 from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError, ValueInvalid
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Bytes
 
-MOST_LEARNED = 64  # records that are learned from one by one: of a stream in which none are alike, that is lost time
 ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
 QUATERNIONS = Target(1.0, ((notation("quaternion"), False),), keep_sign=True)
 
@@ -65,8 +65,9 @@ class AlikeRecords:
         self.form = style.form
         self.is_yaml = form == "yaml"
         operation = request.operation
-        self.is_bulk = operation.formula is None and not (operation.velocity or self.request.in_order or request.place)
-        self.left = MOST_LEARNED
+        self.left = sizes.LEARNED  # where no records are alike, learning is lost time
+        depends = operation.formula is not None or operation.velocity or self.request.in_order or request.place
+        self.is_bulk = self.left > 0 and not depends
         self._plans: dict[Template, Plan | None] = {}
 
     def of_block(self, text: bytes, told: Mapping[str, int]) -> list[RecordResult]:

@@ -8,6 +8,7 @@ from io import BufferedReader, RawIOBase
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
+from frametool import sizes
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream import stamp_source
 from frametool.stream.answers import Outside
@@ -15,7 +16,7 @@ from frametool.stream.faults import SKIP, STOP, Fault, RowNote
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.run import Outcome, mapped
 from frametool.stream.splitter import ARRAY, Splitter
-from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks
+from frametool.text.lines import blocks_behind, extent_in_file, read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator
@@ -24,17 +25,14 @@ if TYPE_CHECKING:
     from frametool.stream.splitter import Part
     from frametool.text.lines import ByteRange, ByteStream
 
-FEW = 16  # records at the end of which a stream that is already complete needs no numpy
-SMALL = 1 << 14  # bytes
+SMALL = 1 << 14  # bytes of a stream that may be few records
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
 
 
-def run_records(
-    stream: ByteStream, form: str, request: Request, *, source: str, jobs: int = 1, size: int = 0
-) -> Generator[Outcome]:
+def run_records(stream: ByteStream, form: str, request: Request, *, source: str, jobs: int = 1) -> Generator[Outcome]:
     """Yield the outcomes of a stream of records."""
     splitter = Splitter(form)
-    outcomes = _outcomes(stream, splitter, form, request, source=source, jobs=jobs, size=size)
+    outcomes = _outcomes(stream, splitter, form, request, source=source, jobs=jobs)
     try:
         yield from _as_array(outcomes, request.on_error) if form == "json" else outcomes
     finally:
@@ -42,11 +40,11 @@ def run_records(
 
 
 def _outcomes(
-    stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int, size: int
+    stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int
 ) -> Generator[Outcome]:
     jobs = 1 if request.in_order else jobs
     extent = extent_in_file(stream) if jobs > 1 else None
-    blocks = read_blocks(stream, whole=splitter.whole, size=size or BLOCK_BYTES)
+    blocks = read_blocks(stream, whole=splitter.whole)
     first = next(blocks, None)
     if first is None:
         return
@@ -57,7 +55,7 @@ def _outcomes(
         except FormatError as error:  # comes behind the results of what is whole
             blocks = _raising(error)
     few = second is None and not request.in_order
-    if few and len((found := splitter.parts(first)).parts) <= FEW:
+    if few and len((found := splitter.parts(first)).parts) <= sizes.FEW:
         outcome = _singly(first, found.parts, form, request, source)
         yield outcome._replace(is_open=None if splitter.layout != ARRAY else not found.closed)
         return
@@ -68,9 +66,7 @@ def _outcomes(
     following: Iterator[bytes | ByteRange] = blocks
     if extent is not None:
         taken = sum(map(len, begun))
-        following = blocks_behind(
-            stream, extent, taken, name=source, size=size or BLOCK_BYTES, whole=lambda: splitter.whole
-        )
+        following = blocks_behind(stream, extent, taken, name=source, whole=lambda: splitter.whole)
     yield from mapped(process, chain(begun, following), jobs)
 
 
@@ -105,7 +101,7 @@ def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedRea
 
     def pieces() -> Iterator[bytes]:
         splitter = Splitter(form)
-        for block in read_blocks(stream, whole=splitter.whole, size=BLOCK_BYTES):
+        for block in read_blocks(stream, whole=splitter.whole):
             edits = []
             for part in splitter.parts(block).parts:
                 with suppress(FrametoolError, UnicodeDecodeError):

@@ -26,7 +26,7 @@ from frametool.stream.table import (
 )
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import RecordEnds, torn_record
-from frametool.text.lines import BLOCK_BYTES, blocks_behind, extent_in_file, read_blocks, whole_lines
+from frametool.text.lines import blocks_behind, extent_in_file, read_blocks, whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -40,19 +40,12 @@ if TYPE_CHECKING:
 
 
 def run_table(
-    stream: ByteStream,
-    form: str,
-    request: Request,
-    *,
-    source: str,
-    header: bool = True,
-    jobs: int = 1,
-    size: int = 0,
+    stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, jobs: int = 1
 ) -> Generator[Outcome]:
-    """Yield the outcomes of a table's blocks, the first one its head; `size` bytes a block if given."""
+    """Yield the outcomes of a table's blocks, the first one its head."""
     jobs = 1 if request.in_order else jobs
     extent = extent_in_file(stream) if jobs > 1 else None
-    table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header, size=size)
+    table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header)
     request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
@@ -61,9 +54,7 @@ def run_table(
     following: Iterator[bytes | ByteRange] = blocks
     if extent is not None:
         whole = _record_ends(table.delimiter)
-        following = blocks_behind(
-            stream, extent, taken + len(rest), name=source, size=size or BLOCK_BYTES, whole=whole
-        )
+        following = blocks_behind(stream, extent, taken + len(rest), name=source, whole=whole)
     yield from mapped(work, chain((rest,) if rest else (), following), jobs)
 
 
@@ -77,12 +68,10 @@ class Begun(NamedTuple):
     lines: int
 
 
-def begin_table(
-    stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, size: int = 0
-) -> Begun:
+def begin_table(stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True) -> Begun:
     """Read the head of a table in a form; raises FormatError."""
     ends = _record_ends((FORMATS[form].delimiter or "").encode())
-    blocks = read_blocks(stream, size=size or BLOCK_BYTES, whole=ends())
+    blocks = read_blocks(stream, whole=ends())
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)

@@ -21,8 +21,9 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool import sizes
 from frametool.errors import FrametoolError, FrametoolWarning, heard_by, warn
-from frametool.text.lines import BLOCK_BYTES, BULK_BYTES, ByteRange
+from frametool.text.lines import BULK_BYTES, ByteRange
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 MOST_WAITING = 2  # blocks a worker may have ahead, so that it never waits for its parent
 PLACES = 3  # for blocks, a worker: those ahead and one whose result waits for its turn; memory stays flat
-PLACE_BYTES = 4 * BLOCK_BYTES  # memory of which no more is used than is written; what is larger goes by the socket
 
 
 class WorkerDied(FrametoolError):
@@ -73,14 +73,15 @@ class Places:
 
     def __init__(self, count: int) -> None:
         """Reserve it; raises OSError where there is not so much."""
-        self._memory = mmap(-1, count * PLACE_BYTES)
+        self.size = 4 * sizes.BLOCK  # no more of it is used than is written; what is larger goes by the socket
+        self._memory = mmap(-1, count * self.size)
         self.free = list(range(count))
 
     def put(self, place: int, text: bytes) -> Parcel:
         """Put a text in a place if it fits."""
-        if len(text) > PLACE_BYTES:
+        if len(text) > self.size:
             return Parcel(place, len(text), text)
-        start = place * PLACE_BYTES
+        start = place * self.size
         self._memory[start : start + len(text)] = text
         return Parcel(place, len(text))
 
@@ -88,7 +89,7 @@ class Places:
         """Return a text as it stands there, until the place is free for others."""
         if parcel.whole is not None:
             return parcel.whole
-        start = parcel.place * PLACE_BYTES
+        start = parcel.place * self.size
         return memoryview(self._memory)[start : start + parcel.size]
 
 

@@ -11,6 +11,7 @@ import stat
 from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
+from frametool import sizes
 from frametool.errors import FileProblem, FormatError
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     ByteStream: TypeAlias = BufferedIOBase  # `read1` gives what has arrived, and waits only while there is nothing
 
 
-BLOCK_BYTES = 1 << 19
-LONGEST_RECORD = 1 << 26
 # A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block. But
 # nothing that has arrived is kept back for longer than the second number.
 BULK_BYTES = 1 << 14
@@ -38,19 +37,18 @@ def whole_lines(text: bytes) -> int:
 def read_blocks(
     stream: ByteStream,
     *,
-    size: int = BLOCK_BYTES,
-    longest: int = LONGEST_RECORD,
     whole: Callable[[bytes], int] = whole_lines,
     lines_before: Callable[[], int] = int,
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
-    size: bytes a block has when the stream delivers as fast as they are taken.
+    A block has `sizes.BLOCK` bytes when the stream delivers as fast as they are taken.
     whole: how many bytes of a text are finished records; for records of several lines. A negative number: so many
     bytes are the beginning of a record that goes on behind them, and need not be looked at again.
     lines_before: counts the lines before the stream, for errors.
-    Raises FormatError if one record is longer than `longest`, however the stream was cut.
+    Raises FormatError if one record is longer than `sizes.RECORD`, however the stream was cut.
     """
+    size, longest = sizes.BLOCK, sizes.RECORD
     ready = _readiness(stream)
     begun: list[bytes] = []  # the beginning of a record
     pieces: list[bytes] = []  # what follows it
@@ -155,7 +153,6 @@ def blocks_behind(
     taken: int,
     *,
     name: str,
-    size: int = BLOCK_BYTES,
     whole: Callable[[], Callable[[bytes], int]],
 ) -> Iterator[bytes | ByteRange]:
     """Yield the blocks of a file from a place on as `read_blocks` cuts them; as ranges up to the last.
@@ -165,11 +162,11 @@ def blocks_behind(
     Raises FileProblem if the file ends before it did at the start: what was there is lost then.
     """
     at, file = extent.begin + taken, stream.fileno()
-    for each in _ranges(file, name, at, size, whole()):
+    for each in _ranges(file, name, at, sizes.BLOCK, whole()):
         yield each
         at = each.start + each.size
     stream.seek(at)
-    yield from read_blocks(stream, size=size, whole=whole(), lines_before=lambda: _count_lines(file, extent.begin, at))
+    yield from read_blocks(stream, whole=whole(), lines_before=lambda: _count_lines(file, extent.begin, at))
     if stream.tell() < extent.end:
         raise _shrunk(name)
 
@@ -188,7 +185,7 @@ def _ranges(file: int, name: str, at: int, size: int, whole: Callable[[bytes], i
 def _count_lines(file: int, begin: int, end: int) -> int:
     """Count the line ends between two places."""
     count = 0
-    while begin < end and (piece := os.pread(file, min(BLOCK_BYTES, end - begin), begin)):
+    while begin < end and (piece := os.pread(file, min(sizes.BLOCK, end - begin), begin)):
         count += piece.count(b"\n")
         begin += len(piece)
     return count

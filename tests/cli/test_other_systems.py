@@ -21,7 +21,6 @@ from frametool.cli.commands import COMMANDS as NAMES
 from frametool.cli.commands.sim import keyboard
 from frametool.formats import table
 from frametool.sim.drivers import Mailbox
-from frametool.stream.trajectories import split_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -157,10 +156,9 @@ def test_a_drive_is_no_prefix_of_a_name(run: Run, arguments: tuple[str, ...]) ->
     assert here.status == 0
 
 
-def test_a_drive_alone_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(Exception, match=r"^C:\\run\.mcap:map:base: no such file or directory$"):
-        split_name(r"C:\run.mcap:map:base")
+def test_a_drive_alone_is_no_file(run: Run) -> None:
+    done = run("compare", r"C:\run.mcap:map:base", r"C:\run.mcap:map:base")
+    assert (done.status, done.err) == (5, "frametool: C:\\run.mcap:map:base: no such file or directory\n")
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
+from sized import sized
 
-from frametool.documents import yaml
 from frametool.documents.document import parse_documents
 from frametool.documents.yaml import BRACKETS, split_brackets, split_run
 from frametool.errors import FormatError
+
+if TYPE_CHECKING:
+    from conftest import Sizes
 
 WORDS = some.sampled_from(["a", "on", "y", "007", "12.5", "-.5", "1e-3", "base_link", "/cam", "a-b", "x.y", "nullify", "N", "+3", "5."])
 LISTS = some.lists(WORDS, min_size=1, max_size=4).map(lambda each: f"[{', '.join(each)}]")
@@ -31,8 +34,7 @@ def test_both_ways_read_the_same(lines: tuple[str, list[str]]) -> None:
     head, maps = lines
     text = head + "".join(f"  - {each}\n" for each in maps)
     expected = values(text)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yaml, "LEAST", 0)
+    with sized(aside=0):
         assert split_run(text) is not None
         assert values(text) == expected
 
@@ -45,8 +47,7 @@ def test_block_maps_too(indent: str, maps: list[dict[str, str]]) -> None:
     entries = [[f"{key}: {value}" for key, value in each.items()] for each in maps]
     text = "frames:\n" + "".join(f"{indent}- " + f"\n{indent}  ".join(each) + "\n" for each in entries)
     expected = values(text)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yaml, "LEAST", 0)
+    with sized(aside=0):
         assert split_run(text) is not None
         assert values(text) == expected
 
@@ -55,8 +56,8 @@ def test_block_maps_too(indent: str, maps: list[dict[str, str]]) -> None:
     "line",
     ["- a: b, c: d", "- a: b\n    c:\n      d: e", "- a: b # c", "- a: b\n    a: c", "- a: [b,\n       c]", "- a: ''", "- a:\n    b: c", "- a: b\n   c: d"],
 )  # fmt: skip
-def test_other_blocks_are_left_to_the_parser(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yaml, "LEAST", 0)
+def test_other_blocks_are_left_to_the_parser(line: str, sizes: Sizes) -> None:
+    sizes(aside=0)
     assert split_run(f"frames:\n  - a: b\n  {line}\n") is None
 
 
@@ -65,14 +66,14 @@ def test_other_blocks_are_left_to_the_parser(line: str, monkeypatch: pytest.Monk
     ["- {a: null}", "- {a: ~}", "- {a: 'b'}", "- {a: b, a: c}", "- {a: b} # c", "- {a: [b, [c]]}", "- {a: {b: c}}", "- {a:b}", "- {a: b c}", "- {a: é}",
      "- {a: b}\n    - {c: d}", "- {a: *b}", "-  {a: b}", "- {a: b,}", "- a"],
 )  # fmt: skip
-def test_anything_else_is_left_to_the_parser(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yaml, "LEAST", 0)
+def test_anything_else_is_left_to_the_parser(line: str, sizes: Sizes) -> None:
+    sizes(aside=0)
     text = f"frames:\n  - {{a: b}}\n  {line}\n"
     assert split_run(text) is None
 
 
-def test_mistakes_before_such_a_list_are_told_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yaml, "LEAST", 0)
+def test_mistakes_before_such_a_list_are_told_where_they_are(sizes: Sizes) -> None:
+    sizes(aside=0)
     with pytest.raises(FormatError, match="f:2:1: key 'a' stands twice"):
         parse_documents("a: 1\na: 2\nframes:\n  - {a: b}\n", "f")
 
@@ -91,8 +92,7 @@ PIECES = ["f1: ", "- ", "xyz: ", "  ", "    ", "\n", "[1, 2]", "{a: b, c: [1, 2]
 @given(some.lists(some.sampled_from(PIECES), max_size=14).map("".join))
 def test_no_text_reads_otherwise_where_brackets_are_read_aside(text: str) -> None:
     expected = outcome(text)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yaml, "LEAST", 0)
+    with sized(aside=0):
         assert outcome(text) == expected
 
 
@@ -100,9 +100,9 @@ NESTED = "frames:\n  world:\n    a: {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}\n    b
 
 
 @pytest.mark.parametrize("text", [NESTED, "- [1, 2]\n- a: [1]\n  b: {c: d}\n", "a: [1]\n---\na: {b: c}\n"])
-def test_values_in_brackets_are_read_aside(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_in_brackets_are_read_aside(text: str, sizes: Sizes) -> None:
     expected = values(text)
-    monkeypatch.setattr(yaml, "LEAST", 0)
+    sizes(aside=0)
     split = split_brackets(text)
     assert split is not None
     assert split[0].count(BRACKETS) == len(split[1]) > 0
@@ -110,14 +110,14 @@ def test_values_in_brackets_are_read_aside(text: str, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("line", ['a: "b"', "a: 'b'", "a: |", "a: >", "a: b # c", "a: &b c", "a: *b", "a: !b c", "? a", "a: \ue000", "a:\tb"])
-def test_a_text_with_more_than_plain_words_is_left_to_the_parser(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yaml, "LEAST", 0)
+def test_a_text_with_more_than_plain_words_is_left_to_the_parser(line: str, sizes: Sizes) -> None:
+    sizes(aside=0)
     assert split_brackets(f"{NESTED}{line}\n") is None
 
 
-def test_brackets_read_aside_are_no_way_around_the_depth(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_brackets_read_aside_are_no_way_around_the_depth(sizes: Sizes) -> None:
     deep = "".join(f"{'  ' * level}a:\n" for level in range(999)) + "  " * 999 + "a: {b: [c]}\n"
     expected = outcome(deep)
     assert "nested deeper than 1000 levels" in str(expected)
-    monkeypatch.setattr(yaml, "LEAST", 0)
+    sizes(aside=0)
     assert outcome(deep) == expected

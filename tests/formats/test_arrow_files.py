@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import sys
-import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import console
@@ -14,10 +13,6 @@ import pytest
 
 import frametool
 from frametool.formats.rows.arrow_files import codec_in
-from frametool.formats.rows.column_file import Made as Column
-from frametool.grammar.result import Style
-from frametool.stream.array_writer import WAITING, ColumnsWriter
-from frametool.stream.row_poses import spans_of
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -27,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from conftest import Outcome
+    from conftest import Outcome, Sizes
     from numpy.typing import NDArray
 
     Use = Callable[..., "Made"]
@@ -393,14 +388,12 @@ def test_a_type_is_one_in_which_no_cell_loses_anything(use: Use, cells: list[str
 
 
 @pytest.mark.parametrize(("form", "late"), [("parquet", "2.5"), ("npy", "2.5"), ("npy", "")])
-def test_a_cell_of_another_type_than_those_before_is_refused_by_its_name(form: str, late: str) -> None:
-    writer = ColumnsWriter(Style(form))
-    made = [{"x": Column(np.zeros(1)), "a": Column(spans_of([cell.encode()]))} for cell in ("1", late)]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the types
-        writer.of_columns(WAITING, made[0])
-    with pytest.raises(frametool.FrametoolError, match=rf"column 'a': '{late}' is no int64, as all cells of the first rows are"):
-        writer.of_columns(1, made[1])
+def test_a_cell_of_another_type_than_those_before_is_refused_by_its_name(use: Use, sizes: Sizes, form: str, late: str) -> None:
+    sizes(typed=1, block=20)
+    rows = "".join(f"1,2,3,{cell}\n" for cell in ("7", "7", "7", late))
+    done = use("apply", "--transform", POSE, data=f"x,y,z,a\n{rows}", form=form)
+    assert (done.status, done.data) == (1, b"")
+    assert f"column 'a': '{late}' is no int64, as all cells of the first rows are" in done.err
 
 
 # --- files that are none ---
@@ -479,8 +472,8 @@ def test_columns_that_cannot_be_moved_are_named(use: Use, columns: dict[str, Any
     assert words in done.err
 
 
-def test_a_group_too_large_to_be_held_is_written_in_parts(use: Use, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("frametool.formats.rows.arrow_files.LARGEST", 1 << 20)
+def test_a_group_too_large_to_be_held_is_written_in_parts(use: Use, sizes: Sizes) -> None:
+    sizes(group=1 << 20)
     xyz = np.random.default_rng(4).normal(size=(200_000, 3))
     given = pa.table(dict(zip(XYZ, xyz.T, strict=True)))
     done = use("apply", "--transform", POSE, data=encoded(given, rows=None))

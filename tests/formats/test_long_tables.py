@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -10,6 +10,9 @@ from frametool.formats.rows import csv
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
+
+if TYPE_CHECKING:
+    from conftest import Sizes
 
 STYLE = Style("csv", (notation("quaternion"),))
 PLAIN = Result(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), None, "map"), {"stamp_ns": 5})
@@ -23,9 +26,9 @@ SEQUENCES: list[list[Any]] = [
 
 @pytest.mark.parametrize("few", [1, 2, 4])
 @pytest.mark.parametrize("values", SEQUENCES)
-def test_rows_that_wait_in_a_file_are_the_table_of_all_at_once(values: list[Any], few: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_that_wait_in_a_file_are_the_table_of_all_at_once(values: list[Any], few: int, sizes: Sizes) -> None:
     at_once = "".join(csv.table_pieces(iter(values), STYLE))
-    monkeypatch.setattr(csv, "FEW", few)
+    sizes(table=few)
     assert "".join(csv.table_pieces(iter(values), STYLE)) == at_once
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.documents import chunks
 from frametool.errors import FileProblem, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
 from frametool.formats.load import Recording
 from frametool.grammar.result import Style
@@ -18,6 +17,8 @@ from frametool.ros.echo_format import message_text, stamp
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import Sizes
 
     from frametool.grammar.edges import Edge
 
@@ -100,9 +101,9 @@ def read(tmp_path: Path, text: str | bytes) -> list[Edge]:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("block", [1 << 20, 97])
 def test_every_form_gives_the_same_samples_however_the_bytes_are_cut(
-    form: str, block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    form: str, block: int, tmp_path: Path, sizes: Sizes
 ) -> None:
-    monkeypatch.setattr(chunks, "BLOCK", block)
+    sizes(piece=block)
     assert [each[:4] for each in read(tmp_path, FORMS[form])] == EXPECTED
 
 

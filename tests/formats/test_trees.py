@@ -6,12 +6,10 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from flow import poses_in
 
 from frametool import FrameTree, load
-from frametool.documents.source import Source
 from frametool.errors import BadTopology, FormatError
-from frametool.stream.record_values import read_poses
-from frametool.stream.request import Request
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -191,7 +189,7 @@ def test_a_deeply_nested_tree_is_read(tmp_path: Path) -> None:
 
 def test_rotations_that_agree_may_stand_together() -> None:
     text = "{rpy_deg: [0, 0, 90], axis_angle: {axis: [0, 0, 1], angle: pi/2}, quaternion: {x: 0, y: 0, z: 1, w: 1.0000001}}"
-    (pose,) = read_poses(Source("f", text), Request(normalize=True))
+    (pose,) = poses_in(text, normalize=True)
     assert pose.rotation == (0.0, 0.0, 0.7071067811865476, 0.7071067811865476)
 
 
@@ -201,16 +199,16 @@ def test_rotations_that_agree_may_stand_together() -> None:
      "{rotvec_deg: [90, 0, 0]}", "{rotvec: [pi/2, 0, 0]}", "{axis_angle_deg: {axis: [2, 0, 0], angle: 90}}"],
 )  # fmt: skip
 def test_a_quarter_turn_is_exact_however_it_is_written(text: str) -> None:
-    assert read_poses(Source("f", text), Request())[0].rotation == (0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
+    assert poses_in(text)[0].rotation == (0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 
 
 def test_millimetres_round_once() -> None:
-    assert read_poses(Source("f", "{xyz_mm: [100, 0.1, 3]}"), Request())[0].position == (0.1, 0.0001, 0.003)
+    assert poses_in("{xyz_mm: [100, 0.1, 3]}")[0].position == (0.1, 0.0001, 0.003)
 
 
 def poses_of(value: Any) -> list[Any]:
     """Read the poses of a value written as JSON."""
-    return list(read_poses(Source("f", json.dumps(value)), Request()))
+    return poses_in(json.dumps(value))
 
 
 def test_a_ros_pose_and_a_matrix_are_poses() -> None:

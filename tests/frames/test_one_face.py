@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from fractions import Fraction
 from itertools import pairwise
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +13,12 @@ import pytest
 
 from frametool import FrameTree, Transform, TransformBuffer
 from frametool.errors import BadTopology, LookupFailed, NoDataAt, TooLate, UnknownFrame, ValueInvalid
-from frametool.frames import track as track_module
 from frametool.frames.path import compose_path
-from frametool.frames.track import PAGE, MovingTrack, Page
+from frametool.frames.track import MovingTrack
 
 if TYPE_CHECKING:
+    from conftest import Sizes
+
     from frametool.frames.lookups import Frames
 
 EDGES = [("map", "base"), ("base", "lidar"), ("base", "arm"), ("arm", "hand"), ("island", "rock")]
@@ -196,43 +198,43 @@ def test_random_reparenting_trees_answer_as_tf2_does(seed: int, policy: str) -> 
 # --- late samples --------------------------------------------------------------------------------------------------
 
 
-class Counting(list[Any]):
-    """A list that counts what an insert has to move."""
-
-    moved = 0
-
-    def insert(self, index: Any, item: Any) -> None:
-        Counting.moved += len(self) - index
-        super().insert(index, item)
-
-
-@pytest.mark.parametrize("order", ["reverse", "random", "two halves"])
-def test_a_late_sample_moves_a_page_of_others_and_not_all(order: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    class CountingPage(Page):
-        def __init__(self, stamps: list[int], parents: list[str], samples: list[Any]) -> None:
-            super().__init__(Counting(stamps), parents, samples)
-
-    monkeypatch.setattr(track_module, "Page", CountingPage)
-    count = 20_000
+def in_order(order: str, count: int) -> list[int]:
+    """Give stamps from 1 in some order."""
     draw = random.Random(1)  # noqa: S311 - not for secrets
-    stamps = {
-        "reverse": list(range(count, 0, -1)), "random": draw.sample(range(count), count),
-        "two halves": [*range(1, count, 2), *range(0, count, 2)],
+    return {
+        "reverse": list(range(count, 0, -1)), "random": draw.sample(range(1, count + 1), count),
+        "two halves": [*range(1, count, 2), *range(2, count + 1, 2)], "in order": list(range(1, count + 1)),
     }[order]  # fmt: skip
-    Counting.moved = 0
-    buffer = TransformBuffer()
-    for stamp in stamps:
+
+
+@pytest.mark.parametrize(("order", "keep"), [("reverse", 1), ("random", 1), ("two halves", 1), ("in order", 1), ("in order", 4)])
+def test_samples_take_time_in_proportion_however_late_and_however_many_are_forgotten(order: str, keep: int) -> None:
+    def took(count: int) -> float:
+        buffer = TransformBuffer(keep_ns=count // keep)
+        begin = process_time()
+        for stamp in in_order(order, count):
+            buffer.insert_components("a", "b", (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), stamp)
+        buffer.lookup("a", "b", count)
+        return process_time() - begin
+
+    assert took(80_000) < 8 * min(took(20_000), took(20_000)) + 0.1
+
+
+@pytest.mark.parametrize(("order", "keep"), [("reverse", 20_000), ("random", 20_000), ("two halves", 20_000), ("in order", 5000)])
+def test_samples_stand_in_the_order_of_time_and_old_ones_are_forgotten(order: str, keep: int) -> None:
+    buffer = TransformBuffer(keep_ns=keep)
+    for stamp in in_order(order, 20_000):
         buffer.insert("a", "b", shifted(stamp), stamp)
-    assert Counting.moved <= count * PAGE
     track = buffer.track("b")
     assert isinstance(track, MovingTrack)
-    assert [stamp for stamp, _, _ in track.walk()] == sorted(stamps)
-    assert max(len(page.stamps) for page in track.pages[:-1]) <= PAGE + 1
+    stamps = [stamp for stamp, _, _ in track.walk()]
+    assert stamps == list(range(max(20_000 - keep, 1), 20_001))
+    assert (track.span, track.count) == ((stamps[0], 20_000), len(stamps))
 
 
 @pytest.mark.parametrize("page", [1, 2, 7, 512])
-def test_the_order_of_inserts_and_the_pages_change_no_answer(page: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(track_module, "PAGE", page + page % 2)
+def test_the_order_of_inserts_and_the_pages_change_no_answer(page: int, sizes: Sizes) -> None:
+    sizes(page=page + page % 2)
     draw = random.Random(page)  # noqa: S311 - not for secrets
     stamps = draw.sample(range(1000), 150)
     poses = {stamp: Transform.random(seed=stamp) for stamp in stamps}
@@ -270,25 +272,8 @@ def test_lookups_between_late_samples_find_what_is_known_so_far(every: int, poli
             assert buffer.lookup("a", "b", at).xyz == pytest.approx((at, 0.0, 0.0))
 
 
-def test_a_late_sample_costs_one_sort_of_its_page_when_somebody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
-    settled: list[int] = []
-
-    class WatchedPage(Page):
-        def settle(self) -> None:
-            settled.extend([len(self.stamps) + len(self.late)] * bool(self.late))
-            super().settle()
-
-    monkeypatch.setattr(track_module, "Page", WatchedPage)
-    count = 20_000
-    buffer = TransformBuffer()
-    for stamp in range(count, 0, -1):
-        buffer.insert("a", "b", shifted(stamp), stamp)
-    assert sum(settled) < 4 * count
-    assert max(settled) <= PAGE + 1
-
-
-def test_of_two_poses_at_a_stamp_the_last_holds_however_late(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(track_module, "PAGE", 4)
+def test_of_two_poses_at_a_stamp_the_last_holds_however_late(sizes: Sizes) -> None:
+    sizes(page=4)
     buffer = TransformBuffer()
     order = [9, 3, 7, 1, 5, 8, 2, 6, 4]
     for stamp in order:
@@ -303,27 +288,8 @@ def test_of_two_poses_at_a_stamp_the_last_holds_however_late(monkeypatch: pytest
     assert [stamp for stamp, _, _ in track.walk()] == sorted(order)
 
 
-def test_what_is_forgotten_in_order_moves_short_pages_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    dropped: list[int] = []
-
-    class WatchedPage(Page):
-        def drop(self, count: int) -> None:
-            dropped.append(len(self.stamps))
-            super().drop(count)
-
-    monkeypatch.setattr(track_module, "Page", WatchedPage)
-    buffer = TransformBuffer(keep_ns=5000)
-    for stamp in range(20_000):
-        buffer.insert("a", "b", shifted(stamp), stamp)
-    assert max(dropped) <= PAGE
-    track = buffer.track("b")
-    assert isinstance(track, MovingTrack)
-    assert track.span == (14_999, 19_999)
-    assert track.count == 5001
-
-
-def test_what_is_too_old_is_dropped_across_pages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(track_module, "PAGE", 4)
+def test_what_is_too_old_is_dropped_across_pages(sizes: Sizes) -> None:
+    sizes(page=4)
     buffer = TransformBuffer(keep_ns=30)
     for stamp in (*range(10, 40, 2), *range(11, 40, 2), 45, 60, 100):
         buffer.insert("a", "b", shifted(stamp), stamp)

@@ -90,7 +90,6 @@ from frametool import FORMATS
 {row}
 from frametool.cli import run, streaming
 from frametool.cli.commands import apply, convert
-from frametool.stream import record_stream, table
 for line in sys.stdin:
     folder, arguments, environment = json.loads(line)
     if (child := os.fork()) == 0:

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "fit", "explain", "calc",
-    "sim", "view", "cli",
+    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "fit", "explain",
+    "calc", "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
-MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem == "errors")
+MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem in LAYERS)
 TREE = "{name: camera, parent: base, xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 
 

@@ -13,13 +13,14 @@ from frametool.errors import FormatError
 from frametool.formats.load import Recording, load
 from frametool.grammar.edges import Tally
 from frametool.grammar.result import Style
-from frametool.ros import message_stream
 from frametool.ros.echo_format import message_text
 from frametool.ros.plain_messages import plain_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from conftest import Sizes
 
 HALF = 0.7071067811865476
 
@@ -175,14 +176,14 @@ def loaded(path: Path) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("seed", range(30))
 def test_stretches_and_single_messages_make_the_same_tree(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    seed: int, tmp_path: Path, sizes: Sizes
 ) -> None:
     path = tmp_path / "a.jsonl"
     path.write_text("".join(json.dumps(message) + "\n" for message in recorded(seed)))
     for size in (2000, 1 << 17):
-        monkeypatch.setattr(message_stream, "STRETCH", size)
+        sizes(stretch=size)
         whole = loaded(path)
-        monkeypatch.setattr(message_stream, "STRETCH", 1)
+        sizes(stretch=1)
         assert loaded(path) == whole
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from frametool.errors import ValueInvalid
-from frametool.sim import sweep
 from frametool.sim.drivers import FollowController
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import RunSummary, simulate
 from frametool.sim.sweep import grid, rows, simulate_many
 from frametool.sim.turtle import CENTRE
+
+if TYPE_CHECKING:
+    from conftest import Sizes
 
 
 @pytest.mark.parametrize("law", ["ros1", "ros2"])
@@ -38,10 +41,10 @@ def test_many_followers_are_each_what_one_alone_is(law: str, leader: str) -> Non
         assert many.wall_hits[index] == progress.walls.get("turtle2", 0)
 
 
-def test_shapes_broadcast_and_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shapes_broadcast_and_blocks_do_not_show(sizes: Sizes) -> None:
     spawn = np.broadcast_to([4.0, 2.0, 0.0], (3, 1, 3))
     whole = simulate_many(spawn=spawn, gain_linear=[0.5, 1.0], duration=3.0)
-    monkeypatch.setattr(sweep, "BLOCK", 4)
+    sizes(followers=4)
     parts = simulate_many(spawn=spawn, gain_linear=[0.5, 1.0], duration=3.0)
     assert whole.x.shape == (3, 2)
     assert all(np.array_equal(one, two, equal_nan=True) for one, two in zip(whole, parts, strict=True))

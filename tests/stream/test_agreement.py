@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 import yaml
-from flow import INVERT, MOVE, convert, flow
+from flow import INVERT, MOVE, Asked, asked, convert, flow, poses_in, values_of
 
-from frametool.documents.source import Source
 from frametool.errors import FrametoolError, FrametoolWarning
-from frametool.grammar.result import Result, Style
-from frametool.stream.record_values import read_poses, results
-from frametool.stream.request import Operation, Request
+from frametool.grammar.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -77,7 +74,7 @@ BAD: dict[str, dict[str, Any]] = {
 REQUESTS = {
     "move": MOVE._replace(rename=lambda _parent, name: ("m", name)),
     "invert": INVERT._replace(rename=lambda parent, name: (name, parent)),
-    "compose": Request(Operation(left=(1.0, 2.0, 3.0, 0.0, 0.6, 0.0, 0.8), right=((0.5, 0.0, 0.0, 0.6, 0.0, 0.0, 0.8),))),
+    "compose": asked(left=(1.0, 2.0, 3.0, 0.0, 0.6, 0.0, 0.8), right=((0.5, 0.0, 0.0, 0.6, 0.0, 0.0, 0.8),)),
     "convert": convert("rpy_deg,quaternion"),
 }
 COUNTS = (1, 2, 40)
@@ -97,7 +94,7 @@ def told(texts: list[str]) -> list[str]:
     return [text.split(": ", 1)[1].removesuffix(" (row skipped)") for text in texts]
 
 
-def ways(record: dict[str, Any], request: Request) -> Iterator[tuple[str, int, Said]]:
+def ways(record: dict[str, Any], request: Asked) -> Iterator[tuple[str, int, Said]]:
     """Run a record in every way of a stream."""
     line = json.dumps(record)
     document = yaml.safe_dump(record, default_flow_style=False, sort_keys=False)
@@ -154,10 +151,10 @@ def test_what_is_wrong_is_said_alike(kind: str) -> None:
         assert len(reasons) == 1, reasons
 
 
-def as_argument(record: dict[str, Any], request: Request) -> Iterator[FrametoolError]:
+def as_argument(record: dict[str, Any], request: Asked) -> Iterator[FrametoolError]:
     for text in (json.dumps(record), yaml.safe_dump(record)):
         with pytest.raises(FrametoolError) as found:
-            list(results(Source("argument", text), request, Style("json")))
+            values_of(text, request)
         yield found.value
 
 
@@ -174,11 +171,11 @@ def test_an_argument_has_the_numbers_of_a_line(kind: str, wanted: str) -> None:
     line = flow(f"{text}\n".encode(), request, "json")
     if line.status:
         with pytest.raises(FrametoolError):
-            list(results(Source("argument", text), request, Style("json")))
+            values_of(text, request)
         return
-    (mine,) = results(Source("argument", text), request, Style("json", request.notations))
+    (mine,) = values_of(text, request)
     if isinstance(mine, Result):
-        (again,) = read_poses(Source("line", line.text.decode()), Request())
+        (again,) = poses_in(line.text.decode())
         x, y, z, *turned = mine.pose.components
         assert again.components in ((x, y, z, *turned), (x, y, z, *(0.0 - part for part in turned)))
     else:

@@ -6,11 +6,9 @@ import json
 import re
 
 import pytest
-from flow import MOVE, convert, flow
+from flow import MOVE, asked, convert, flow
 
-from frametool.stream.request import Operation, Request
-
-CONSECUTIVE = Request(Operation(of="previous"))
+CONSECUTIVE = asked(of="previous")
 GOOD = '{"point":[1,2,3]}\n'
 
 
@@ -44,7 +42,6 @@ def test_angles_of_records_go_on_beyond_half_a_turn() -> None:
     result = flow(text, convert("rpy_deg")._replace(unwrap=True), "json")
     yaws = [json.loads(line)["rpy_deg"]["yaw"] for line in result.text.splitlines()]
     assert yaws == pytest.approx([170, 190, 320, 450])
-
 
 
 

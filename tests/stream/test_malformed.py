@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from flow import INVERT, MOVE, convert, flow
+from flow import INVERT, MOVE, ON_ERROR, convert, flow
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from frametool.stream.faults import ON_ERROR
 
 GOOD = {
     "csv": (b"id,x,y,z,qx,qy,qz,qw,t\n", b'007,1,2,3,0,0,0,1,"a,b"\n'),

@@ -6,14 +6,12 @@ import random
 from typing import TYPE_CHECKING
 
 import pytest
-from flow import INVERT, MOVE, QUARTER, convert, flow
-
-from frametool.stream.request import Operation, Request
+from flow import INVERT, MOVE, QUARTER, asked, convert, flow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-COMPOSE = Request(Operation(left=QUARTER, right=(QUARTER,)))
+COMPOSE = asked(left=QUARTER, right=(QUARTER,))
 SWAP = INVERT._replace(rename=lambda parent, name: (name, parent))
 TABLES = {
     "points": ("x,y,z", MOVE),

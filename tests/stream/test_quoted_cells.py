@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 from flow import MOVE, flow
-
-from frametool.text import lines
+from sized import sized
 
 ROWS = b"x,y,z,note\n1,2,3,a\n"
 
@@ -22,12 +21,11 @@ def test_a_long_cell_passes_in_blocks_of_any_size(cell: bytes) -> None:
         assert flow(text, MOVE, size=size) == whole
 
 
-def test_a_record_beyond_the_limit_is_refused_with_its_line_whatever_the_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    defaults = {**(lines.read_blocks.__kwdefaults__ or {}), "longest": 5000}
-    monkeypatch.setattr(lines.read_blocks, "__kwdefaults__", defaults)
+def test_a_record_beyond_the_limit_is_refused_with_its_line_whatever_the_block() -> None:
     for cell in (b'"' + b"a\n" * 3000 + b'"', b"x" * 5000):
         text = ROWS + b"4,5,6," + cell + b"\n7,8,9,b\n"
-        found = [flow(text, MOVE, size=size) for size in (7, 100, 4096, 1 << 16)]
+        with sized(record=5000):
+            found = [flow(text, MOVE, size=size) for size in (7, 100, 4096, 1 << 16)]
         assert found[0].told == [
             "the record that begins in line 3 is longer than 5000 bytes: this is no text in lines, or a quote is not closed"
         ]

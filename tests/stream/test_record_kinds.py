@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from flow import Moving
 
-from frametool.documents.source import Source
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.grammar.readers import Reading
-from frametool.stream.answers import Entry, answer
-from frametool.stream.record import find_records
-from frametool.stream.request import Operation, Request
-from frametool.stream.splice import target_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,24 +29,8 @@ def pose(case: dict[str, Any]) -> dict[str, Any]:
     return {"position": mapping("xyz", case["v"]), "orientation": mapping("xyzw", case["pose_q"])}
 
 
-REQUEST = Request(Operation(moves=True))
-
-
-class Moved:
-    """A message of texts, and what becomes of its numbers."""
-
-    def __init__(self, fields: dict[str, Any]) -> None:
-        (self.record,) = find_records({"header": HEADER, **fields}, REQUEST, Reading(Source("test", "")), (0,))
-        self.own = self.record.values[: self.record.shape.own_size]
-
-    def by(self, edge: Any) -> Sequence[float]:
-        made = answer(Entry(self.record, target_of(self.record, REQUEST), edge), self.record.values, (), REQUEST)
-        assert made is not None
-        return made.parts
-
-
-def read(**fields: Any) -> Moved:
-    return Moved(fields)
+def read(**fields: Any) -> Moving:
+    return Moving({"header": HEADER, **fields})
 
 
 def transform(case: dict[str, Any]) -> Any:

@@ -6,14 +6,13 @@ import json
 from typing import TYPE_CHECKING
 
 import pytest
-from flow import INVERT, MOVE, Flow, convert, flow
+from flow import INVERT, MOVE, Asked, Flow, convert, flow
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.stream.request import Request
 
 RECORDS = {
     "flat": '{{"x":{0},"y":2,"z":3,"qx":0,"qy":0,"qz":1,"qw":0}}',
@@ -51,7 +50,7 @@ REQUESTS = {
 BYTES = ("utf-8", "surrogateescape")
 
 
-def run(lines: list[str], request: Request, size: int) -> Flow:
+def run(lines: list[str], request: Asked, size: int) -> Flow:
     text = "".join(f"{line}\n" for line in lines).encode(*BYTES)
     return flow(text, request._replace(on_error="skip"), "json", size=size)
 

@@ -5,24 +5,21 @@ from __future__ import annotations
 import json
 import math
 import random
-from io import BytesIO
+from time import process_time
 from typing import TYPE_CHECKING, Any
-from unittest.mock import Mock
 
+import numpy as np
 import pytest
 import yaml
-
-from frametool.errors import FrametoolError, heard_by
-from frametool.grammar.result import Result, Style
-from frametool.stream import record_results, record_values
-from frametool.stream.faults import SKIP, BadRows
-from frametool.stream.record_cuts import RecordCutter
-from frametool.stream.record_results import AlikeRecords, stream_results
-from frametool.stream.request import Operation, Request
-from frametool.stream.splitter import Splitter
+from sized import sized
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Outcome
+
+    Run = Callable[..., Outcome]
 
 COUNT = 60
 NUMBERS = (0, 1, -3, -0.0, 1e-9, 123456.789, 1e300, 0.1)
@@ -77,74 +74,48 @@ def a_stream(seed: int) -> tuple[str, bytes]:
     return "yaml", "---\n".join(texts).encode()
 
 
-def told(form: str, data: bytes, request: Request, style: Style) -> tuple[list[Any], list[str]]:
-    """Return results, the types of what they say among them, and everything that is told."""
-    said: list[str] = []
-
-    def report(error: FrametoolError) -> None:
-        said.append(str(error))
-
-    def typed(value: Any) -> Any:
-        if isinstance(value, dict):
-            return [(key, typed(each)) for key, each in value.items()]
-        return [typed(each) for each in value] if isinstance(value, list) else (type(value), repr(value))
-
-    bad = BadRows("a", SKIP, tell=report)
-    with heard_by(lambda message, *_: said.append(message)):
-        found = [
-            (each.pose, typed(each.extras)) if isinstance(each, Result) else typed(each)
-            for each in stream_results(BytesIO(data), form, request, style, bad)
-        ]
-    return [repr(each) for each in found], said
-
-
 @pytest.mark.parametrize("seed", range(40))
-@pytest.mark.parametrize("form", ["csv", "tum", "npy", "yaml"])
-def test_in_bulk_as_one_by_one(seed: int, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("form", ["csv", "tum", "npy", "yaml", "json"])
+def test_in_bulk_as_one_by_one(run: Run, seed: int, form: str, tmp_path: Path) -> None:
     how, data = a_stream(seed)
-    request = (Request(), Request(normalize=True), Request(operation=Operation(inverse=True)))[seed % 3]
-    in_bulk = told(how, data, request, Style(form))
-    monkeypatch.setattr(AlikeRecords, "_plan", lambda *_: None)
-    one_by_one = told(how, data, request, Style(form))
-    assert in_bulk[1] == one_by_one[1]
-    assert [each.replace("-0.0", "0.0") for each in in_bulk[0]] == [each.replace("-0.0", "0.0") for each in one_by_one[0]]
+    command = (("convert",), ("convert", "--normalize"), ("invert",))[seed % 3]
+    made = tmp_path / "made"
+
+    def outcome(**sizes: int) -> tuple[int, str, object]:
+        with sized(**sizes):
+            done = run(*command, "--in", how, "-f", form, "--on-error", "skip", "-o", "made", "--force", stdin=data)
+        written = made.read_bytes() if made.exists() else b""
+        read = repr(np.load(made).tolist()) if written and form == "npy" else written.decode()
+        made.unlink(missing_ok=True)
+        return done.status, done.err, read.replace("-0.0", "0.0")
+
+    assert outcome(few=0) == outcome(few=COUNT, learned=0)
 
 
 @pytest.mark.parametrize("kind", ["pose", "degrees", "stamped", "transform", "point", "flat", "turn"])
 @pytest.mark.parametrize("layout", ["lines", "array"])
-def test_records_that_are_alike_are_read_once(kind: str, layout: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a thousand, those are read one by one that are the first of their template, or odd."""
+def test_records_that_are_alike_take_less_time_than_one_by_one(run: Run, kind: str, layout: str) -> None:
     rng = random.Random(7)  # noqa: S311 - the same records in every run
-    records = [a_record(kind, rng, at) | {"note": f"n{at}"} for at in range(1000)]
+    told = [{"note": f"n{at}", "stamp_ns": at, "distance": at / 7, "source_stamp_ns": 2 * at} for at in range(1000)]
+    records = [told[at] | a_record(kind, rng, at) for at in range(1000)]
     data = json.dumps(records) if layout == "array" else "\n".join(map(json.dumps, records))
-    alone = Mock(side_effect=record_values.results)
-    monkeypatch.setattr(record_results, "results", alone)
-    found, _ = told("json", data.encode(), Request(), Style("csv"))
-    assert len(found) == 1000
-    assert alone.call_count < 20
+
+    def took(**sizes: int) -> float:
+        begin = process_time()
+        with sized(**sizes):
+            assert run("convert", "-f", "csv", stdin=data).out.count("\n") == 1001
+        return process_time() - begin
+
+    assert min(took(), took()) < took(learned=0) / 2
 
 
-@pytest.mark.parametrize("form", ["json", "yaml"])
-def test_what_is_told_of_a_result_makes_no_other_record_of_it(form: str) -> None:
-    """The results of one command are read by the next as the ones that are alike, whatever is said beside them."""
-    told = [{"stamp_ns": at, "distance": at / 7, "angle_deg": at / 3, "source_stamp_ns": 2 * at} for at in range(50)]
-    lines = [json.dumps({"xyz": [at, 0, 1], "xyzw": [0, 0, 0, 1], **told[at]}) for at in range(50)]
-    cutter = RecordCutter(Splitter(form), form, Request(), "a")
-    text = ("\n" if form == "json" else "\n---\n").join(lines).encode()
-    parts = cutter.splitter.parts(text).parts
-    for part in parts:
-        assert cutter.match(text, part.start, part.end) or cutter.learn(text, part)
-    assert len(parts) == 50
-    assert len(cutter.templates) <= 2  # the last document of YAML ends in no line of its own
-
-
-def test_a_frame_that_is_left_out_is_told_once(run: Callable[..., Any]) -> None:
+def test_a_frame_that_is_left_out_is_told_once(run: Run) -> None:
     line = '{"parent": "map", "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n'
     done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "-f", "csv", stdin=line * 100)
     assert done.err == "frametool: warning: stdin: frame 'map' is left out: the frames of the result are not known\n"
     assert done.out.count("\n") == 101
 
 
-def test_a_broken_record_whose_key_is_a_mapping_is_null(run: Callable[..., Any]) -> None:
+def test_a_broken_record_whose_key_is_a_mapping_is_null(run: Run) -> None:
     done = run("convert", "-f", "csv", "--on-error", "null", stdin='{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n{"a": nan , {"b": 1}: 2}\n')
     assert (done.status, done.out) == (3, "x,y,z,qx,qy,qz,qw\n1.0,2.0,3.0,0.0,0.0,0.0,1.0\n,,,,,,\n")

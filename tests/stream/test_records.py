@@ -3,15 +3,14 @@ from __future__ import annotations
 import json
 
 import pytest
-from flow import INVERT, MOVE, Flow, convert, flow
+from flow import INVERT, MOVE, Asked, Flow, asked, convert, flow
 
 from frametool.errors import FrametoolWarning
-from frametool.stream.request import Operation, Request
 
 MANY = 40  # records: beyond what is done singly
 
 
-def check(form: str, record: str, wanted: str, request: Request) -> None:
+def check(form: str, record: str, wanted: str, request: Asked) -> None:
     """Run one record alone, and many of it."""
     between = "" if form == "json" else "---\n"
     assert flow(record.encode(), request, form).text.decode() == wanted
@@ -97,7 +96,7 @@ def test_the_size_of_blocks_does_not_show_in_records(size: int) -> None:
 
 def test_one_record_alone_gives_what_it_gives_among_many() -> None:
     record = '{"name": "a", "xyz": [0.1, 0.2, 0.3], "quaternion": {"x": 0.1, "y": -0.2, "z": 0.3, "w": 0.9273618495495703}}\n'
-    for request in (INVERT, MOVE, convert("matrix"), Request(Operation(right=((1.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.8),)))):
+    for request in (INVERT, MOVE, convert("matrix"), asked(right=((1.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.8),))):
         assert flow(record.encode() * MANY, request, "json").text == flow(record.encode(), request, "json").text * MANY
 
 

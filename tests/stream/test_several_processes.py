@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
+import io
+import os
 import tempfile
 from typing import TYPE_CHECKING
 
 import pytest
-from flow import INVERT, MOVE, Flow, convert, flow
+from flow import INVERT, MOVE, ON_ERROR, QUARTER, Asked, Flow, asked, convert, flow
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sized import sized
 
 from frametool.errors import FileProblem, heard_by
-from frametool.stream import table_stream
-from frametool.stream.faults import ON_ERROR
-from frametool.stream.run import Outcome
-from frametool.stream.workers import PLACE_BYTES, spread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from io import BufferedReader
-
-    from frametool.stream.request import Request
 
 # where numpy was loaded with threads of its own, a newer Python warns of every fork; they do nothing here
 pytestmark = pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
@@ -40,7 +36,7 @@ DOCUMENTS = [
 ]  # fmt: skip
 
 
-def same_with_several(text: bytes, request: Request, form: str, size: int, jobs: int) -> None:
+def same_with_several(text: bytes, request: Asked, form: str, size: int, jobs: int) -> None:
     alone = heard(text, request, form)
     assert heard(text, request, form, size=size, jobs=jobs) == alone
     with tempfile.NamedTemporaryFile() as file:
@@ -50,7 +46,7 @@ def same_with_several(text: bytes, request: Request, form: str, size: int, jobs:
             assert heard(stream, request, form, size=size, jobs=jobs) == alone
 
 
-def heard(text: bytes | BufferedReader, request: Request, form: str, *, size: int = 0, jobs: int = 1) -> Flow:
+def heard(text: bytes | BufferedReader, request: Asked, form: str, *, size: int = 0, jobs: int = 1) -> Flow:
     """Run a stream; its warnings stand among the messages."""
     warned: list[str] = []
     with heard_by(lambda message, *_: warned.append(message)):
@@ -105,48 +101,43 @@ def test_rows_that_need_those_before_them_stay_in_order() -> None:
     same_with_several(rows, convert("rpy")._replace(unwrap=True), "csv", 16, 2)
 
 
-def test_a_record_beyond_the_limit_is_refused_with_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    from frametool.text import lines
-
-    defaults = {**(lines.read_blocks.__kwdefaults__ or {}), "longest": 5000}
-    monkeypatch.setattr(lines.read_blocks, "__kwdefaults__", defaults)
+def test_a_record_beyond_the_limit_is_refused_with_its_line() -> None:
     rows = b"x,y,z,tag\n" + b"1,2,3,a\n" * 100
     for cell in (b'"' + b"a\n" * 3000 + b'"', b"x" * 5000):
-        same_with_several(rows + b"4,5,6," + cell + b"\n7,8,9,b\n", MOVE, "csv", 100, 2)
+        with sized(record=5000):
+            same_with_several(rows + b"4,5,6," + cell + b"\n7,8,9,b\n", MOVE, "csv", 100, 2)
 
 
-def test_what_is_larger_than_a_shared_place_arrives_too() -> None:
-    blocks = [b"a" * (PLACE_BYTES + 1), b"b", b"c" * PLACE_BYTES]
-    found = [bytes(outcome.text) for outcome in spread(lambda block: Outcome(block + block), blocks, 2)]
-    assert found == [block + block for block in blocks]
+def test_results_many_times_as_long_as_their_rows_arrive_too() -> None:
+    same_with_several(b"yaw\n" + b"0\n1\n" * 5000, convert("matrix"), "csv", 600, 2)
 
 
-def test_what_ends_the_blocks_is_raised_behind_the_results_before() -> None:
-    def blocks() -> Iterator[bytes]:
-        yield from (b"%d" % number for number in range(20))
+class Failing(io.BytesIO):
+    """A stream that fails where it should end."""
+
+    def read1(self, size: int | None = -1, /) -> bytes:
+        if piece := super().read1(size):
+            return piece
         raise FileProblem("gone")
 
-    found: list[bytes] = []
-    with pytest.raises(FileProblem, match="gone"):
-        found.extend(bytes(outcome.text) for outcome in spread(Outcome, blocks(), 3))
-    assert found == [b"%d" % number for number in range(20)]
+
+def test_what_ends_a_stream_is_told_behind_the_results_before() -> None:
+    rows = b"x,y,z\n" + b"".join(b"%d,2,3\n" % number for number in range(200))
+    found = flow(Failing(rows), MOVE, size=100, jobs=3)
+    assert found == (flow(rows, MOVE).text, ["gone"], 5)
 
 
-def test_a_file_that_becomes_shorter_while_it_is_read_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_becomes_shorter_while_it_is_read_is_an_error() -> None:
     with tempfile.NamedTemporaryFile() as file:
-        file.write(b"x,y,z\n" + b"1,2,3\n" * 1000)
+        file.write(b"frame,x,y,z\n" + b"a,1,2,3\n" * 1000)
         file.seek(0)
-        monkeypatch.setattr(table_stream, "TableWork", lambda *_: truncating(file.name))
+
+        def shortened(_own: str) -> tuple[float, ...]:
+            os.truncate(file.name, 20)
+            return QUARTER
+
+        request = asked(moves=True, frames=("",), pose_of_row_frame=shortened, result_frame="map")
         with open(file.name, "rb") as stream:
-            found = flow(stream, MOVE, size=600, jobs=2)
+            found = flow(stream, request, size=600, jobs=2)
     assert found.told[-1] == "in: became shorter while it was read"
     assert found.status == 5
-
-
-def truncating(path: str) -> object:
-    def process(block: bytes) -> Outcome:
-        with open(path, "r+b") as file:
-            file.truncate(10)
-        return Outcome(block)
-
-    return process

@@ -7,10 +7,9 @@ import io
 from typing import TYPE_CHECKING, Protocol
 
 import pytest
-from flow import INVERT, QUARTER, convert, flow
+from flow import INVERT, QUARTER, asked, convert, flow
 
 from frametool.errors import UnknownFrame, ValueInvalid
-from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
     from conftest import Outcome
@@ -40,7 +39,7 @@ def way(own: str | None) -> Rigid:
     return QUARTER
 
 
-MOVES = Request(Operation(left=QUARTER, moves=True), pose_from_frame=way, result_frame="map", on_error="skip")
+MOVES = asked(left=QUARTER, moves=True, pose_from_frame=way, result_frame="map", on_error="skip")
 
 
 def rows(text: str | bytes) -> list[dict[str, str]]:
@@ -84,7 +83,7 @@ def test_relative_checks_that_both_are_given_in_one_frame(run: Run) -> None:
 @pytest.mark.parametrize("size", [0, 30])
 def test_consecutive_rows_are_given_in_one_frame_and_seen_from_the_row_before(size: int) -> None:
     table = f"parent,name,{POSE}\na,c,{ONE}\nx,c,{ONE}\na,c,{ONE}\n".encode()
-    result = flow(table, Request(Operation(of="previous"), on_error="skip"), size=size)
+    result = flow(table, asked(of="previous", on_error="skip"), size=size)
     assert [(row["parent"], row["name"]) for row in rows(result.text)] == [("c", "c"), ("c", "c")]
     assert result.told[0].startswith("in:3:parent: given in another frame than 'a'")
 

@@ -1,13 +1,10 @@
 from __future__ import annotations
 
 import random
-import sys
 from itertools import pairwise
 
 import pytest
-from flow import INVERT, MOVE, convert, flow
-
-from frametool.stream.request import Operation, Request
+from flow import INVERT, MOVE, asked, calls, convert, flow
 
 HOSTILE = ["007", "1.50", "1e3", '"a,b"', '"q""q"', '""', "", "é 🐢", "\0", "x" * 1_000_000, '" "', "-0.0", "nan", "5'"]
 
@@ -103,7 +100,7 @@ def test_what_is_no_finite_number_is_refused_and_named(cell: str) -> None:
 
 @pytest.mark.parametrize("cell", ["-0.0", "5e-324", "1e308", "1e-308", "0.1", "123456789012345678"])
 def test_extreme_numbers_keep_their_bits(cell: str) -> None:
-    still = Request(Operation(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), moves=True))
+    still = asked(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), moves=True)
     result = flow(f"x,y,z\n{cell},{cell},{cell}\n".encode(), still)
     assert [float(each) for each in result.text.splitlines()[1].split(b",")] == [float(cell)] * 3
 
@@ -111,7 +108,7 @@ def test_extreme_numbers_keep_their_bits(cell: str) -> None:
 def test_results_that_overflow_are_refused() -> None:
     result = flow(
         b"x,y,z\n1e308,1e308,0\n",
-        Request(Operation(left=(1e308, 0.0, 0.0, 0.0, 0.0, -0.7071067811865476, 0.7071067811865476), moves=True)),
+        asked(left=(1e308, 0.0, 0.0, 0.0, 0.0, -0.7071067811865476, 0.7071067811865476), moves=True),
     )
     assert (result.status, result.text) == (1, b"x,y,z\n")
 
@@ -146,14 +143,14 @@ def test_rotations_that_are_none_are_refused_and_nearly_ones_are_told() -> None:
 
 def test_second_poses_come_from_the_same_row() -> None:
     header = ",".join(f"{side}.{name}" for side in "ab" for name in ("x", "y", "z", "qx", "qy", "qz", "qw"))
-    result = flow(f"n,{header}\n7,0,0,0,0,0,0,1,3,4,0,0,0,0,1\n".encode(), Request(Operation(of="pair"), poses=2))
+    result = flow(f"n,{header}\n7,0,0,0,0,0,0,1,3,4,0,0,0,0,1\n".encode(), asked(of="pair", poses=2))
     assert result.text == b"n,x,y,z,qx,qy,qz,qw,distance,angle,angle_deg\n7,3.0,4.0,0.0,0.0,0.0,0.0,1.0,5.0,0.0,0.0\n"
 
 
 @pytest.mark.parametrize("size", [0, 30])
 def test_consecutive_rows_are_compared_across_blocks_and_bad_rows(size: int) -> None:
     rows = b"".join(b"%d,0,0,0,0,0,1\n" % x if x != 4 else b"?,0,0,0,0,0,1\n" for x in (1, 2, 4, 7, 11))
-    request = Request(Operation(of="previous"), on_error="skip", precision=0)
+    request = asked(of="previous", on_error="skip", precision=0)
     result = flow(b"x,y,z,qx,qy,qz,qw\n" + rows, request, size=size)
     assert [line.split(b",")[0] for line in result.text.splitlines()[1:]] == [b"0", b"1", b"5", b"4"]
 
@@ -168,7 +165,7 @@ def test_unwrapped_angles_never_jump(size: int) -> None:
 
 def test_each_row_may_name_its_frame() -> None:
     edges = {"a": (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), "b": (2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)}
-    request = Request(Operation(moves=True), frames=("",), pose_of_row_frame=edges.__getitem__, result_frame="map")
+    request = asked(moves=True, frames=("",), pose_of_row_frame=edges.__getitem__, result_frame="map")
     result = flow(b"frame,x,y,z\na,0,0,0\nb,0,0,0\n", request)
     assert result.text == b"frame,x,y,z\nmap,1.0,0.0,0.0\nmap,2.0,0.0,0.0\n"
 
@@ -243,25 +240,9 @@ def test_semicolons_part_cells_as_commas_do(size: int) -> None:
 
 @pytest.mark.parametrize("row", [b"1,2", b"1,2,3,4", b"x,2,3"])
 def test_no_consecutive_row_at_all_is_no_crash(row: bytes) -> None:
-    result = flow(b"x,y,z\n" + row + b"\n", Request(Operation(of="previous"), on_error="skip"))
+    result = flow(b"x,y,z\n" + row + b"\n", asked(of="previous", on_error="skip"))
     assert result.text == b"x,y,z,qx,qy,qz,qw,distance,angle,angle_deg\n"
     assert result.status == 3
-
-
-def calls(text: bytes, request: Request) -> int:
-    """Count the calls that a run makes, into Python and out of it."""
-    count = 0
-
-    def counted(_frame: object, event: str, _argument: object) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    sys.setprofile(counted)
-    try:
-        flow(text, request)
-    finally:
-        sys.setprofile(None)
-    return count
 
 
 def wide(columns: int, name: str) -> bytes:

@@ -4,32 +4,39 @@ import io
 import os
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sized import sized
 
 from frametool.errors import FormatError
 from frametool.text.cells import RecordEnds, whole_records
 from frametool.text.lines import read_blocks
 
+if TYPE_CHECKING:
+    from conftest import Sizes
+
 
 @given(st.binary(max_size=60).map(lambda text: text.replace(b"a", b"\n")), st.integers(1, 20))
 def test_blocks_are_the_stream_cut_behind_line_ends(text: bytes, size: int) -> None:
-    blocks = list(read_blocks(io.BytesIO(text), size=size))
+    with sized(block=size):
+        blocks = list(read_blocks(io.BytesIO(text)))
     assert b"".join(blocks) == text
     assert all(block.endswith(b"\n") for block in blocks[:-1])
     assert all(blocks)
 
 
 def test_a_line_longer_than_allowed_is_an_error_that_says_so() -> None:
-    with pytest.raises(FormatError, match="longer than 1000 bytes"):
-        list(read_blocks(io.BytesIO(b"x" * 5000 + b"\n"), size=100, longest=1000))
+    with sized(block=100, record=1000), pytest.raises(FormatError, match="longer than 1000 bytes"):
+        list(read_blocks(io.BytesIO(b"x" * 5000 + b"\n")))
 
 
 def test_records_of_several_lines_stay_whole() -> None:
     text = b'a,"b\n\nc",d\n' * 10
-    blocks = list(read_blocks(io.BytesIO(text), size=7, whole=whole_records))
+    with sized(block=7):
+        blocks = list(read_blocks(io.BytesIO(text), whole=whole_records))
     assert b"".join(blocks) == text
     assert all(block.count(b'"') % 2 == 0 for block in blocks)
 
@@ -52,7 +59,8 @@ RECORDS = [
 
 @given(st.lists(st.sampled_from(RECORDS), max_size=8), st.integers(1, 40), st.integers(1, 40))
 def test_blocks_end_where_records_do_however_the_stream_is_cut(rows: list[bytes], most: int, size: int) -> None:
-    blocks = list(read_blocks(Trickle(b"".join(rows), most), size=size, whole=RecordEnds(b",")))
+    with sized(block=size):
+        blocks = list(read_blocks(Trickle(b"".join(rows), most), whole=RecordEnds(b",")))
     ends = {sum(map(len, rows[:count])) for count in range(len(rows) + 1)}
     assert b"".join(blocks) == b"".join(rows)
     assert {sum(map(len, blocks[:count])) for count in range(len(blocks) + 1)} <= ends
@@ -60,10 +68,11 @@ def test_blocks_end_where_records_do_however_the_stream_is_cut(rows: list[bytes]
 
 @pytest.mark.parametrize("record", [b"x" * 99 + b"\n", b'"' + b"\n" * 97 + b'"\n', b'"' + b'""\n' * 32 + b'"\n'])
 @pytest.mark.parametrize("longest", [120, 105, 101, 99, 98, 60, 30])
-def test_the_longest_record_is_the_same_however_the_stream_is_cut(record: bytes, longest: int) -> None:
+def test_the_longest_record_is_the_same_however_the_stream_is_cut(record: bytes, longest: int, sizes: Sizes) -> None:
     for most in (1, 2, 7, 64, 1000):
         for size in (1, 3, 50, 1000):
-            blocks = read_blocks(Trickle(b"a,b\n" + record + b"c\n", most), size=size, longest=longest, whole=RecordEnds(b","))
+            sizes(block=size, record=longest)
+            blocks = read_blocks(Trickle(b"a,b\n" + record + b"c\n", most), whole=RecordEnds(b","))
             if len(record) <= longest:
                 assert b"".join(blocks) == b"a,b\n" + record + b"c\n"
             else:

@@ -14,6 +14,7 @@ import browsers
 import pytest
 from chromium import NEEDS_CHROMIUM
 from console import ROOT
+from flow import poses_in
 from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
@@ -152,10 +153,7 @@ def test_what_is_copied_reads_back_as_the_same_pose(page_of: MakePage, visit: Vi
     tab.click("#shell")
     yaml, command = tab.evaluate("() => window.copied")
     tree = frametool.load(ROOT / "examples" / "robot.yaml")
-    from frametool.cli.poses import poses_from
-    from frametool.stream.request import Request
-
-    (pose,) = poses_from(yaml, Request())
+    (pose,) = poses_in(yaml)
     assert (pose.name, pose.parent) == ("tool", "map")
     assert frametool.Transform.of(*pose.components).is_close(tree.lookup("map", "tool"), angle=1e-13, distance=1e-13)
     assert command == "frametool lookup examples/robot.yaml map tool"

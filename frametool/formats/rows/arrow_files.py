@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frametool import sizes
 from frametool.errors import FormatError, ValueInvalid, printable, shown, warn
 from frametool.formats.rows.arrow import IS_JSON, ArrowBatch, kind_of, require_pyarrow
 from frametool.formats.rows.column_file import Collected, ColumnFile, seekable
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from frametool.text.spans import Ints
 
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrows"}
-LARGEST = 3 << 26  # bytes of a group of rows that is held as a whole, four times in all: below 1 GB
 NEW_GROUP = 1 << 20  # rows of a group where the input has none
 HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory that writing a group may take: times its size, and bytes beside
 NULLS = True  # its columns have room for them
@@ -142,7 +142,7 @@ class GroupWriter:
         self.count += new.num_rows
         self.read += new.num_rows if batch is None else batch.size
         ends = batch.ends_group if batch is not None else self.count >= NEW_GROUP
-        if ends or self.size > LARGEST:
+        if ends or self.size > sizes.GROUP:
             self._write_group()
         return self.sink.taken()
 
@@ -345,7 +345,7 @@ class ParquetFile(ArrowFile):
 
     def _table(self, group: int) -> Any:
         """Read a group, its columns side by side; None for one that is too large to be held."""
-        if self.about.row_group(group).total_byte_size > LARGEST:
+        if self.about.row_group(group).total_byte_size > sizes.GROUP:
             return None
         with translated(self.name):
             return self.file.read_row_group(group)
@@ -362,7 +362,7 @@ class ParquetFile(ArrowFile):
         else:
             parts = self.guarded(self._rows_of(group, AT_ONCE))
             if not self.warned:
-                warn(f"{self.name}: groups of rows beyond {LARGEST >> 20} MiB are written in parts")
+                warn(f"{self.name}: groups of rows beyond {sizes.GROUP >> 20} MiB are written in parts")
             self.warned = True
         for rows in parts:
             left -= rows.num_rows

@@ -11,6 +11,7 @@ from __future__ import annotations
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
+from frametool import sizes
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
 from frametool.grammar.result import NoResult, Result, carries_position, in_columns, pose_numbers, without_frame
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
 SIX = ("twist", "wrench")
-FEW = 1 << 13  # rows of a table that is made at once
 HALVES = ("linear", "angular", "force", "torque")
 
 
@@ -89,8 +89,8 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 def table_pieces(values: Iterator[Result | dict[str, Any]], style: Style) -> Iterator[str]:
     """Yield the table of results, poses or mappings; of many it waits in a file until all columns are known."""
     cells = (_pose_cells(each, style) if isinstance(each, Result) else dict(_record_cells(each)) for each in values)
-    rows = list(islice(cells, FEW))
-    if len(rows) < FEW:
+    rows = list(islice(cells, sizes.TABLE))
+    if len(rows) < sizes.TABLE:
         yield _table(rows, style)
         return
     from json import dumps, loads
