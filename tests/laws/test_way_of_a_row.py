@@ -11,14 +11,15 @@ import shlex
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
-from types import CodeType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import CodeType
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = f"{ROOT / 'frametool'}{os.sep}"
@@ -108,7 +109,7 @@ def main(ways: list[str]) -> None:
         for way in ways:
             arguments = shlex.split(WAYS[way])
             silently(arguments)
-            print(f'    "{way}": {cost(lambda arguments=arguments: silently(arguments))},  # bound: {MOST.get(way)}')
+            print(f'    "{way}": {cost(partial(silently, arguments))},  # bound: {MOST.get(way)}')
         os.chdir(ROOT)
 
 
