@@ -1,0 +1,117 @@
+"""How much code a row meets on its way: functions run, files touched and their code lines, counted in a real run.
+
+The bounds of MOST may only be lowered.  `python tests/laws/test_way_of_a_row.py` prints today's numbers beside them.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import CodeType
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = f"{ROOT / 'frametool'}{os.sep}"
+RECORDS = "".join(f'{{"id": {at}, "frame": "lidar", "point": [{at}.0, 0.0, 0.5]}}\n' for at in range(40))
+FILES = {
+    "point.csv": "x,y,z\n1,2,3\n",
+    "records.jsonl": RECORDS,
+    "walk.tum": "".join(f"{at}.0 {at}.0 0 0 0 0 0.6 0.8\n" for at in range(40)),
+    "robot.yaml": (ROOT / "examples" / "robot.yaml").read_text(encoding="utf-8"),
+}
+WAYS = {
+    "one CSV point": "apply robot.yaml map lidar -i point.csv",
+    "40 JSON records": "apply robot.yaml map lidar -i records.jsonl",
+    "40 JSON records to CSV": "apply robot.yaml map lidar -i records.jsonl -f csv",
+    "TUM to KITTI": "convert -i walk.tum -f kitti",
+    "YAML lookup": "lookup robot.yaml map lidar",
+    "convert of numbers": "convert --from rpy_deg 0 0 90",
+}
+
+
+class Cost(NamedTuple):
+    """What a run touches of the package: functions (with lambdas and comprehensions), files, lines of the functions."""
+
+    functions: int
+    files: int
+    lines: int
+
+
+MOST = {
+    "one CSV point": Cost(functions=637, files=59, lines=3819),  # the aim: 320 functions, 30 files
+    "40 JSON records": Cost(functions=713, files=62, lines=4251),  # 340, 32
+    "40 JSON records to CSV": Cost(functions=720, files=60, lines=4194),  # 340, 32
+    "TUM to KITTI": Cost(functions=514, files=50, lines=2960),  # 320, 30
+    "YAML lookup": Cost(functions=362, files=41, lines=2057),  # 220, 28
+    "convert of numbers": Cost(functions=165, files=24, lines=886),  # 120, 20
+}
+
+
+def cost(run: Callable[[], Any]) -> Cost:
+    """Count what a run calls; what is run while a module is imported counts too, so that a first run comes before."""
+    codes: set[CodeType] = set()
+
+    def note(frame: Any, event: str, _argument: Any) -> None:
+        if event == "call" and frame.f_code.co_filename.startswith(PACKAGE):
+            codes.add(frame.f_code)
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        run()
+    finally:
+        sys.setprofile(before)
+    lines = {(code.co_filename, line) for code in codes for *_, line in code.co_lines() if line}
+    return Cost(len(codes), len({code.co_filename for code in codes}), len(lines))
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_row_meets_no_more_code_than_before(run: Callable[..., Any], way: str) -> None:
+    arguments = shlex.split(WAYS[way])
+    assert run(*arguments, files=FILES).status == 0
+    found = cost(lambda: run(*arguments))
+    assert all(each <= most for each, most in zip(found, MOST[way], strict=True)), f"{found} > {MOST[way]}"
+
+
+def silently(arguments: list[str]) -> None:
+    """Run the command line with nothing on its input, and drop what it writes."""
+    from frametool import cli
+
+    outer = sys.stdin, sys.stdout, sys.stderr
+    sys.stdin, sys.stdout, sys.stderr = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in outer)
+    try:
+        cli.run(arguments)
+    finally:
+        sys.stdin, sys.stdout, sys.stderr = outer
+
+
+def main(ways: list[str]) -> None:
+    """Print what each way costs, each in a process of its own: what one has cached spares another some calls."""
+    if not ways:
+        for way in WAYS:
+            subprocess.run([sys.executable, __file__, way], check=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        for name, text in FILES.items():
+            Path(name).write_text(text, encoding="utf-8")
+        for way in ways:
+            arguments = shlex.split(WAYS[way])
+            silently(arguments)
+            print(f'    "{way}": {cost(partial(silently, arguments))},  # bound: {MOST.get(way)}')
+        os.chdir(ROOT)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
