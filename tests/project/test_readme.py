@@ -54,9 +54,10 @@ def split(text: str) -> tuple[list[str], list[float]]:
 
 
 def shown(command: str, bin_folder: Path) -> str:
-    """Return what a terminal shows; README's own questions are asked by processes, as a person asks them."""
-    by_process = command in dict(QUESTIONS) or not understands(command)
-    return console.printed(command, bin_folder) if by_process else printed(command, console.ROOT, console.WIDTH)
+    """Return what a terminal shows; README's own questions are asked by processes too, as a person asks them."""
+    text = printed(command, console.ROOT, console.WIDTH) if understands(command) else console.printed(command, bin_folder)
+    assert command not in dict(QUESTIONS) or text == console.printed(command, bin_folder)
+    return text
 
 
 @pytest.mark.parametrize(("command", "output"), EXAMPLES, ids=[command for command, _ in EXAMPLES])

@@ -45,9 +45,8 @@ class Outcome(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """A command: what joins it to the one before, its words as they are written, its redirections."""
+    """A command of a pipeline: its words as they are written, its redirections."""
 
-    joint: str
     words: list[str]
     redirections: list[str]
 
@@ -59,25 +58,27 @@ class Terminal(io.BytesIO):
         return True
 
 
-def parsed(line: str) -> list[Stage]:
-    """Return the commands of a line; raises NotUnderstood."""
-    stages = [Stage(";", [], [])]
+def parsed(line: str) -> list[tuple[str, list[Stage]]]:
+    """Return the pipelines of a line, each with what joins it to the one before; raises NotUnderstood."""
+    pipelines = [(";", [Stage([], [])])]
     position = 0
     while position < len(line):
         found = TOKEN.match(line, position)
         if found is None:
             raise NotUnderstood(line[position:])
         position = found.end()
-        if found["joint"]:
-            stages.append(Stage(found["joint"], [], []))
+        stages = pipelines[-1][1]
+        if found["joint"] == "|":
+            stages.append(Stage([], []))
+        elif found["joint"]:
+            pipelines.append((found["joint"], [Stage([], [])]))
         elif found["word"]:
             stages[-1].words.append(found["word"])
         elif found["redirection"]:
             stages[-1].redirections.append(found["redirection"])
-    for stage in stages:
-        if not (stage.words and COMMAND.fullmatch(stage.words[0])):
-            raise NotUnderstood(line)
-    return stages
+    if not all(stage.words and COMMAND.fullmatch(stage.words[0]) for _, stages in pipelines for stage in stages):
+        raise NotUnderstood(line)
+    return pipelines
 
 
 def understands(line: str) -> bool:
@@ -115,7 +116,7 @@ class _Shell:
     def run(self, line: str, folder: Path) -> int:
         """Run a line and return its exit status."""
         with chdir(folder):
-            for joint, stages in _pipelines(parsed(line)):
+            for joint, stages in parsed(line):
                 if joint == ";" or (joint == "&&") == (self.variables["?"] == "0"):
                     self.variables["?"] = str(self._pipeline(stages))
         return int(self.variables["?"])
@@ -169,13 +170,6 @@ class _Shell:
         if found[0].startswith("$("):
             return self.until_end.enter_context(TemporaryDirectory())
         return self.variables[found[0][1:]]
-
-
-def _pipelines(stages: list[Stage]) -> Iterator[tuple[str, list[Stage]]]:
-    """Yield the pipelines of commands, each with what joins it to the one before."""
-    begins = [number for number, stage in enumerate(stages) if stage.joint != "|"]
-    for begin, end in zip(begins, [*begins[1:], len(stages)], strict=True):
-        yield stages[begin].joint, stages[begin:end]
 
 
 def frametool(words: list[str], stdin: Any, out: Any, err: Any) -> int:
