@@ -6,6 +6,7 @@ import io
 import os
 import pathlib
 import re
+import shutil
 import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -32,7 +33,8 @@ settings.load_profile("steady")
 
 # terminals, shells, signals and forks are of POSIX; tests of them import what Windows has not
 POSIX = r"(?m)^\s*(?:import|from) (?:browsers|console|fcntl|machine_output|oracles_of_use|pty|readline|resource|shell|termios)\b"
-TESTS = pathlib.Path(__file__).parent.rglob("test_*.py")
+HERE = pathlib.Path(__file__).parent
+TESTS = HERE.rglob("test_*.py")
 collect_ignore = [str(each) for each in TESTS if os.name == "nt" and re.search(POSIX, each.read_text(encoding="utf-8"))]
 
 
@@ -73,6 +75,21 @@ def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcom
 def sizes(monkeypatch: pytest.MonkeyPatch) -> Sizes:
     """Set sizes of the run by their names in lower case, as in `sizes(block=7)`."""
     return partial(set_sizes, monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def copied_examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Copy the example files into a folder."""
+    return shutil.copytree(HERE.parent / "examples", tmp_path_factory.mktemp("copied") / "examples")
+
+
+@pytest.fixture
+def examples_folder(copied_examples: Path) -> Iterator[Path]:
+    """Return a folder with the example files; what a test writes there is removed after it."""
+    before = set(copied_examples.iterdir())
+    yield copied_examples
+    for path in set(copied_examples.iterdir()) - before:
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 @pytest.fixture(autouse=True)

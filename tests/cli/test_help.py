@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-import subprocess
-import sys
 import tomllib
 from importlib import import_module
 from itertools import pairwise
@@ -16,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import pytest
+from in_process import run_line
 
 from frametool.cli.commands import COMMANDS, examples
 from frametool.cli.commands.help import questions, topic, topics
@@ -44,21 +41,11 @@ def test_a_subject_fits_a_screen_and_has_examples(name: str) -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_an_example_of_a_subject_runs(example: str, tmp_path: Path) -> None:
-    for file in (ROOT / "examples").iterdir():
-        if file.is_file():
-            shutil.copy(file, tmp_path)
-    script = tmp_path / "frametool"
-    script.write_text(f'#!/bin/sh\nexec {sys.executable} -m frametool "$@"\n')
-    script.chmod(0o755)
-    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        ["bash", "-o", "pipefail", "-c", example], cwd=tmp_path, env=environment, capture_output=True, text=True,
-        check=False, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
+def test_an_example_of_a_subject_runs(example: str, examples_folder: Path) -> None:
+    done = run_line(example, examples_folder, pipefail=True)
     leaves_out = "frametool solve" in example or "--robust" in example
-    assert done.returncode in ((0, 3) if leaves_out else (0,)), done.stderr
-    assert done.stdout or "|| true" in example or "check" in example
+    assert done.status in ((0, 3) if leaves_out else (0,)), done.err
+    assert done.out or "|| true" in example or "check" in example
 
 
 def test_every_representation_convention_and_exit_code_is_explained() -> None:
