@@ -50,14 +50,15 @@ class Outcome(NamedTuple):
 def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcome]:
     """Run the command line in this process, in an empty folder that `files` fill."""
 
-    def call(*arguments: str, stdin: str | bytes = "", files: dict[str, str | bytes] | None = None) -> Outcome:
+    def call(*arguments: str, stdin: str | bytes | io.RawIOBase = "", files: dict[str, str | bytes] | None = None) -> Outcome:
         monkeypatch.chdir(tmp_path)
         for name, content in (files or {}).items():
             (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
         errors = {"out": "strict", "err": "backslashreplace"}  # as Python opens them
         streams = {name: io.TextIOWrapper(io.BytesIO(), "utf-8", errors=each) for name, each in errors.items()}
         data = stdin.encode() if isinstance(stdin, str) else stdin
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(io.BytesIO(data)), "utf-8"))
+        raw = io.BytesIO(data) if isinstance(data, bytes) else data
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(raw), "utf-8"))
         monkeypatch.setattr(sys, "stdout", streams["out"])
         monkeypatch.setattr(sys, "stderr", streams["err"])
         status = cli.run(list(arguments))

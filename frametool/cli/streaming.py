@@ -25,7 +25,7 @@ from frametool.cli.options import (
     verbose_option,
 )
 from frametool.cli.stderr import say, say_error
-from frametool.documents.source import HEAD
+from frametool.documents.source import HEAD, has_line, has_record
 from frametool.errors import FileProblem, FormatError
 from frametool.formats.table import FORMATS, ORDERS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
@@ -126,7 +126,22 @@ class Stream:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
         if self._opened is None:
             self._opened = self.messages() or _opened(self.path)
+            if not self._opened.seekable():
+                from frametool.text.lines import arrived
+
+                self._opened = arrived(self._opened, self._shows_form, HEAD)
         return self._opened
+
+    def _shows_form(self, begin: bytes) -> bool:
+        """Return True if what comes later does not change the form that is found."""
+        if has_record(begin):
+            return True
+        if not has_line(begin):
+            return False
+        try:
+            return bool(self.told_form() or self._detected(begin, is_table=self._says_columns(), quiet=True))
+        except FormatError:
+            return False
 
     def messages(self) -> BufferedReader | None:
         """Return the points, poses or fixes of the bag that -i names as JSON lines; None for any other file.
@@ -239,12 +254,12 @@ class Stream:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
 
-    def _detected(self, begin: bytes, *, is_table: bool) -> str:
+    def _detected(self, begin: bytes, *, is_table: bool, quiet: bool = False) -> str:
         """Find the form of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
         form, known_by = detect(begin, *STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
-        if known_by:
+        if known_by and not quiet:
             say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
         return form
 

@@ -181,6 +181,29 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
 
+# what ends where its next one begins, or with the stream: a key or an entry of YAML, on the first line, and XML
+_OVER_LINES = rb"""- |["']?[A-Za-z_][\w./-]*["']?[ \t]*:\s|\s*<"""
+
+
+def _data(begin: bytes) -> bytes:
+    """Return the whole lines of a text from the first one that is data."""
+    return re.sub(rb"\A(?:\xef\xbb\xbf)?(?:(?:#.*|---)?[ \t\r]*\n)*", b"", begin[: begin.rfind(b"\n") + 1])
+
+
+def has_line(begin: bytes) -> bool:
+    """Return True if a line of data has arrived, and it is none of a document, which stands on many."""
+    data = _data(begin)
+    return bool(data) and not re.match(_OVER_LINES, data)
+
+
+def has_record(begin: bytes) -> bool:
+    """Return True if a document has arrived, a line of JSON, or two lines of a table."""
+    data = _data(begin)
+    if re.match(_OVER_LINES, data):
+        return re.search(rb"(?m)^---\s*$", data) is not None
+    return re.match(rb"\s*[{[].*[]}],?\s*\n|\s*[^\s{[].*\n(?:#.*\n)*[^#\n].*\n", data) is not None
+
+
 def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
     """Read a file, or standard input for `-`, as text; `stream` is what was opened already.
 
@@ -334,9 +357,15 @@ class InputFile:
         self.beside: Sequence[InputFile] = ()  # all files that are read together
         self.scopes: list[str] = []  # what stands before its names, once for each, where another file says so
         self.stream: BinaryIO = BufferedReader(BytesIO()) if folder else stream or opened(path)
+        self._is_pipe = not self.stream.seekable()
 
     def head(self) -> bytes:
         """Return the first bytes, and leave them to be read."""
+        if self._is_pipe:
+            from frametool.text.lines import arrived
+
+            self.stream = arrived(self.stream, has_record, HEAD)  # type: ignore[arg-type]
+            self._is_pipe = False
         head: bytes = self.stream.peek(HEAD)[:HEAD]  # type: ignore[attr-defined]
         return head
 

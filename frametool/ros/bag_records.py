@@ -8,7 +8,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
-from io import BufferedReader, RawIOBase
+from io import BufferedReader
 from math import isfinite
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from frametool.errors import FormatError, Unanswered, first_of, listing
 from frametool.ros.bags import TYPES, check_count, opened_bag, refuse_foreign
 from frametool.ros.messages import PATH
 from frametool.ros.pose_lists import POSE_ARRAY, posed_messages
+from frametool.text.lines import Pieces
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 
@@ -62,7 +63,7 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
         refuse_foreign(reader, chosen, path)
         topics = record_topics(reader, chosen, path)
         if topics:
-            return BufferedReader(_Lines(_pieces(_lines(reader, topics, path)), opened.pop_all()))
+            return BufferedReader(Pieces(_pieces(_lines(reader, topics, path)), opened.pop_all()))
         wanted = {topic.strip("/") for topic in chosen}
         clouds = [each.topic.strip("/") for each in reader.connections if each.msgtype == CLOUD]
         if any(not wanted or topic in wanted for topic in clouds):
@@ -162,30 +163,3 @@ _WRITERS: dict[type, Callable[[Any], str]] = {
 def _is_data(name: str) -> bool:
     """Tell a field from the library's own marks and from the constants of a message's type."""
     return not name.isupper() and not name.startswith("__")
-
-
-class _Lines(RawIOBase):
-    """Bytes that an iterator yields, as a stream."""
-
-    def __init__(self, lines: Iterator[bytes], opened: ExitStack) -> None:
-        """Take the lines, and what is closed behind the last."""
-        self._lines = lines
-        self._opened = opened
-        self._rest = b""
-
-    def readable(self) -> bool:
-        """Tell that it is read."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Fill a buffer; 0 at the end."""
-        if not self._rest:
-            self._rest = next(self._lines, b"")
-        size = min(len(self._rest), len(buffer))
-        buffer[:size], self._rest = self._rest[:size], self._rest[size:]
-        return size
-
-    def close(self) -> None:
-        """Close the bag too."""
-        self._opened.close()
-        super().close()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from io import BufferedReader, RawIOBase
+from io import BufferedReader
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from frametool import sizes
 from frametool.errors import FormatError, FrametoolError
@@ -16,7 +16,7 @@ from frametool.stream.faults import SKIP, STOP, Fault, RowNote
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.run import Outcome, mapped
 from frametool.stream.splitter import ARRAY, Splitter
-from frametool.text.lines import blocks_behind, extent_in_file, read_blocks
+from frametool.text.lines import Pieces, blocks_behind, extent_in_file, read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator
@@ -76,26 +76,6 @@ def _raising(error: FormatError) -> Iterator[bytes]:
     yield b""
 
 
-class _Pieces(RawIOBase):
-    """A stream of pieces of bytes."""
-
-    def __init__(self, pieces: Iterator[bytes]) -> None:
-        """Take them."""
-        self.pieces = pieces
-        self.left = b""
-
-    def readable(self) -> bool:
-        """Tell that it can be read."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Read as much as fits of the next piece."""
-        self.left = self.left or next((piece for piece in self.pieces if piece), b"")
-        size = min(len(buffer), len(self.left))
-        buffer[:size], self.left = self.left[:size], self.left[size:]
-        return size
-
-
 def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedReader:
     """Return a stream of records with so much added to all stamps in them; a record that cannot be read stays."""
 
@@ -109,7 +89,7 @@ def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedRea
                     edits.append((part.start, part.end, moved.encode()))
             yield stamp_source.replaced(block, edits)
 
-    return BufferedReader(_Pieces(pieces()))
+    return BufferedReader(Pieces(filter(None, pieces())))
 
 
 def _has_ended(stream: ByteStream) -> bool:

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
+from io import BufferedReader, RawIOBase
+from itertools import chain
 from time import monotonic
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool import sizes
 from frametool.errors import FileProblem, FormatError
@@ -101,6 +104,53 @@ def _readiness(stream: ByteStream) -> Callable[[int], bool]:
     except (AttributeError, OSError, ValueError):
         return lambda _patience: False
     return lambda patience: bool(poll.poll(patience))
+
+
+class Pieces(RawIOBase):
+    """Bytes that an iterator yields, as a stream; no piece is empty."""
+
+    def __init__(self, pieces: Iterator[bytes], source: Any = None) -> None:
+        """Take the pieces, and what is closed behind the last."""
+        self._pieces = pieces
+        self._source = source
+        self._rest = b""
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def fileno(self) -> int:
+        """Return the number of the file that the pieces are of."""
+        return int(self._source.fileno())
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer with what fits of the next piece; 0 at the end."""
+        self._rest = self._rest or next(self._pieces, b"")
+        size = min(len(self._rest), len(buffer))
+        buffer[:size], self._rest = self._rest[:size], self._rest[size:]
+        return size
+
+    def close(self) -> None:
+        """Close the source too; standard input stays open."""
+        if self._source is not None and self._source is not getattr(sys.stdin, "buffer", None):
+            self._source.close()
+        super().close()
+
+
+def arrived(stream: BufferedReader, is_enough: Callable[[bytes], bool], most: int) -> BufferedReader:
+    """Wait until a pipe has brought enough to tell its form, and return a stream that shows it at the first look.
+
+    is_enough: judges the bytes so far; most: bytes after which nothing is waited for
+    """
+    if is_enough(stream.peek()):
+        return stream
+    held = b""
+    while len(held) < most and (piece := stream.read1(most - len(held))):
+        held += piece
+        if b"\n" in piece and is_enough(held):
+            break
+    pieces = chain((held,) if held else (), iter(lambda: stream.read1(most), b""))
+    return BufferedReader(Pieces(pieces, stream), most)
 
 
 class ByteRange(NamedTuple):
