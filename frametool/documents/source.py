@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
     Event: TypeAlias = tuple[int, str, int, int, str, int]
 
-DEEPEST = 1000  # levels of lists and maps; a tree of 60 frames in a row has 120
+DEEPEST = 990  # levels of lists and maps; a tree of 60 frames in a row has 120, and libyaml reads no more than 1000
 # of one file of documents, also in bytes; a million frames take 100 to 600 million
 MOST_CHARACTERS = 1 << 30
 # lists and maps in one text: each takes 64 bytes or more, and 3 characters to write; a million messages: 6e6

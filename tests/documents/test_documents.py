@@ -83,10 +83,10 @@ REFUSED = {
     '{"a": "\\ud83d"}': "f:1:8: \\ud83d is half a character; its other half is missing",
     "a: \ud83d": "f:1:4: not UTF-8: half a character (U+D83D)",
     "a: \x01": "f:1:4: the character U+0001 may not stand in YAML or JSON; is this text?",
-    "[" * 200_000: "f:1:1001: nested deeper than 1000 levels",
-    "[" * 1001 + "]" * 1001: "f:1:1001: nested deeper than 1000 levels",
-    '{"a":' * 200_000: "f:1:5001: nested deeper than 1000 levels",
-    "- " * 5000: "f:1:2001: nested deeper than 1000 levels",
+    "[" * 200_000: "f:1:991: nested deeper than 990 levels",
+    "[" * 991 + "]" * 991: "f:1:991: nested deeper than 990 levels",
+    '{"a":' * 200_000: "f:1:4951: nested deeper than 990 levels",
+    "- " * 5000: "f:1:1981: nested deeper than 990 levels",
     "a: [1, 2": "f:1:9: did not find expected ',' or ']', while parsing a flow sequence begun at line 1",
 }
 
