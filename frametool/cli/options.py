@@ -17,6 +17,7 @@ from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, s
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
+from frametool.formats.unsupported import UNSUPPORTED
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
@@ -223,10 +224,9 @@ class Form(Text):
         self.are = are
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse an unknown one with the nearest name; of a form that is known and not read, say what to do."""
+        """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
         if value not in self.names:
-            if value in FORMATS and (instead := FORMATS[value].instead):
-                self.fail(f"{value} ({FORMATS[value].summary}) is not read: {instead}", param, ctx)
+            _refuse_unsupported(self, value, param, ctx)
             near = did_you_mean(value, self.names)
             self.fail(f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all", param, ctx)
         return value
@@ -234,6 +234,23 @@ class Form(Text):
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the forms."""
         return {name: FORMATS[name].summary for name in self.names}
+
+
+class WrittenForm(click.Choice[str]):
+    """The form of a result, one of those that a command writes."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse an unknown one; of one that is not supported, say what to do."""
+        _refuse_unsupported(self, value, param, ctx)
+        return super().convert(value, param, ctx)
+
+
+def _refuse_unsupported(
+    kind: click.ParamType[Any], value: Any, param: click.Parameter | None, ctx: click.Context | None
+) -> None:
+    if value in UNSUPPORTED:
+        row = UNSUPPORTED[value]
+        kind.fail(f"{value} ({row.summary}) is not supported: {row.remedy}", param, ctx)
 
 
 class AxesName(Text):
@@ -403,7 +420,7 @@ _PLACE = (
 
 
 def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
-    return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
+    return click.option("-f", "--format", "format_name", type=WrittenForm(("text", *forms)), help=text)
 
 
 MESSAGES = ("pose", "tf", "path", "point", "fix")

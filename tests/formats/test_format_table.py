@@ -16,6 +16,7 @@ from frametool.formats.detect import by_sign, detect, of_folder
 from frametool.formats.load import load
 from frametool.formats.rows.pose_rows import RowForm
 from frametool.formats.table import FORMATS, Format, by_suffix, readers, writers
+from frametool.formats.unsupported import UNSUPPORTED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -341,14 +342,14 @@ def test_a_form_that_is_not_read_is_named_in_one_short_line_with_what_to_do(run:
     head, form = KNOWN[name]
     found = run("tree", "file", files={"file": head})
     assert (found.status, found.out) == (1, "")
-    assert found.err == f"frametool: file: {FORMATS[form].summary}: {FORMATS[form].instead}\n"
+    assert found.err == f"frametool: file: {UNSUPPORTED[form]}\n"
     assert len(found.err) < 200
 
 
-@pytest.mark.parametrize("suffix", [suffix for row in FORMATS.values() if row.instead for suffix in row.suffixes])
+@pytest.mark.parametrize("suffix", [suffix for row in UNSUPPORTED.values() for suffix in row.suffixes])
 def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Callable[..., Any], suffix: str) -> None:
-    form = next(name for name, row in FORMATS.items() if suffix in row.suffixes)
-    assert FORMATS[form].instead in run("check", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
+    form = next(name for name, row in UNSUPPORTED.items() if suffix in row.suffixes)
+    assert UNSUPPORTED[form].remedy in run("check", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
     assert run("tree", f"b{suffix}", files={f"b{suffix}": "frames: {a: {b: {xyz: [1, 2, 3]}}}"}).status == 0
 
 
@@ -395,7 +396,7 @@ def test_an_empty_file_has_no_frames(run: Callable[..., Any], data: bytes) -> No
 def test_a_form_that_is_not_read_cannot_be_told_either(run: Callable[..., Any]) -> None:
     found = run("tree", "--in", "xacro", "-", stdin="<robot/>")
     assert found.status == 2
-    assert FORMATS["xacro"].instead in found.err
+    assert UNSUPPORTED["xacro"].remedy in found.err
 
 
 @pytest.mark.parametrize(

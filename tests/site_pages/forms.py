@@ -59,10 +59,10 @@ ASKED = {  # why there is such an option
 
 
 def section() -> Section:
-    """Return the pages of all forms: those that are read, only written, only known."""
-    groups: dict[str, list[Page]] = {"Read": [], "Only written": [], "Known and not read": []}
+    """Return the pages of all forms: those that are read, those only written."""
+    groups: dict[str, list[Page]] = {"Read": [], "Only written": []}
     for name, row in FORMATS.items():
-        kind = "Read" if row.reads else "Only written" if row.writes else "Known and not read"
+        kind = "Read" if row.reads else "Only written"
         groups[kind].append(Page(f"formats/{name}.md", name, f"{name}: {row.summary}", row.summary, _text(name, row)))
     about = "What is in a file, what its numbers mean, how it is known: `frametool formats NAME` prints the same."
     return Section("formats", "Forms of files", about, groups)
@@ -71,7 +71,6 @@ def section() -> Section:
 def _text(name: str, row: Format) -> str:
     facts = {
         "What its numbers mean": [inline(row.states)],
-        "What to do": [inline(row.instead)],
         "Suffixes": [f"`{each}`" for each in row.suffixes],
         "Files called": [f"`{each}`" for each in row.names],
         "Columns": [f"`{' '.join(row.columns)}`" if row.columns else ""],
