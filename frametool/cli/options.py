@@ -343,7 +343,7 @@ _READING = (
     _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
              help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
-             help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
+             help="values of joints: a map, JointState messages, CSV, MJCF:KEY"),
     _setting("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
              help="names of frames that a form does not name; may be repeated, in the order of the files"),
     _setting("--direction", "direction", type=click.Choice(DIRECTIONS),

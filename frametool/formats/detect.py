@@ -5,7 +5,6 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
     magic      a pattern of the first bytes
     folder     a file that the folder holds
     xml text   a pattern found in XML, outside its comments
-    xml child  the root element, a slash, and a pattern of the first element in it
     xml        the root element
     json path  the way to a key that is not outermost: keys with slashes between them, * for any; lists do not count
     json key   a key of the outermost object, or of the objects in the outermost list
@@ -217,7 +216,6 @@ def _are_poses(begin: Beginning, words: str) -> bool:
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
     "xml text": lambda begin, what: bool(begin.xml) and re.search(what, begin.xml) is not None,
-    "xml child": lambda begin, what: bool(begin.xml) and re.fullmatch(what, "/".join(begin.elements)) is not None,
     "xml": lambda begin, what: begin.elements[:1] == [what],
     "json path": lambda begin, what: any(_leads(path, what.split("/")) for path in begin.json_paths),
     "json key": lambda begin, what: (what,) in begin.json_paths,
@@ -262,7 +260,6 @@ def _signs(form: str) -> tuple[tuple[str, str | bytes], ...]:
 _KNOWN_BY = {
     "magic": "its first bytes",
     "xml text": "its elements",
-    "xml child": "its elements",
     "xml": "its root element",
     "text": "its first lines",
     "line": "its first line",

@@ -129,10 +129,6 @@ _POSE_WORDS = (
     r"(?:rot|rotation|q|quat|quaternion)(?:_?[xyzw])?|orientation|(?:roll|pitch|yaw|rpy|euler|axis_angle|rotvec)\w*|"
     r"xyzw|wxyz|matrix|a[xyz]|theta|[RT]|rotation_matrix|[rq]vec(?:_[wxyz])?|tvec_[xyz]"
 )
-_SRDF = (
-    "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
-    "(?:disable|enable|disable_default)_collisions"
-)
 
 _AT_HEAD = r"(?=(?s:.{0,2000}?)"
 _LENGTH = r"""(?<!\w)%s(?:[_ ]?[({\[]*[ijkn](?: ?- ?1)?[)}\]]*)?["']?\s*(?:[,;:\t ]|[\[(_](?:m|mm|cm)\b|$)"""
@@ -430,12 +426,6 @@ FORMATS = {
         states="parent<-child, metres, optical axes of cameras unless told",
         asks=("frames", "camera_axes"),
     ),
-    "drake": _read_tree(
-        "Drake model directives",
-        "frametool.formats.robots.drake",
-        signs=(("yaml key", "directives"),),
-        states="parent<-frame, metres, degrees, rpy about fixed axes",
-    ),
     "handeye": _tree(
         "hand-eye calibration of easy_handeye",
         "frametool.formats.trees.handeye",
@@ -486,14 +476,6 @@ FORMATS = {
         signs=(("xml", "robot"),),
         loses="written as links that are fixed to one another; joints, limits and shapes are no frames",
         states="parent<-child, metres, radians, rpy about fixed axes",
-    ),
-    "srdf": Format(
-        "SRDF, the semantics of a robot",
-        suffixes=(".srdf",),
-        reads=("tree", "joints"),
-        reader="frametool.formats.robots.srdf",
-        signs=(("xml child", f"robot/(?:{_SRDF})"),),
-        states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
     ),
     "npy": _arrays(
         "NPY of numpy: n x 3 points, n x 7 poses, records with fields",

@@ -29,8 +29,23 @@ class Unsupported(NamedTuple):
 
 
 _COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
+_SRDF = (
+    "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
+    "(?:disable|enable|disable_default)_collisions"
+)
 
 UNSUPPORTED = {
+    "drake": Unsupported(
+        "Drake model directives",
+        "write what add_frame and add_weld say as a tree: {name: .., parent: .., xyz: [..], rpy_deg: [..]}",
+        (("yaml key", "directives"),),
+    ),
+    "srdf": Unsupported(
+        "SRDF, the semantics of a robot",
+        "give values of joints, --joints FILE of {JOINT: VALUE} or -j JOINT=VALUE; a virtual joint is an edge of a tree",
+        (("xml text", rf"\A<robot\b[^<>]*>\s*<(?:{_SRDF})\b"),),
+        (".srdf",),
+    ),
     "colmap-bin": Unsupported(
         "COLMAP images.bin",
         "write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",

@@ -130,8 +130,6 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a model of MuJoCo whose joints are told": (b"<mujoco model='a'>\n<keyframe>", "joints records rows", "mjcf"),
     "URDF": (b'<?xml version="1.0"?>\n<!-- <xacro:a/> ${b} -->\n<robot name="r" xmlns:xacro="x">\n<link', "tree", "urdf"),
     "URDF that begins with a joint": (b'<robot name="r"><joint name="a"><origin/></joint>', "tree", "urdf"),
-    "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "tree", "srdf"),
-    "SRDF as values of joints": (b'<robot name="r"><disable_collisions link1="a"/>', "joints records rows", "srdf"),
     "a map of joints": (b"joint: 30deg\n", "joints records rows", "yaml"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows as frames": (b"stamp,x,y,z,qx,qy,qz,qw\n", "tree", "csv"),
@@ -181,7 +179,6 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "KITTI's odometry with a bad number": (b"P0: 7.2e+02 0 x 0 0 7 1 0 0 0 1 0\n", "tree", "kitti-calib"),
     "KITTI's tracking without colons": (b"R_rect 9.9e-01 1 0 0 0 0 0 0 1\n", "tree", "kitti-calib"),
     "KITTI's raw recordings": (b"calib_time: 15-Mar-2012 11:37:16\nR: 7.5e-03", "tree", "kitti-calib"),
-    "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "tree", "drake"),
     "sensors of nuScenes": (b'[\n{\n"token": "f4d",\n"sensor_token": "47f",', "tree", "nuscenes"),
     "ego poses of nuScenes": (b'[{"token": "5a", "timestamp": 15, "rotation": [', "tree", "nuscenes"),
     "a table of joints": (b"joint,theta,d,a,alpha\n1,q1,0.1,0,pi/2\n", "tree", "dh"),
@@ -317,6 +314,9 @@ def test_frames_make_a_tree_ours_whatever_stands_beside_them(beside: str, tmp_pa
 
 
 KNOWN: dict[str, tuple[bytes, str]] = {
+    "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "drake"),
+    "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "srdf"),
+    "SRDF of collisions": (b'<robot name="r">\n<disable_collisions link1="a"/>', "srdf"),
     "camera_info": (b"image_width: 640\ncamera_matrix: {rows: 3}\nprojection_matrix: {rows: 3}\n", "camera_info"),
     "camera_info as echo prints it": (b"header:\n  frame_id: a\nheight: 4\ndistortion_model: plumb_bob\n---\n", "camera_info"),
     "camera_info as ini": (b"# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n", "camera_info"),
@@ -414,7 +414,7 @@ def test_verbose_says_by_what_a_file_was_known(run: Callable[..., Any], data: st
 
 
 BOTH = (
-    "directives:\n- add_frame: {name: f, X_PF: {base_frame: world, translation: [1, 2, 3]}}\n"
+    "T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]}\n"
     "parameters:\n  eye_on_hand: false\n  robot_base_frame: base\n  tracking_base_frame: cam\n"
     "transformation: {x: 1, y: 2, z: 3, qx: 0, qy: 0, qz: 0, qw: 1}\n"
 )
@@ -422,8 +422,8 @@ BOTH = (
 
 def test_a_file_that_two_forms_fit_is_read_as_the_one_that_is_told(run: Callable[..., Any]) -> None:
     done = run("tree", "a.yaml", files={"a.yaml": BOTH})
-    assert (done.status, done.err) == (1, "frametool: a.yaml: fits drake and handeye; give --in drake|handeye\n")
-    assert "name: f," in run("tree", "a.yaml", "--in", "drake").out
+    assert (done.status, done.err) == (1, "frametool: a.yaml: fits euroc-sensor and handeye; give --in euroc-sensor|handeye\n")
+    assert "name: a," in run("tree", "a.yaml", "--in", "euroc-sensor").out
     assert "name: cam," in run("tree", "a.yaml", "--in", "handeye").out
 
 

@@ -32,7 +32,6 @@ KNOWN = {  # kinds of signs, in words; of a pattern that is more than words only
     "magic": "its first bytes",
     "folder": "a folder that holds {}",
     "xml text": "what its XML holds",
-    "xml child": "the first element of its XML",
     "xml": "the root element {} of its XML",
     "json path": "the keys {} of its JSON",
     "json key": "the outermost key {} of its JSON",
