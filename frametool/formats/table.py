@@ -116,11 +116,6 @@ BAG = "frametool.ros.bags"
 _RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.ros.recordings"}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
-_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
-_OPEN3D = (
-    rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+[^\S\n]*+\n"
-    rf"(?:\s*+(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}[^\S\n]*+\n){{2}}"
-)
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -339,26 +334,6 @@ FORMATS = {
         states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
         poses=Poses("quaternion", counted="ids of vertices"),
         asks=("frames", "stamps", "edges"),
-    ),
-    "open3d": _trajectory(
-        "Open3D camera trajectory",
-        "frametool.formats.rows.open3d",
-        suffixes=(".log",),
-        signs=(
-            ("text", _OPEN3D),
-            ("json path", "parameters/extrinsic"),
-        ),
-        states=".log holds world<-camera, .json camera<-world",
-        poses=Poses("matrix", axes="optical", frames=_CAMERA),  # of the .log
-    ),
-    "bundler": Format(
-        "Bundler's bundle.out",
-        reads=("tree", "trajectory", "rows"),
-        reader="frametool.formats.rows.bundler",
-        poses=Poses("matrix", inverse=True, axes="opengl", frames=_CAMERA, counted="numbers of cameras"),
-        signs=(("text", r"\A\ufeff?# *Bundle file v"),),
-        states="holds camera<-world; opengl (along -z)",
-        asks=("frames", "stamps", "camera_axes"),
     ),
     "autoware": _tree(
         "Autoware sensor calibration",

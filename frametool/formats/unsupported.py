@@ -29,6 +29,12 @@ class Unsupported(NamedTuple):
 
 
 _COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
+_OPEN3D = (
+    rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+[^\S\n]*+\n"
+    rf"(?:\s*+(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}[^\S\n]*+\n){{2}}"
+)
 _SRDF = (
     "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
     "(?:disable|enable|disable_default)_collisions"
@@ -42,9 +48,19 @@ UNSUPPORTED = {
     ),
     "srdf": Unsupported(
         "SRDF, the semantics of a robot",
-        "give values of joints, --joints FILE of {JOINT: VALUE} or -j JOINT=VALUE; a virtual joint is an edge of a tree",
+        "give values of joints, --joints FILE with {JOINT: VALUE}; a virtual joint is an edge of a tree",
         (("xml text", rf"\A<robot\b[^<>]*>\s*<(?:{_SRDF})\b"),),
         (".srdf",),
+    ),
+    "open3d": Unsupported(
+        "Open3D camera trajectory",
+        "use kitti: the first 12 numbers of each pose in a line, optical axes (of JSON's extrinsics the inverse)",
+        (("text", _OPEN3D), ("json path", "parameters/extrinsic")),
+    ),
+    "bundler": Unsupported(
+        "Bundler's bundle.out",
+        "use COLMAP's images.txt, R and t of each camera with y and z negated (colmap, optical axes)",
+        (("text", r"\A\ufeff?# *Bundle file v"),),
     ),
     "colmap-bin": Unsupported(
         "COLMAP images.bin",

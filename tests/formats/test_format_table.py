@@ -145,9 +145,6 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "COLMAP with rigs": (b"# Frame list with one line of data per frame:\n", "tree", "colmap"),
     "NeRF": (b'{"fl_x": 1, "frames": [{"file_path": "a", "transform_matrix": [[', "tree", "nerf"),
     "g2o": (b"PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 0 1", "tree", "g2o"),
-    "Open3D's log": (b"0 0 1\n1 0 0 2 \n0 1 0 2 \n0 0 1 -3e-1 \n0 0 0 1 \n", "rows records", "open3d"),
-    "Open3D's JSON": (b'{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1', "tree", "open3d"),
-    "Bundler": (b"# Bundle file v0.3\n1 2\n", "tree", "bundler"),
     "a tree in JSON with frames that have matrices elsewhere": (b'{"frames": [{"name": "a"}]}', "tree", "json"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
@@ -315,6 +312,9 @@ def test_frames_make_a_tree_ours_whatever_stands_beside_them(beside: str, tmp_pa
 
 KNOWN: dict[str, tuple[bytes, str]] = {
     "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "drake"),
+    "Open3D's log": (b"0 0 1\n1 0 0 2 \n0 1 0 2 \n0 0 1 -3e-1 \n0 0 0 1 \n", "open3d"),
+    "Open3D's JSON": (b'{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1', "open3d"),
+    "Bundler": (b"# Bundle file v0.3\n1 2\n", "bundler"),
     "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "srdf"),
     "SRDF of collisions": (b'<robot name="r">\n<disable_collisions link1="a"/>', "srdf"),
     "camera_info": (b"image_width: 640\ncamera_matrix: {rows: 3}\nprojection_matrix: {rows: 3}\n", "camera_info"),

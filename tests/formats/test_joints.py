@@ -299,7 +299,7 @@ def test_states_of_srdf_are_refused_with_what_gives_values_of_joints(run: Run) -
     files = {"arm.urdf": URDF, "arm.srdf": '<robot name="r"><group_state name="home" group="arm"/></robot>'}
     done = run("lookup", "arm.urdf", "base", "tip", "--joints", "arm.srdf:home", files=files)
     assert (done.status, done.err.count("\n")) == (1, 1)
-    assert "arm.srdf: SRDF, the semantics of a robot: give values of joints, --joints FILE of {JOINT: VALUE}" in done.err
+    assert "arm.srdf: SRDF, the semantics of a robot: give values of joints, --joints FILE with {JOINT: VALUE}" in done.err
 
 
 def test_what_tools_print_between_messages_is_passed_over_and_told(arm: Callable[..., Any]) -> None:

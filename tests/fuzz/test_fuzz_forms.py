@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from oracles_of_use import Ending, Tool
 
 pytestmark = pytest.mark.fuzz
-ROW_FORMS = {"tum": [], "euroc": [], "colmap": ["--camera-axes", "optical"], "nerf": ["--camera-axes", "opengl"], "kitti": [], "g2o": [], "open3d": []}
+ROW_FORMS = {"tum": [], "euroc": [], "colmap": ["--camera-axes", "optical"], "nerf": ["--camera-axes", "opengl"], "kitti": [], "g2o": []}
 STREAMS = ("json", "yaml", "csv")
 BINARY = ("npy", "npz", "parquet", "arrow")
 STAMPED = {"json", "yaml", "csv", "tum", "euroc", "npz", "parquet", "arrow"}
