@@ -155,13 +155,13 @@ def test_what_is_written_reads_back_to_the_same_bits_and_is_written_the_same_in_
 
 
 def test_round_the_forms_and_back_keeps_the_trajectory(run: Run, tmp_path: Path) -> None:
-    way = ("tum", "euroc", "kitti", "tum", "colmap", "g2o", "nerf", "csv", "tum")
+    way = ("tum", "euroc", "kitti", "tum", "colmap", "g2o", "colmap", "nerf", "csv", "tum")
     poses = matrices(30)
     (tmp_path / "0").write_text(text_of("tum", poses))
     for at, (source, target) in enumerate(pairwise(way)):
         told = ("--in", "csv") if source == "csv" else ()
         assert run("convert", "-i", str(at), *told, "-f", target, "-o", str(at + 1)).status == 0
-    found, _ = samples_of(tmp_path / "8")
+    found, _ = samples_of(tmp_path / "9")
     assert abs(found @ OPTICAL_FROM_OPENGL - poses).max() < 1e-11  # COLMAP's axes are optical, NeRF's are not
 
 
