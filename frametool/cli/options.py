@@ -325,7 +325,6 @@ in_option = _setting(
     "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
     help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
-array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _CAMERA_AXES = _setting(
     "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
     help="what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
@@ -338,7 +337,7 @@ _TOPIC = _setting(
     "--topic", "topics", type=TEXT, multiple=True, metavar="NAME", help="read only this topic; may be repeated"
 )
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
-pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES, array_option)
+pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
     _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
              help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),

@@ -459,14 +459,6 @@ FORMATS = {
         suffixes=(".npy",),
         signs=(("magic", rb"\x93NUMPY"),),
     ),
-    "npz": _arrays(
-        "NPZ of numpy, several arrays in a zip file",
-        "frametool.formats.rows.npz",
-        texts=True,
-        suffixes=(".npz",),
-        signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
-        asks=("array",),
-    ),
     "pcd": _arrays(
         "PCD point cloud",
         "frametool.formats.rows.pcd",

@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from typing import NamedTuple
 
+from frametool.errors import ValueInvalid
+
 
 class Unsupported(NamedTuple):
     """A form that is neither read nor written.
@@ -61,6 +63,13 @@ UNSUPPORTED = {
         "Bundler's bundle.out",
         "use COLMAP's images.txt, R and t of each camera with y and z negated (colmap, optical axes)",
         (("text", r"\A\ufeff?# *Bundle file v"),),
+    ),
+    "npz": Unsupported(
+        "NPZ of numpy, several arrays in a zip file",
+        'use one NPY for each array (numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"]))',
+        (("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
+        (".npz",),
+        was_written=True,
     ),
     "colmap-bin": Unsupported(
         "COLMAP images.bin",
@@ -141,3 +150,10 @@ def unsupported_by_suffix(path: str) -> str | None:
     """Return the form that the suffix of a file stands for, if it is one of these."""
     suffix = os.path.splitext(path)[1].lower()
     return next((name for name, row in UNSUPPORTED.items() if suffix in row.suffixes), None)
+
+
+def refuse_suffix(path: str) -> None:
+    """Raise ValueInvalid for a file to be written whose suffix stands for a form that was written before 0.2.0."""
+    name = unsupported_by_suffix(path)
+    if name and UNSUPPORTED[name].was_written:
+        raise ValueInvalid(f"{path}: {UNSUPPORTED[name]}")

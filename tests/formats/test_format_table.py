@@ -312,6 +312,7 @@ def test_frames_make_a_tree_ours_whatever_stands_beside_them(beside: str, tmp_pa
 
 KNOWN: dict[str, tuple[bytes, str]] = {
     "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "drake"),
+    "NPZ": (b"PK\x03\x04" + bytes(26) + b"points.npy" + bytes(20), "npz"),
     "Open3D's log": (b"0 0 1\n1 0 0 2 \n0 1 0 2 \n0 0 1 -3e-1 \n0 0 0 1 \n", "open3d"),
     "Open3D's JSON": (b'{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1', "open3d"),
     "Bundler": (b"# Bundle file v0.3\n1 2\n", "bundler"),
@@ -463,3 +464,11 @@ def test_a_cloud_without_y_has_no_points(run: Callable[..., Any]) -> None:
     assert (done.status, done.err.count("\n")) == (1, 1)
     assert "no columns of a point or pose among: x, nx, ny, nz" in done.err
     assert run("tree", "a.ply").err == "frametool: a.ply: PLY point cloud or mesh: no frames in it; frametool convert and apply read it\n"
+
+
+@pytest.mark.parametrize("name", [name for name, row in UNSUPPORTED.items() if row.was_written])
+def test_a_form_that_was_written_is_refused_as_an_output_with_what_to_write(run: Callable[..., Any], name: str) -> None:
+    remedy = UNSUPPORTED[name].remedy
+    for output in (("-f", name), ("-o", f"a{UNSUPPORTED[name].suffixes[0]}")):
+        found = run("convert", *output, stdin="x,y,z\n1,2,3\n")
+        assert (found.status in (1, 2), found.out, found.err.count("\n"), remedy in found.err) == (True, "", 1, True)

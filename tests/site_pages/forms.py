@@ -53,7 +53,6 @@ ASKED = {  # why there is such an option
     "dh": "which of the two conventions its parameters follow",
     "order": "the order of its quaternions",
     "edges": "to take its edges instead of its vertices",
-    "array": "which of its arrays is meant",
 }
 
 
