@@ -489,11 +489,6 @@ FORMATS = {
         suffixes=(".arrow", ".feather", ".ipc"),
         signs=(("magic", rb"ARROW1"),),
     ),
-    "arrows": _ARROW._replace(
-        summary="a stream of Arrow (pip install 'frametool[arrow]')",
-        suffixes=(".arrows",),
-        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
-    ),
 }
 
 

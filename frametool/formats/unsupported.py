@@ -71,6 +71,13 @@ UNSUPPORTED = {
         (".npz",),
         was_written=True,
     ),
+    "arrows": Unsupported(
+        "a stream of Arrow",
+        "use a file of Arrow (arrow): pyarrow.feather.write_feather(pyarrow.ipc.open_stream(SOURCE).read_all(), NEW)",
+        (("magic", rb"\xff\xff\xff\xff..\0\0"),),
+        (".arrows",),
+        was_written=True,
+    ),
     "colmap-bin": Unsupported(
         "COLMAP images.bin",
         "write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",

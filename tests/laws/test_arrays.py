@@ -98,7 +98,7 @@ def test_points_stay_points_through_every_form(run: Run, name: str, form: str) -
     assert run("convert", "-i", f"made.{form}", "-f", "tum", "--quiet").status == 1
 
 
-@pytest.mark.parametrize("form", ["parquet", "arrow", "arrows", "npy"])
+@pytest.mark.parametrize("form", ["parquet", "arrow", "npy"])
 def test_other_keys_go_into_columns_and_back(run: Run, form: str) -> None:
     assert into(run, ("convert",), "in.jsonl", POSES["poses.jsonl"], form).err == ""
     back = [json.loads(line) for line in run("convert", "-i", f"made.{form}", "-f", "json").out.splitlines()]
