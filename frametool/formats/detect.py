@@ -412,8 +412,10 @@ def refuse_robots(text: bytes, name: str) -> None:
 
 def with_hint(error: FormatError, text: bytes, name: str, *, told: bool = False) -> FormatError:
     """Return the error for a text without a pose: of frames, one that points to `lookup`; no prose is quoted."""
+    from frametool.grammar.pasted import unsupported_tool
+
     begin = Beginning(text[:HEAD])
-    has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0])
+    has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0] or unsupported_tool(begin.text))
     is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or has_sign
     if begin.data_line and not (told or is_known or not_text(begin.head)):
         error = _unknown(begin, "records", "rows", name=name)
