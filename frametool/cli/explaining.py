@@ -90,7 +90,7 @@ class PoseTask:
 
         more: options of the command that are about streams too
         """
-        names = {*OPTIONS, "array", "edges", *more} - {"given", "quiet"}
+        names = {*OPTIONS, "edges", *more} - {"given", "quiet"}
         if not settings().reads_trees:
             names |= {"stamps", "camera_axes"}
             if not any(isinstance(each, str) and os.path.exists(each) for each in arguments):
@@ -122,7 +122,7 @@ class PoseTask:
         if self.output.told not in (None, "text"):
             instead = f"{', '.join(FORMS)}, not {self.output.told}"
             raise click.UsageError(f"--explain writes {instead}; leave one of them out")
-        refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "array", "edges"} - {"given", "quiet"}))
+        refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "edges"} - {"given", "quiet"}))
         return DerivationStyle(self.output.style, significant(self._precision), self._every)
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> Given:

@@ -154,7 +154,7 @@ GROUPS = {
         "explain_full", "explain_step", "color",
     ),
     "Forms that leave something open (help formats)": (
-        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array", "order",
+        "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "order",
     ),
     "Turtles (help turtles)": (
         "target", "delay", "gain_linear", "gain_angular", "max_linear", "max_angular", "turtlesim", "holonomic", "seed",

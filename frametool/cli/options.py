@@ -17,6 +17,7 @@ from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, s
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
+from frametool.formats.unsupported import UNSUPPORTED
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
@@ -223,10 +224,9 @@ class Form(Text):
         self.are = are
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse an unknown one with the nearest name; of a form that is known and not read, say what to do."""
+        """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
         if value not in self.names:
-            if value in FORMATS and (instead := FORMATS[value].instead):
-                self.fail(f"{value} ({FORMATS[value].summary}) is not read: {instead}", param, ctx)
+            _refuse_unsupported(self, value, param, ctx)
             near = did_you_mean(value, self.names)
             self.fail(f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all", param, ctx)
         return value
@@ -234,6 +234,23 @@ class Form(Text):
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the forms."""
         return {name: FORMATS[name].summary for name in self.names}
+
+
+class WrittenForm(click.Choice[str]):
+    """The form of a result, one of those that a command writes."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse an unknown one; of one that is not supported, say what to do."""
+        _refuse_unsupported(self, value, param, ctx)
+        return super().convert(value, param, ctx)
+
+
+def _refuse_unsupported(
+    kind: click.ParamType[Any], value: Any, param: click.Parameter | None, ctx: click.Context | None
+) -> None:
+    if value in UNSUPPORTED:
+        row = UNSUPPORTED[value]
+        kind.fail(f"{value} ({row.summary}) is not supported: {row.remedy}", param, ctx)
 
 
 class AxesName(Text):
@@ -308,7 +325,6 @@ in_option = _setting(
     "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
     help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
-array_option = _setting("--array", "array", type=TEXT, metavar="NAME", help="which array of an NPZ file is streamed")
 _CAMERA_AXES = _setting(
     "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
     help="what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
@@ -321,12 +337,12 @@ _TOPIC = _setting(
     "--topic", "topics", type=TEXT, multiple=True, metavar="NAME", help="read only this topic; may be repeated"
 )
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
-pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES, array_option)
+pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
     _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
              help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
     _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
-             help="values of joints: a map, JointState messages, CSV, robot.srdf:STATE"),
+             help="values of joints: a map, JointState messages, CSV, MJCF:KEY"),
     _setting("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
              help="names of frames that a form does not name; may be repeated, in the order of the files"),
     _setting("--direction", "direction", type=click.Choice(DIRECTIONS),
@@ -403,7 +419,7 @@ _PLACE = (
 
 
 def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
-    return click.option("-f", "--format", "format_name", type=click.Choice(("text", *forms)), help=text)
+    return click.option("-f", "--format", "format_name", type=WrittenForm(("text", *forms)), help=text)
 
 
 MESSAGES = ("pose", "tf", "path", "point", "fix")

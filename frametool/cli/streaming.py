@@ -225,7 +225,7 @@ class Stream:
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
         if form == "kitti" and self.given and not self.told_form():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
-        refuse_not_needed((form,), "stamps", "edges", "array")
+        refuse_not_needed((form,), "stamps", "edges")
         if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
         if tables_only and form in RECORDS:

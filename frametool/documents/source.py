@@ -355,7 +355,6 @@ class InputFile:
         self.name = "stdin" if self.path == "-" else self.path
         self.form = ""
         self.beside: Sequence[InputFile] = ()  # all files that are read together
-        self.scopes: list[str] = []  # what stands before its names, once for each, where another file says so
         self.stream: BinaryIO = BufferedReader(BytesIO()) if folder else stream or opened(path)
         self._is_pipe = not self.stream.seekable()
 

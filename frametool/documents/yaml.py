@@ -225,7 +225,7 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
     """Return the value of each document of a YAML text, None for an empty one.
 
     Mappings become dicts with text keys, sequences lists, scalars text, null values None.
-    tags: of mappings that are read (`!Rpy`, `!!opencv-matrix`); the dict then has its tag under the key TAG.
+    tags: of mappings that are read (`!!opencv-matrix`); the dict then has its tag under the key TAG.
     Raises FormatError.
     """
     if source.text.count("\n%TAG") > _MOST_DIRECTIVES:
@@ -381,7 +381,7 @@ class _Builder:
 
     def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
         """Raise for a key that is there already, is empty or asks for a merge; a quoted << is a name."""
-        if event.value == "" and not (event.style and self.tags):  # Drake's name of the only body
+        if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
             raise repeated_key(self.source, yaml_events(self.source.text))

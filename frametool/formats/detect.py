@@ -5,7 +5,6 @@ Kinds of signs in the table, the strongest first.  Above the suffix, a sign belo
     magic      a pattern of the first bytes
     folder     a file that the folder holds
     xml text   a pattern found in XML, outside its comments
-    xml child  the root element, a slash, and a pattern of the first element in it
     xml        the root element
     json path  the way to a key that is not outermost: keys with slashes between them, * for any; lists do not count
     json key   a key of the outermost object, or of the objects in the outermost list
@@ -34,7 +33,8 @@ from functools import cached_property
 
 from frametool.documents.source import HEAD, LOOKED_AT, UTF16, not_text
 from frametool.errors import FormatError, bare, first_of
-from frametool.formats.table import BAG, FORMATS, by_suffix, readers, unread
+from frametool.formats.table import BAG, FORMATS, by_suffix, readers
+from frametool.formats.unsupported import UNSUPPORTED, unsupported_by_suffix
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -216,7 +216,6 @@ def _are_poses(begin: Beginning, words: str) -> bool:
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
     "xml text": lambda begin, what: bool(begin.xml) and re.search(what, begin.xml) is not None,
-    "xml child": lambda begin, what: bool(begin.xml) and re.fullmatch(what, "/".join(begin.elements)) is not None,
     "xml": lambda begin, what: begin.elements[:1] == [what],
     "json path": lambda begin, what: any(_leads(path, what.split("/")) for path in begin.json_paths),
     "json key": lambda begin, what: (what,) in begin.json_paths,
@@ -245,7 +244,7 @@ def _count(keys: set[str], pattern: str) -> int:
 def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
     """Return the forms that show a sign of the strongest kind that is shown at all, and that kind."""
     for kind, shows in tests.items():
-        found = [name for name in names if any(kind == of and shows(begin, what) for of, what in FORMATS[name].signs)]
+        found = [name for name in names if any(kind == of and shows(begin, what) for of, what in _signs(name))]
         if found and kind == "yaml key":  # no stronger than those that stand deeper
             found += _fitting(begin, {"yaml inner": tests["yaml inner"]}, names)[0]
         if found:
@@ -253,11 +252,14 @@ def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) 
     return [], ""
 
 
+def _signs(form: str) -> tuple[tuple[str, str | bytes], ...]:
+    return (UNSUPPORTED[form] if form in UNSUPPORTED else FORMATS[form]).signs
+
+
 # kind -> by what a file was known; all others by its keys
 _KNOWN_BY = {
     "magic": "its first bytes",
     "xml text": "its elements",
-    "xml child": "its elements",
     "xml": "its root element",
     "text": "its first lines",
     "line": "its first line",
@@ -267,14 +269,14 @@ _KNOWN_BY = {
 def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
     """Return the form, among those from which `reads` is read, whose sign the first bytes show; None if none does.
 
-    Raises FormatError if two forms fit, or one that is known and not read.
+    Raises FormatError if two forms fit, or an unsupported one.
     """
     return _by_sign(Beginning(head), *reads, name=name)[0]
 
 
 def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
     """Return the form whose sign is shown, and by what it is known; a form that is read goes before one that is not."""
-    fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *unread()))
+    fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *UNSUPPORTED, *readers("drawing")))
     if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
         return None, ""  # bytes that look like a line of something by chance
     found = [form for form in fitting if not _is_unread(form, reads)] or fitting
@@ -288,12 +290,16 @@ def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]
 
 
 def _is_unread(form: str, reads: tuple[str, ...]) -> bool:
-    return bool(FORMATS[form].instead) and set(reads).isdisjoint(FORMATS[form].reads)
+    return form in UNSUPPORTED or set(reads).isdisjoint(FORMATS[form].reads)
+
+
+_NO_POSES = "no poses in it (frametool tree shows the frames); give what it was made from, as a bag of /tf, /tf_static"
 
 
 def not_read(form: str, name: str) -> FormatError:
-    """Make the error for a file of a form that is known and not read: what it is, what to do."""
-    return FormatError(f"{FORMATS[form].summary}: {FORMATS[form].instead}", source=name or "stdin")
+    """Make the error for a file that is recognised and not read: what it is, what to do."""
+    about = str(UNSUPPORTED[form]) if form in UNSUPPORTED else f"{FORMATS[form].summary}: {_NO_POSES}"
+    return FormatError(about, source=name or "stdin")
 
 
 def of_folder(path: str) -> str | None:
@@ -327,7 +333,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         if (what := not_text(head)).startswith("not text but") and FORMATS[form].reader != BAG:
             raise _no_text(what, name)
         return form, f"the suffix {name[name.rfind('.') :].lower()}"
-    if form := by_suffix(name, unread()):
+    if form := unsupported_by_suffix(name):
         raise not_read(form, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
         raise _no_text(what, name)
@@ -406,8 +412,11 @@ def refuse_robots(text: bytes, name: str) -> None:
 
 def with_hint(error: FormatError, text: bytes, name: str, *, told: bool = False) -> FormatError:
     """Return the error for a text without a pose: of frames, one that points to `lookup`; no prose is quoted."""
+    from frametool.grammar.pasted import unsupported_tool
+
     begin = Beginning(text[:HEAD])
-    is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or _fitting(begin, _STRONG, (*FORMATS,))[0]
+    has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0] or unsupported_tool(begin.text))
+    is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or has_sign
     if begin.data_line and not (told or is_known or not_text(begin.head)):
         error = _unknown(begin, "records", "rows", name=name)
     return _points_to_lookup(text, name) or error

@@ -142,7 +142,6 @@ class Recording(InputFile):
         try:
             options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
             found = import_module(FORMATS[self.form].reader).read(self, options)
-            found = self._scoped(found) if self.scopes else found
             if offset_ns := self.answers.time_offset:
                 found = (at_other_times(piece, offset_ns) for piece in found)
             yield from found
@@ -160,22 +159,6 @@ class Recording(InputFile):
             found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
         for first, *others in found.values():
             warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
-
-    def _scoped(self, edges: Iterable[Edge]) -> Iterator[Edge]:
-        """Yield the edges under each of the scopes that another file gives them."""
-        for edge in edges:
-            for scope in self.scopes:
-                child, parent = (
-                    name and _in_scope(name, scope, has_own=self.form == "sdf") for name in (edge.child, edge.parent)
-                )
-                yield edge._replace(child=child or "", parent=parent)
-
-
-def _in_scope(name: str, scope: str, *, has_own: bool) -> str:
-    """Return a name in a scope, which takes the place of its own; the world is one for all."""
-    if name == "world":
-        return name
-    return f"{scope}::{(name.partition('::')[2] or '__model__') if has_own else name}"
 
 
 def opened_together(files: Iterable[Recording]) -> list[Recording]:

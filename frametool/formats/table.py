@@ -39,7 +39,6 @@ class Format(NamedTuple):
     states: what its numbers mean (which frame in which, units, order), told when such a file was read
     asks: the options that say what it leaves open
     loses: what a tree written in it may have had and it does not hold, told then
-    instead: of a form that is known and not read: what to do
     delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
     columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
     poses: what its rows mean
@@ -56,7 +55,6 @@ class Format(NamedTuple):
     states: str = ""
     asks: tuple[str, ...] = ()
     loses: str = ""
-    instead: str = ""
     names: tuple[str, ...] = ()
     delimiter: str | None = None
     columns: tuple[str, ...] = ()
@@ -91,11 +89,10 @@ def _read_tree(summary: str, module: str, **fields: Any) -> Format:
 
 def _drawing(summary: str, module: str, **fields: Any) -> Format:
     """Return the row of a form that says how frames hang together and nothing of where they are."""
-    remedy = "no poses in it (frametool tree shows the frames); give what it was made from, as a bag of /tf, /tf_static"
+    states = "parent -> child, no poses"
     return Format(
-        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, states="parent -> child, no poses",
-        instead=remedy, **fields,
-    )  # fmt: skip
+        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, states=states, **fields
+    )
 
 
 def _arrays(
@@ -118,13 +115,7 @@ _TABLE = "frametool.stream.table_samples"
 BAG = "frametool.ros.bags"
 _RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.ros.recordings"}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_COLMAP_MODELS = "(?:SIMPLE_|FULL_)?(?:PINHOLE|RADIAL|OPENCV|FOV)(?:_FISHEYE)?|(?:RAD_TAN_)?THIN_PRISM_FISHEYE"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
-_NO_INDICES = r"(?!\s*0\s+1\s+2\s+0\s[^\n]*\n\s*1\s[^\n]*\n\s*2\s)"  # of a data frame
-_OPEN3D = (
-    rf"\A\ufeff?{_NO_INDICES}\s*\d+[ \t]+\d+[ \t]+\d+[^\S\n]*+\n"
-    rf"(?:\s*+(?:{_NUMBER}[ \t]+){{3}}{_NUMBER}[^\S\n]*+\n){{2}}"
-)
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -132,10 +123,6 @@ _POSE_WORDS = (
     r"[xyz](?:_mm|_cm)?|[pt][xyz]|xyz\w*|(?:trans|translation|pos|position|location)(?:_[xyz])?|t|tvec|value|pose|"
     r"(?:rot|rotation|q|quat|quaternion)(?:_?[xyzw])?|orientation|(?:roll|pitch|yaw|rpy|euler|axis_angle|rotvec)\w*|"
     r"xyzw|wxyz|matrix|a[xyz]|theta|[RT]|rotation_matrix|[rq]vec(?:_[wxyz])?|tvec_[xyz]"
-)
-_SRDF = (
-    "group|group_state|gripper|end_effector|virtual_joint|passive_joint|joint_property|link_sphere_approximation|"
-    "(?:disable|enable|disable_default)_collisions"
 )
 
 _AT_HEAD = r"(?=(?s:.{0,2000}?)"
@@ -348,31 +335,6 @@ FORMATS = {
         poses=Poses("quaternion", counted="ids of vertices"),
         asks=("frames", "stamps", "edges"),
     ),
-    "open3d": _trajectory(
-        "Open3D camera trajectory",
-        "frametool.formats.rows.open3d",
-        suffixes=(".log",),
-        signs=(
-            ("text", _OPEN3D),
-            ("json path", "parameters/extrinsic"),
-        ),
-        states=".log holds world<-camera, .json camera<-world",
-        poses=Poses("matrix", axes="optical", frames=_CAMERA),  # of the .log
-    ),
-    "bundler": Format(
-        "Bundler's bundle.out",
-        reads=("tree", "trajectory", "rows"),
-        reader="frametool.formats.rows.bundler",
-        poses=Poses("matrix", inverse=True, axes="opengl", frames=_CAMERA, counted="numbers of cameras"),
-        signs=(("text", r"\A\ufeff?# *Bundle file v"),),
-        states="holds camera<-world; opengl (along -z)",
-        asks=("frames", "stamps", "camera_axes"),
-    ),
-    "colmap-bin": Format(
-        "COLMAP images.bin",
-        signs=(("magic", rb".{4}\0{4}.{4}.{56}.{4}[\x20-\x7e]{1,200}\0"),),
-        instead="write it as text: colmap model_converter --input_path . --output_path . --output_type TXT",
-    ),
     "autoware": _tree(
         "Autoware sensor calibration",
         "frametool.formats.trees.autoware",
@@ -439,12 +401,6 @@ FORMATS = {
         states="parent<-child, metres, optical axes of cameras unless told",
         asks=("frames", "camera_axes"),
     ),
-    "drake": _read_tree(
-        "Drake model directives",
-        "frametool.formats.robots.drake",
-        signs=(("yaml key", "directives"),),
-        states="parent<-frame, metres, degrees, rpy about fixed axes",
-    ),
     "handeye": _tree(
         "hand-eye calibration of easy_handeye",
         "frametool.formats.trees.handeye",
@@ -496,28 +452,12 @@ FORMATS = {
         loses="written as links that are fixed to one another; joints, limits and shapes are no frames",
         states="parent<-child, metres, radians, rpy about fixed axes",
     ),
-    "srdf": Format(
-        "SRDF, the semantics of a robot",
-        suffixes=(".srdf",),
-        reads=("tree", "joints"),
-        reader="frametool.formats.robots.srdf",
-        signs=(("xml child", f"robot/(?:{_SRDF})"),),
-        states="virtual joints: parent_frame<-child_link; its states are values of joints (--joints FILE:STATE)",
-    ),
     "npy": _arrays(
         "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
         "frametool.formats.rows.npy",
         texts=True,
         suffixes=(".npy",),
         signs=(("magic", rb"\x93NUMPY"),),
-    ),
-    "npz": _arrays(
-        "NPZ of numpy, several arrays in a zip file",
-        "frametool.formats.rows.npz",
-        texts=True,
-        suffixes=(".npz",),
-        signs=(("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
-        asks=("array",),
     ),
     "pcd": _arrays(
         "PCD point cloud",
@@ -549,89 +489,12 @@ FORMATS = {
         suffixes=(".arrow", ".feather", ".ipc"),
         signs=(("magic", rb"ARROW1"),),
     ),
-    "arrows": _ARROW._replace(
-        summary="a stream of Arrow (pip install 'frametool[arrow]')",
-        suffixes=(".arrows",),
-        signs=(("magic", rb"\xff\xff\xff\xff..\0\0"),),
-    ),
-    "feather1": Format(
-        "Feather of the first version",
-        signs=(("magic", rb"FEA1"),),
-        instead="write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
-    ),
-    "xacro": Format(
-        "xacro, from which URDF is made",
-        suffixes=(".xacro",),
-        signs=(  # launch files have the same substitutions
-            ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
-        ),
-        instead="expand it: xacro FILE > robot.urdf (pip install xacro)",
-    ),
-    "ur": Format(
-        "UR kinematics, a chain that xacro puts into the robot",
-        signs=(("yaml key", "kinematics"),),
-        instead="expand the robot's URDF with it: xacro ur.urdf.xacro kinematics_params:=FILE ..",
-    ),
-    "camera_info": Format(
-        "camera_info, the intrinsics of a camera",
-        signs=(("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
-        instead="there is no pose in it; its frame stands in the tree of the robot",
-    ),
-    "intrinsics": Format(
-        "cameras of Kalibr that were calibrated alone",
-        signs=(("yaml inner", r"distortion_coeffs|cam_overlaps"),),
-        instead="there is no pose in it; one would stand under T_cam_imu or T_cn_cnm1",
-    ),
-    "cameras": Format(
-        "cameras.txt of COLMAP, the intrinsics",
-        signs=(("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
-        instead="there is no pose in it; those of the cameras stand in images.txt beside it",
-    ),
-    "lio": Format(
-        "parameters of FAST-LIO or LIO-SAM",
-        signs=(("yaml inner", r"extrinsic_[TR]|extrinsic(?:Trans|Rot|RPY)|[RP]cl"), ("yaml key", r"extrinsic_[TR]")),
-        instead="extrinsic_T, R are imu<-lidar, extrinsicRot is lidar<-imu; write {xyz: .., matrix: ..} as a tree",
-    ),
-    "map": Format(
-        "map.yaml of a map server",
-        signs=(("yaml key", "occupied_thresh"),),
-        instead="its origin is the lower left corner of the picture in the map: {xyz: [x, y, 0], rpy: [0, 0, yaw]}",
-    ),
-    "usd": Format(
-        "a USD scene",
-        suffixes=(".usd", ".usda", ".usdc", ".usdz"),
-        signs=(("magic", rb"#usda |PXR-USDC"),),
-        instead="its units and axes differ from file to file; export URDF, or the poses as JSON",
-    ),
-    "gltf": Format(
-        "a glTF scene",
-        suffixes=(".gltf", ".glb"),
-        signs=(("magic", rb"glTF"), ("json path", "asset/version")),
-        instead="glTF has y up and z forward; export URDF, or the poses as JSON",
-    ),
-    "unity": Format(
-        "a Unity scene",
-        suffixes=(".unity", ".prefab"),
-        signs=(("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),),
-        instead="Unity is left-handed with y up; export poses as JSON and convert them",
-    ),
-    "itk": Format(
-        "an ITK or ANTs transform",
-        suffixes=(".tfm",),
-        signs=(("magic", rb"#Insight Transform File"),),
-        instead="it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
-    ),
 }
 
 
 def readers(*what: str) -> tuple[str, ...]:
     """Name the forms from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
-
-
-def unread() -> tuple[str, ...]:
-    """Name the forms that are known by their signs and not read."""
-    return tuple(name for name, row in FORMATS.items() if row.instead)
 
 
 def writers(*what: str) -> tuple[str, ...]:

@@ -246,7 +246,6 @@ class Answers(NamedTuple):
     edges: of a graph of poses the edges are wanted, not the vertices
     joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
     joint_files: files with values of joints, over time or for good
-    array: the one of several arrays that is read
     order: of quaternions in lists, `xyzw` or `wxyz`
     time_offset: nanoseconds that are added to all stamps
     """
@@ -259,7 +258,6 @@ class Answers(NamedTuple):
     edges: bool = False
     joints: Mapping[str, str] = MappingProxyType({})
     joint_files: tuple[str, ...] = ()
-    array: str = ""
     order: str = ""
     time_offset: int = 0
 

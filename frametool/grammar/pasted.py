@@ -1,6 +1,6 @@
 """Numbers as people paste them from other tools, turned into the mappings that `read_pose` takes.
 
-    array([[ 0., -1.], ..                  numpy, PyTorch, JAX, SymPy; [0 -1; 1 0] is MATLAB
+    array([[ 0., -1.], ..                  numpy, PyTorch, JAX; [0 -1; 1 0] is MATLAB
     0.7071 + 0.7071k                       the algebra of tutorials: x, y, z of i, j, k, then w
     0.7071 << 0, 0, 0.7071 >>              spatialmath: w, then x, y, z; (x,y,z,w) = .. is Pinocchio's
     Quaternion(x=0.0, ..)                  a repr with names; <Euler (x=0, ..), order='XYZ'> of Blender
@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import ValueInvalid, shown
 from frametool.geometry.representations import notation
 from frametool.grammar.rotation_spelling import spelled
 from frametool.text.numbers import parse_angle, parse_number
@@ -36,27 +36,27 @@ _ARGUMENTS = r"(?:,\s*+[A-Za-z]\w*+\s*+=\s*+[\w.'\":<>]++){1,9}+\s*+(?=\))"  # d
 _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
 _SCALAR = r"(?:np|numpy)\.\w+\(([^()]*)\)"  # numpy 2 in lists: np.float64(0.5)
 _OPEN, _CLOSE = "[({", "])}"
-_BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\(|(?:structure\(|matrix\()?\bc\((?:[^,()]*,){8}"
+_BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\("
+_UNSUPPORTED: Sequence[tuple[str, str]] = (  # how prints begin that are recognised and not read, and what printed them
+    (r"Out\[\d+\](?://\w+)?\s*=|\{\{?[^{}]*?\d(?:`|\*\^)", "Mathematica"),
+    (r"\d+\xd7\d+ [A-Za-z]", "Julia"),
+    (r"\[,\d+\]|(?:structure\(|matrix\()?\bc\((?:[^,()]*,){8}", "R"),
+    (r"\$*\s*\\(?:begin|left)\b", "LaTeX"),
+    (r"[⎡⎛]|\w+\(\[\[(?:Float|Integer)\(", "SymPy"),
+)
 _COLUMNS = r"(?m)^[ \t]*Columns? \d+(?: (?:through|and|to) \d+)?:?[ \t]*$"
 _DECORATIONS: Sequence[tuple[str, str]] = (
     (r"\x1b\[[\d;]*m", ""),  # colours of a terminal
-    (r"\A\s*Out\[\d+\](?://\w+)?\s*[:=]\s*", ""),  # Mathematica, IPython
+    (r"\A\s*Out\[\d+\]:\s*", ""),  # IPython
     (r"\A\s*Parameter containing:\s*", ""),  # PyTorch
     (r"\A\s*(?:[A-Za-z_][\w.()]*\s*)?<<", ""),  # Eigen's comma initializer
-    (rf"\A({LABEL})?\s*\d+[\xd7x]\d+\b[^\n]*\n", ""),  # heading of Julia and MATLAB's live scripts
+    (rf"\A({LABEL})\s*\d+[\xd7x]\d+\b[^\n]*\n", ""),  # heading of MATLAB's live scripts
     (rf"\A({LABEL})\s*(?:se3|so3)[ \t]*\n", ""),  # MATLAB's classes
     (r"(?s)\A([^<]*)<Matrix \d+x\d+\s*(.*)>", r"\1[\2]"),  # Blender
-    (r"(?m)^[ \t]*(?:\[,\d+\][ \t]*)+\n|^\[\d+,\]", ""),  # R
-    (r"\\(?:left|right)\s*\\?[][().{}|]|\\(?:begin|end)\{\w+\}(?:\{[lcr]+\})?|[$]", " "),  # LaTeX
-    (r"(?<!\s)\s*+\\\\\s*+", "\n"),
-    (r"(?<!\s)\s*+&\s*+", " "),
-    (r"[⎡⎢⎣⎤⎥⎦⎛⎜⎝⎞⎟⎠│┃┌┐└┘]", " "),  # brackets that SymPy and nalgebra draw
-    (r"\b(?:Float|Integer)\('?([-+.\deE]+)'?(?:, precision=\d+)?\)", r"\1"),  # SymPy's srepr
-    (r"(?<=[\d.])`+[\d.]*", ""),  # Mathematica's precision
-    (r"(?<=[\d.])\*\^", "e"),  # and its power of ten
+    (r"[│┌┐└┘]", " "),  # brackets that nalgebra draws
     (_SCALAR, r"\1"),
 )
-_DECORATED = r"""[\x1b\\⎡⎢⎣⎤⎥⎦⎛⎜⎝⎞⎟⎠│┃┌┐└┘`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
+_DECORATED = r"""[\x1b\\⎡⎛│┌`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
 
 
 def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
@@ -85,17 +85,25 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
 def _undecorated(text: str) -> str:
     """Take away the names, headings and brackets that tools put around numbers.
 
-    Raises ValueInvalid for what holds a matrix column by column.
+    Raises ValueInvalid for what holds a matrix column by column, and for tools whose prints are not read.
     """
     if not re.search(_DECORATED, text):
         return text
     if by_columns := re.match(rf"(?:{LABEL})?\s*(?:{_BY_COLUMNS})", text):
         name = shown(by_columns[0].split("(")[0].strip())
         raise ValueInvalid(f"{name} holds a matrix column by column; write its rows, [[..], [..], [..]]")
+    if tool := unsupported_tool(text):
+        raise ValueInvalid(f"a print of {tool} is not read; write its rows, [[..], [..], [..]], as numpy does")
     for pattern, plain in _DECORATIONS:
         text = re.sub(pattern, plain, text)
     text = re.sub(_ARGUMENTS, "", text)
     return re.sub(_NAMED, "(", text)
+
+
+def unsupported_tool(text: str) -> str:
+    """Name the tool that printed a text, where its prints are recognised and not read; else return ""."""
+    found = (tool for begin, tool in _UNSUPPORTED if re.match(rf"\s*(?:{LABEL})?\s*(?:{begin})", text))
+    return next(found, "")
 
 
 def _side_by_side(body: str) -> str:
@@ -187,7 +195,7 @@ def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
 
     The one has metres and a rotation vector in radians, the other millimetres and w first; a robtarget has the
     robot's configuration and external axes behind it, which are no part of the pose.  given: what numbers are
-    Raises ValueInvalid for p[..] with another count of numbers.
+    Raises ValueInvalid for p[..] with another count of numbers, and for ABB's two lists alone.
     """
     bare = re.sub(rf"\A(?:{LABEL})?(?={_UR}\[)|\A{_DECLARED}", "", text.strip().rstrip(";").strip())
     if found := re.fullmatch(rf"{_UR}\[([^\[\]]*)\]", bare):
@@ -201,7 +209,8 @@ def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
     if (len(xyz), len(turn)) != (3, 4):
         return None
     if not found[3] and ":=" not in text:
-        warn("taken for a pose of ABB: millimetres, w first; --from xyzw or wxyz reads metres in that order")
+        told = "{xyz: [..], wxyz: [..]}, of ABB {xyz_mm: [..], wxyz: [..]}, or give --from xyzw or wxyz"
+        raise ValueInvalid(f"two lists say neither unit nor order; write {told}")
     return {"xyz_mm": xyz, "wxyz": turn}
 
 
@@ -212,7 +221,6 @@ def _algebra(text: str) -> dict[str, Any] | None:
     """Read `0.7071 + 0.7071k`, `-j`, `0.5i + -0.5j + 0.5*k + 0.5`: each unit and the real part once at most."""
     plain = re.sub(LABEL, "", text, count=1).removeprefix("quaternion") if len(text) < 200 else ""
     tight = re.sub(r"\s+", "", plain)
-    tight = re.sub(rf"\(({NUMBER})\)", r"\1", tight)  # SymPy's + (-0.5)*j
     if not tight or tight[-1] not in "ijk0123456789." or not any(each in "ijk" for each in tight):
         return None
     parts: dict[str, str] = {}

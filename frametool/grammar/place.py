@@ -40,11 +40,14 @@ LLA_KEYS = frozenset((*SAME, "lat_rad", "lon_rad", *SEA_LEVEL, *GEOID))
 LOCAL_KEYS = frozenset(("east", "north", "up", "down"))
 UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
 HEADINGS = {"heading_deg": True, "heading_rad": False}
-SAID = frozenset(("datum", "epsg", "mgrs", LLA, "convergence_deg", "grid_scale"))
-EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}
-NO_MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
+NOT_READ = {  # key or column -> what to write instead
+    "datum": "datum is not read, all is WGS84; leave it out, or convert from another one first (cs2cs, pyproj)",
+    "epsg": "codes of EPSG are not read; write utm_zone: 32N or lat, lon; convert from others first (cs2cs, pyproj)",
+    LLA: "lla does not say which number is lat; write {lat: .., lon: .., alt: ..}",
+    "mgrs": "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)",
+}
+EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | {"convergence_deg", "grid_scale", ECEF, AT, *HEADINGS}
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
-DATUMS = ("WGS84", "WGS 84", "WGS-84", "wgs84")
 LEVEL = 1e-9  # of 1: what is less level points nowhere
 NEAR = 0.01  # metres: how far two positions of one entry may lie apart
 MINUTE, SECOND = "['\u2032\u2019]", "(?:[\"\u2033\u201d]|'')"
@@ -116,7 +119,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     """Read every position that the keys of a mapping say."""
-    check_datum(own)
+    _refuse_not_read(own)
     found = []
     if AT in own:
         found += within((AT,), _placed_at, own[AT], reading)
@@ -125,7 +128,7 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
-        flat = {key: own[key] for key in own if key in {*UTM_KEYS, "epsg"} or SAME.get(key) == "alt"}
+        flat = {key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}
         found.append(_utm(flat, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
         found.append(_lla(own, reading))
@@ -221,14 +224,13 @@ def _utm(value: Any, reading: Reading) -> Spot:
     if type(value) is not dict:
         example = "{zone: 32N, easting: .., northing: .., alt: ..}"
         raise Misfit(f"expected {example}, found {kind(value)}")
-    known = {*REPRESENTATIONS[UTM].names, "utm_zone", "epsg", *GEOID, *SEA_LEVEL, "altitude", "height", "hae",
-             "convergence_deg", "grid_scale", "datum"}  # fmt: skip
+    _refuse_not_read(value)
+    known = {*REPRESENTATIONS[UTM].names, "utm_zone", *GEOID, *SEA_LEVEL, "altitude", "height", "hae",
+             "convergence_deg", "grid_scale"}  # fmt: skip
     if unknown := [key for key in value if key not in known]:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
         raise Misfit(what, (unknown[0],), key=True)
-    check_datum(value)
     zones = [_member(key, _zone, value[key]) for key in (ZONE, "utm_zone") if key in value]
-    zones += [zone_of_epsg(value["epsg"])] if "epsg" in value else []
     zones += [reading.earth.zone] if not zones and reading.earth and reading.earth.zone is not None else []
     if not zones or len({*zones}) > 1:
         raise Misfit("utm needs its zone: 32N, or 32S south of the equator" if not zones else "two zones; keep one")
@@ -272,19 +274,6 @@ def _member(key: str, read: Callable[..., float], *arguments: Any) -> float:
     except ValueInvalid as error:
         misfit = NotARotation if isinstance(error, NotFinite) else Misfit
         raise misfit(str(error), (key,), rule=error.rule) from None
-
-
-def zone_of_epsg(value: Any) -> float:
-    """Return the zone that a code of EPSG names: 326zz north, 327zz south."""
-    text = str(value).upper().removeprefix("EPSG:")
-    if len(text) == 5 and text[:3] in ("326", "327") and "01" <= text[3:] <= "60":
-        return zone_number(f"{int(text[3:])}{'N' if text[:3] == '326' else 'S'}")
-    raise Misfit(_other_epsg(text), ("epsg",))
-
-
-def _other_epsg(text: str) -> str:
-    known = "4326, 4979 (lat lon), 4978 (ecef), 32601 to 32660 and 32701 to 32760 (utm)"
-    return f"epsg {shown(text)} is not read; convert with cs2cs or pyproj to one of {known}"
 
 
 def _local(own: dict[str, Any], reading: Reading) -> Spot:
@@ -357,19 +346,10 @@ def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
     return x, y, z, w
 
 
-def check_datum(own: dict[str, Any]) -> None:
-    """Refuse other datums, codes of other systems, and MGRS."""
-    datum = own.get("datum", DATUMS[0])
-    if datum not in DATUMS:
-        what = f"datum {shown(str(datum))} is not WGS84 (up to a metre off, and drifting)"
-        raise Misfit(f"{what}; convert with cs2cs or pyproj first", ("datum",))
-    if LLA in own:
-        raise Misfit("lla does not say which number is lat; write {lat: .., lon: .., alt: ..}", (LLA,), key=True)
-    if "mgrs" in own:
-        raise Misfit(NO_MGRS, ("mgrs",), key=True)
-    text = str(own.get("epsg", "4326")).upper().removeprefix("EPSG:")
-    if text not in ("4326", "4979", "4978") and not ("easting" in own or UTM in own):
-        raise Misfit(_other_epsg(text), ("epsg",))
+def _refuse_not_read(own: dict[str, Any]) -> None:
+    """Refuse keys that name another system than WGS84, and a bare `lla`."""
+    if key := next((key for key in NOT_READ if key in own), None):
+        raise Misfit(NOT_READ[key], (key,), key=True)
 
 
 def _incomplete(own: dict[str, Any]) -> str:

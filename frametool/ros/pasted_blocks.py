@@ -55,7 +55,7 @@ _BEGIN = re.compile(
       | [\[({{][\[({{\s]*+(?:np\.|array|Array|Float)
       | {NUMBER}(?:[ \t\r]*+(?:[,;\n<]|\Z)|[ \t]++[-+.\d*])          # bare numbers, MATLAB's factor
       | [-+]?\s*+(?:{DECIMAL}\s*+)?(?:\*\s*+)?[ijk]\s*+(?:[-+]|\Z) | {NUMBER}\s*+[-+]
-      | \d+[\xd7x]\d+\b | Columns?\ \d | \[,\d | \\(?:left|begin)\b | [⎡⎢⎛│┃┌] | (?:se3|so3|quaternion)\s*\n )
+      | \d+[\xd7x]\d+\b | Columns?\ \d | \[,\d | \\(?:left|begin)\b | [⎡⎛│┌] | (?:se3|so3|quaternion)\s*\n )
     | \x1b\[ | Out\[\d | Parameter\ containing: | (?:[A-Za-z_]\w*\s*)?<< | \(x,\s*y,\s*z,\s*w\)\s*=
     | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n]
     | [xyzw]:\s*{NUMBER}\s*,

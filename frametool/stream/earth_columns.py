@@ -20,16 +20,14 @@ from frametool.grammar.names import FIX, PARENT_COLUMNS, may_be_on_earth
 from frametool.grammar.place import (
     GEOID,
     NO_ALT,
-    NO_MGRS,
+    NOT_READ,
     SAME,
     SEA_LEVEL,
     band_s,
-    check_datum,
     check_in_ecef,
     check_parent,
     coordinate,
     not_on_ellipsoid,
-    zone_of_epsg,
 )
 from frametool.stream.faults import ZONES, Misused, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, places_named
@@ -110,9 +108,10 @@ def _position(
         return _local(kind, spots, earth)
     fields: list[tuple[str, NamedColumn]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
     if kind == UTM:
-        zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE) or spots.get(EPSG)
+        zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
         spots = {name: spot for name, spot in spots.items() if spot is not zone}
         if zone is None and earth.zone is None and {"easting", "northing"} <= spots.keys():
+            _refuse_not_read(spots)
             raise ValueInvalid("easting and northing do not say their zone; add a column utm_zone, or give --zone 32N")
         fields = [(ZONE, zone)] if zone is not None else []
         fields += [(name, spots[name]) for name in ("easting", "northing") if name in spots]
@@ -150,14 +149,20 @@ def _columns(
         if field[:3] not in ("lat", "lon") and spot.unit not in ("", "m"):
             what = f"column {shown(spot.name)}: unknown unit {shown(spot.unit)} of a length here; known is m"
             raise ValueInvalid(what)
-    fields = [*fields, *((name, spots[name]) for name in (AXES, EPSG) if name in spots)]
-    staying = [(name, spots[name]) for name in (DATUM, STATUS, PARENT) if name in spots]
-    fields = [*fields, *staying]
+    _refuse_not_read(spots)
+    axes = [(AXES, spots[AXES])] if AXES in spots else []
+    staying = [(name, spots[name]) for name in (STATUS, PARENT) if name in spots]
+    fields = [*fields, *axes, *staying]
     zone = earth.zone if kind == UTM and fields[0][0] != ZONE else None
     place = Place(kind, tuple(field for field, _ in fields), earth.axes or kind * (kind in LOCAL), zone,
                   earth.origin if kind in LOCAL else None)  # fmt: skip
     places, names = zip(*((spot.place, spot.name) for _, spot in fields), strict=True)
     return Columns(places, names, unit=place, staying=len(staying))
+
+
+def _refuse_not_read(spots: dict[str, NamedColumn]) -> None:
+    if name := next((name for name in (DATUM, EPSG) if name in spots), None):
+        raise ValueInvalid(NOT_READ[name])
 
 
 def _in_radians(spot: NamedColumn) -> bool:
@@ -238,7 +243,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 def _half(names: Iterable[str]) -> str:
     """Say what is missing of a position that is there by half; "" where there is none."""
     if any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
-        return NO_MGRS
+        return NOT_READ["mgrs"]
     fields = {FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
     if len(fields & {"lat", "lon"}) == 1:
         missing = "lon" if "lat" in fields else "lat"
@@ -308,20 +313,10 @@ def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader]]:
     return words, {at: partial(coordinate, field=field) for at, field in enumerate(fields) if field in ("lat", "lon")}
 
 
-def _zone(text: str) -> float:
-    return zone_of_epsg(text) if text.upper().removeprefix("EPSG:").isdecimal() and len(text) > 2 else zone_number(text)
-
-
 def _axes(text: str) -> float:
     if text not in AXES_AT:
         raise ValueInvalid(f"{shown(text)}: axes at a place are {', '.join(AXES_AT)}")
     return float(AXES_AT.index(text))
-
-
-def _said(name: str, text: str) -> float:
-    """Check the datum or the code of EPSG of a row: nothing but WGS84."""
-    check_datum({name: text})
-    return 0.0
 
 
 def _status(text: str) -> float:
@@ -338,8 +333,8 @@ def _parent(text: str) -> float:
 
 
 WORDS: dict[str, Reader] = {
-    ZONE: _zone, AXES: _axes, DATUM: partial(_said, DATUM), EPSG: partial(_said, EPSG), STATUS: _status, PARENT: _parent
-}  # fmt: skip
+    ZONE: zone_number, AXES: _axes, STATUS: _status, PARENT: _parent
+}
 
 
 def zone_notes(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:

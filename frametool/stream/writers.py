@@ -214,7 +214,7 @@ class TextWriter:
         if name == "seconds" and min(stamps) >= 0:
             return spans_of([b"%d.%09d" % divmod(stamp, BILLION) for stamp in stamps])
         numbers: Sequence[int] = range(self.count + first, self.count + first + size)
-        if NUMBER in block.extras and name in (NUMBER, "next"):
+        if NUMBER in block.extras and name == NUMBER:
             numbers = [int(text) for text in texts_of(block.extras[NUMBER])]
         return spans_of([field(name, stamp, number).encode() for stamp, number in zip(stamps, numbers, strict=True)])
 

@@ -203,7 +203,6 @@ def form_entry(name: str) -> dict[str, Any]:
         "writes": row.writes,
         "states": row.states or None,
         "asks": tuple(map(option_of, row.asks)),
-        "instead": row.instead or None,
     }
 
 
@@ -215,19 +214,19 @@ def option_of(ask: str) -> str:
 
 
 def write_forms(entries: Iterable[dict[str, Any]]) -> str:
-    """Return a list of forms: those that are read first, then those only written, then those only known."""
+    """Return a list of forms: those that are read first, then those only written."""
     parts: dict[str, list[str]] = {}
     for entry in entries:
-        kind = _READ if entry["reads"] else _WRITTEN if entry["writes"] else _KNOWN
+        kind = _READ if entry["reads"] else _WRITTEN
         suffixes = f" ({' '.join(entry['suffixes'])})" if entry["suffixes"] else ""
         uses = (("read as", entry["reads"]), ("written from", entry["writes"]))
         texts = [f"{entry['summary']}{suffixes}", "; ".join(f"{use} {', '.join(what)}" for use, what in uses if what)]
-        texts += [entry["states"], *(f"asks for {option}" for option in entry["asks"]), entry["instead"]]
+        texts += [entry["states"], *(f"asks for {option}" for option in entry["asks"])]
         parts.setdefault(kind, []).append(_labelled(entry["name"], texts))
-    return "\n".join(f"{kind}:\n{''.join(parts[kind])}" for kind in (_READ, _WRITTEN, _KNOWN) if kind in parts)
+    return "\n".join(f"{kind}:\n{''.join(parts[kind])}" for kind in (_READ, _WRITTEN) if kind in parts)
 
 
-_READ, _WRITTEN, _KNOWN = "read", "only written", "known and not read; what to do"
+_READ, _WRITTEN = "read", "only written"
 
 
 def write_form(entry: dict[str, Any]) -> str:
@@ -240,7 +239,6 @@ def write_form(entry: dict[str, Any]) -> str:
         "means": entry["states"],
         "asks for": ", ".join(entry["asks"]),
         "known by": ", ".join(_signs(name)),
-        "instead": entry["instead"],
     }
     lines = "".join(_labelled(label, [text]) for label, text in facts.items() if text)
     example = "".join(f"    {line}\n" for line in example_of(name))

@@ -100,15 +100,6 @@ def test_a_pose_graph_of_edges_says_how_they_are_read(run: Run) -> None:
     assert json.loads(run("convert", "a.g2o", "--edges", "-f", "json").out)["xyz"] == [1, 0, 0]
 
 
-def test_a_model_of_drake_may_leave_its_only_body_without_a_name(run: Run) -> None:
-    text = (
-        "directives:\n- add_model:\n    name: box\n    file: package://x/box.sdf\n    default_free_body_pose:\n"
-        '      "": {translation: [1, 2, 3], rotation: !Rpy {deg: [0, 0, 90]}}\n'
-    )
-    outcome = run("lookup", "a.yaml", "world", "box", "-f", "json", files={"a.yaml": text})
-    assert json.loads(outcome.out)["xyz"] == [1, 2, 3]
-
-
 @pytest.mark.parametrize(
     ("arguments", "option", "form"),
     [

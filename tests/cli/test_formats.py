@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Run = Callable[..., Outcome]
 
-LISTED = ("summary", "reads", "writes", "suffixes", "states", "asks", "instead")
+LISTED = ("summary", "reads", "writes", "suffixes", "states", "asks")
 
 
 def words(text: str) -> str:
@@ -36,13 +36,13 @@ def test_the_list_names_every_form_with_what_the_table_says_of_it(run: Run) -> N
     assert (found.status, found.err) == (0, "")
     for name, row in FORMATS.items():
         assert f"\n  {name} " in found.out
-        assert all(words(said) in words(found.out) for said in (row.summary, row.states, row.instead))
+        assert all(words(said) in words(found.out) for said in (row.summary, row.states))
     assert max(map(len, found.out.splitlines())) <= 80
 
 
-def test_the_list_is_parted_into_what_is_read_what_is_only_written_and_what_is_only_known(run: Run) -> None:
+def test_the_list_is_parted_into_what_is_read_and_what_is_only_written(run: Run) -> None:
     parts = [part.splitlines()[0] for part in run("formats").out.split("\n\n")]
-    assert parts == ["read:", "only written:", "known and not read; what to do:"]
+    assert parts == ["read:", "only written:"]
 
 
 def test_json_has_one_object_a_line_with_all_the_table_says(run: Run) -> None:

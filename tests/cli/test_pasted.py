@@ -31,7 +31,6 @@ TURNED = {
     "numpy 1.26.4, repr(R) of float32": "array([[ 0., -1.,  0.],\n       [ 1.,  0.,  0.],\n       [ 0.,  0.,  1.]], dtype=float32)",
     "a script": "R = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])",
     "PyTorch 2.13.0, repr(R)": "tensor([[ 0., -1.,  0.],\n        [ 1.,  0.,  0.],\n        [ 0.,  0.,  1.]], dtype=torch.float64)",
-    "SymPy 1.14.0, repr(R)": "Matrix([[0, -1, 0], [1, 0, 0], [0, 0, 1]])",
     "MATLAB, mat2str(R)": "[0 -1 0;1 0 0;0 0 1]",
     "MATLAB, a script": "R = [0 -1 0; 1 0 0; 0 0 1];",
     "MATLAB, R without ;": "R =\n\n     0    -1     0\n     1     0     0\n     0     0     1\n\n",

@@ -116,7 +116,7 @@ def test_without_a_stream_the_form_is_that_of_the_tree(run: Run) -> None:
         (("convert", "--in", "csv", "--in", "tsv", "-i", "points.csv"), "--in csv and --in tsv: there is one stream"),
         (("apply", "--transform", "{xyz: [1, 0, 0]}", "-i", "points.csv", "--in", "urdf"), "--in urdf is not streamed"),
         (("tree", "t.yaml", "--in", "yamll"), "no form 'yamll' is read; did you mean 'yaml'?"),
-        (("tree", "t.yaml", "--in", "xacro"), "is not read: expand it: xacro FILE"),
+        (("tree", "t.yaml", "--in", "xacro"), "is not supported: expand it: xacro FILE"),
         (("tree", "t.yaml", "--frames", "a,"), "--frames takes names with commas between them, found 'a,'"),
         (("tree", "t.yaml", "-j", "lift"), "--joint takes NAME=VALUE, found 'lift'"),
         (("tree", "t.yaml", "-j", "lift=1", "-j", "a=2", "-j", "lift=3"), "--joint 'lift' is given twice, 1 and 3; leave one out"),
@@ -175,7 +175,7 @@ def test_all_commands_that_read_frames_have_all_the_options() -> None:
         ("lookup t.yaml --fixed li", "lidar"),
         ("tree t.yaml --direction p", "parent-from-child"),
         ("formats sem", "semicolon"),
-        ("formats xa", "xacro"),
+        ("formats mer", "mermaid"),
     ],
 )
 def test_forms_and_frames_are_completed(run: Run, monkeypatch: pytest.MonkeyPatch, words: str, offered: str) -> None:

@@ -35,10 +35,6 @@ def by_polars(path: Path) -> None:
     frame().write_parquet(path, row_group_size=500)
 
 
-def as_stream_by_polars(path: Path) -> None:
-    frame().write_ipc_stream(path, compression="zstd")
-
-
 def as_arrow_by_polars(path: Path) -> None:
     frame().write_ipc(path, compression="lz4")
 
@@ -50,11 +46,11 @@ def by_duckdb(path: Path) -> None:
         connection.execute(f"COPY (FROM points) TO '{path}' (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 2048)")
 
 
-WAYS = {"p.parquet": by_polars, "d.parquet": by_duckdb, "p.arrow": as_arrow_by_polars, "p.arrows": as_stream_by_polars}
+WAYS = {"p.parquet": by_polars, "d.parquet": by_duckdb, "p.arrow": as_arrow_by_polars}
 
 
 def read_by_polars(path: Path) -> Any:
-    readers = {".parquet": polars.read_parquet, ".arrow": polars.read_ipc, ".arrows": polars.read_ipc_stream}
+    readers = {".parquet": polars.read_parquet, ".arrow": polars.read_ipc}
     return readers[path.suffix](path)
 
 

@@ -50,7 +50,7 @@ def test_what_moves_stays_of_its_form(run: Run, tmp_path: Path, form: str, data:
     assert (tmp_path / "c.bin").read_bytes() == data
 
 
-@pytest.mark.parametrize("form", ["ply", "pcd", "npy", "npz"])
+@pytest.mark.parametrize("form", ["ply", "pcd", "npy"])
 def test_clouds_go_into_other_forms_and_back(run: Run, tmp_path: Path, form: str) -> None:
     files: dict[str, bytes] = {"a.bin": NUSCENES}
     assert run("convert", "-i", "a.bin", "--in", "nuscenes-bin", "-o", f"b.{form}", files=files).status == 0
@@ -128,13 +128,12 @@ def test_a_name_that_ends_in_bin_does_not_choose_what_is_written(run: Run) -> No
         assert "-o b.bin does not say its form; give -f kitti-bin or nuscenes-bin" in done.err
 
 
-@pytest.mark.parametrize("form", ["pcd", "ply", "npy", "npz"])
+@pytest.mark.parametrize("form", ["pcd", "ply", "npy"])
 def test_a_cloud_without_a_rotation_is_converted_into_its_own_form_too(run: Run, tmp_path: Path, form: str) -> None:
     run("convert", "-i", "a.csv", "-o", f"a.{form}", files={"a.csv": "x,y,z\n1,2,3\n4,5,6\n"})
     done = run("convert", "-i", f"a.{form}", "-o", f"b.{form}", "--quiet")
     assert (done.status, done.err) == (0, "")
-    if form != "npz":  # whose archive has a date
-        assert (tmp_path / f"a.{form}").read_bytes() == (tmp_path / f"b.{form}").read_bytes()
+    assert (tmp_path / f"a.{form}").read_bytes() == (tmp_path / f"b.{form}").read_bytes()
     assert run("convert", "-i", f"b.{form}", "-f", "csv", "--quiet").out == "x,y,z\n1.0,2.0,3.0\n4.0,5.0,6.0\n"
     refused = run("convert", "-i", f"a.{form}", "-o", f"c.{form}", "--to", "rpy")
     assert (refused.status, "no columns of a rotation among" in refused.err) == (1, True)

@@ -16,6 +16,7 @@ from frametool.formats.detect import by_sign, detect, of_folder
 from frametool.formats.load import load
 from frametool.formats.rows.pose_rows import RowForm
 from frametool.formats.table import FORMATS, Format, by_suffix, readers, writers
+from frametool.formats.unsupported import UNSUPPORTED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,8 +130,6 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "a model of MuJoCo whose joints are told": (b"<mujoco model='a'>\n<keyframe>", "joints records rows", "mjcf"),
     "URDF": (b'<?xml version="1.0"?>\n<!-- <xacro:a/> ${b} -->\n<robot name="r" xmlns:xacro="x">\n<link', "tree", "urdf"),
     "URDF that begins with a joint": (b'<robot name="r"><joint name="a"><origin/></joint>', "tree", "urdf"),
-    "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "tree", "srdf"),
-    "SRDF as values of joints": (b'<robot name="r"><disable_collisions link1="a"/>', "joints records rows", "srdf"),
     "a map of joints": (b"joint: 30deg\n", "joints records rows", "yaml"),
     "rows": (b"x,y,z\n1,2,3\n", "rows records", "csv"),
     "rows as frames": (b"stamp,x,y,z,qx,qy,qz,qw\n", "tree", "csv"),
@@ -146,9 +145,6 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "COLMAP with rigs": (b"# Frame list with one line of data per frame:\n", "tree", "colmap"),
     "NeRF": (b'{"fl_x": 1, "frames": [{"file_path": "a", "transform_matrix": [[', "tree", "nerf"),
     "g2o": (b"PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 0 1", "tree", "g2o"),
-    "Open3D's log": (b"0 0 1\n1 0 0 2 \n0 1 0 2 \n0 0 1 -3e-1 \n0 0 0 1 \n", "rows records", "open3d"),
-    "Open3D's JSON": (b'{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1', "tree", "open3d"),
-    "Bundler": (b"# Bundle file v0.3\n1 2\n", "tree", "bundler"),
     "a tree in JSON with frames that have matrices elsewhere": (b'{"frames": [{"name": "a"}]}', "tree", "json"),
     "rows whose first column ends in a colon": (b"a:,y\n1,2\n", "rows records", "csv"),
     "rows under a comment": (b"# t,x,y\n1,2,3\n", "rows records", "csv"),
@@ -180,7 +176,6 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "KITTI's odometry with a bad number": (b"P0: 7.2e+02 0 x 0 0 7 1 0 0 0 1 0\n", "tree", "kitti-calib"),
     "KITTI's tracking without colons": (b"R_rect 9.9e-01 1 0 0 0 0 0 0 1\n", "tree", "kitti-calib"),
     "KITTI's raw recordings": (b"calib_time: 15-Mar-2012 11:37:16\nR: 7.5e-03", "tree", "kitti-calib"),
-    "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "tree", "drake"),
     "sensors of nuScenes": (b'[\n{\n"token": "f4d",\n"sensor_token": "47f",', "tree", "nuscenes"),
     "ego poses of nuScenes": (b'[{"token": "5a", "timestamp": 15, "rotation": [', "tree", "nuscenes"),
     "a table of joints": (b"joint,theta,d,a,alpha\n1,q1,0.1,0,pi/2\n", "tree", "dh"),
@@ -316,6 +311,14 @@ def test_frames_make_a_tree_ours_whatever_stands_beside_them(beside: str, tmp_pa
 
 
 KNOWN: dict[str, tuple[bytes, str]] = {
+    "directives of Drake": (b"# c\n\ndirectives:\n- add_model:\n", "drake"),
+    "a stream of Arrow": (b"\xff\xff\xff\xff\x80\0\0\0" + bytes(40), "arrows"),
+    "NPZ": (b"PK\x03\x04" + bytes(26) + b"points.npy" + bytes(20), "npz"),
+    "Open3D's log": (b"0 0 1\n1 0 0 2 \n0 1 0 2 \n0 0 1 -3e-1 \n0 0 0 1 \n", "open3d"),
+    "Open3D's JSON": (b'{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1', "open3d"),
+    "Bundler": (b"# Bundle file v0.3\n1 2\n", "bundler"),
+    "SRDF": (b'<?xml version="1.0"?>\n<robot name="r"><!-- c --><group name="arm">', "srdf"),
+    "SRDF of collisions": (b'<robot name="r">\n<disable_collisions link1="a"/>', "srdf"),
     "camera_info": (b"image_width: 640\ncamera_matrix: {rows: 3}\nprojection_matrix: {rows: 3}\n", "camera_info"),
     "camera_info as echo prints it": (b"header:\n  frame_id: a\nheight: 4\ndistortion_model: plumb_bob\n---\n", "camera_info"),
     "camera_info as ini": (b"# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n", "camera_info"),
@@ -341,14 +344,14 @@ def test_a_form_that_is_not_read_is_named_in_one_short_line_with_what_to_do(run:
     head, form = KNOWN[name]
     found = run("tree", "file", files={"file": head})
     assert (found.status, found.out) == (1, "")
-    assert found.err == f"frametool: file: {FORMATS[form].summary}: {FORMATS[form].instead}\n"
+    assert found.err == f"frametool: file: {UNSUPPORTED[form]}\n"
     assert len(found.err) < 200
 
 
-@pytest.mark.parametrize("suffix", [suffix for row in FORMATS.values() if row.instead for suffix in row.suffixes])
+@pytest.mark.parametrize("suffix", [suffix for row in UNSUPPORTED.values() for suffix in row.suffixes])
 def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Callable[..., Any], suffix: str) -> None:
-    form = next(name for name, row in FORMATS.items() if suffix in row.suffixes)
-    assert FORMATS[form].instead in run("check", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
+    form = next(name for name, row in UNSUPPORTED.items() if suffix in row.suffixes)
+    assert UNSUPPORTED[form].remedy in run("check", f"a{suffix}", files={f"a{suffix}": b"PK\x03\x04...."}).err
     assert run("tree", f"b{suffix}", files={f"b{suffix}": "frames: {a: {b: {xyz: [1, 2, 3]}}}"}).status == 0
 
 
@@ -395,7 +398,7 @@ def test_an_empty_file_has_no_frames(run: Callable[..., Any], data: bytes) -> No
 def test_a_form_that_is_not_read_cannot_be_told_either(run: Callable[..., Any]) -> None:
     found = run("tree", "--in", "xacro", "-", stdin="<robot/>")
     assert found.status == 2
-    assert FORMATS["xacro"].instead in found.err
+    assert UNSUPPORTED["xacro"].remedy in found.err
 
 
 @pytest.mark.parametrize(
@@ -413,7 +416,7 @@ def test_verbose_says_by_what_a_file_was_known(run: Callable[..., Any], data: st
 
 
 BOTH = (
-    "directives:\n- add_frame: {name: f, X_PF: {base_frame: world, translation: [1, 2, 3]}}\n"
+    "T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]}\n"
     "parameters:\n  eye_on_hand: false\n  robot_base_frame: base\n  tracking_base_frame: cam\n"
     "transformation: {x: 1, y: 2, z: 3, qx: 0, qy: 0, qz: 0, qw: 1}\n"
 )
@@ -421,8 +424,8 @@ BOTH = (
 
 def test_a_file_that_two_forms_fit_is_read_as_the_one_that_is_told(run: Callable[..., Any]) -> None:
     done = run("tree", "a.yaml", files={"a.yaml": BOTH})
-    assert (done.status, done.err) == (1, "frametool: a.yaml: fits drake and handeye; give --in drake|handeye\n")
-    assert "name: f," in run("tree", "a.yaml", "--in", "drake").out
+    assert (done.status, done.err) == (1, "frametool: a.yaml: fits euroc-sensor and handeye; give --in euroc-sensor|handeye\n")
+    assert "name: a," in run("tree", "a.yaml", "--in", "euroc-sensor").out
     assert "name: cam," in run("tree", "a.yaml", "--in", "handeye").out
 
 
@@ -462,3 +465,11 @@ def test_a_cloud_without_y_has_no_points(run: Callable[..., Any]) -> None:
     assert (done.status, done.err.count("\n")) == (1, 1)
     assert "no columns of a point or pose among: x, nx, ny, nz" in done.err
     assert run("tree", "a.ply").err == "frametool: a.ply: PLY point cloud or mesh: no frames in it; frametool convert and apply read it\n"
+
+
+@pytest.mark.parametrize("name", [name for name, row in UNSUPPORTED.items() if row.was_written])
+def test_a_form_that_was_written_is_refused_as_an_output_with_what_to_write(run: Callable[..., Any], name: str) -> None:
+    remedy = UNSUPPORTED[name].remedy
+    for output in (("-f", name), ("-o", f"a{UNSUPPORTED[name].suffixes[0]}")):
+        found = run("convert", *output, stdin="x,y,z\n1,2,3\n")
+        assert (found.status in (1, 2), found.out, found.err.count("\n"), remedy in found.err) == (True, "", 1, True)

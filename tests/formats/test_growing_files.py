@@ -37,7 +37,6 @@ FILES = {
     "autoware, all bad": ("autoware", "base:\n", "  c{at}: {{x: {at}q, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}}\n", ""),
     "autoware, all odd": ("autoware", "base:\n", "  /c{at}: {{x: 1, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}}\n", ""),
     "nuscenes, all bad": ("nuscenes", "[", '{{"token": "a{at}", "timestamp": {at}, "rotation": [1, 0], "translation": [1, 2, 3]}},\n', '{"token": "b", "timestamp": 1, "rotation": [1, 0, 0, 0], "translation": [1, 2, 3]}]'),
-    "drake, a chain": ("drake", "directives:\n", "- add_frame: {{name: f{next}, X_PF: {{base_frame: f{at}, translation: [1, 0, 0]}}}}\n", ""),
     "launch": ("launch", "<launch>\n", CALL.replace("{more}", ""), "</launch>"),
     "launch, conditions": ("launch", "<launch>\n", CALL.replace("{more}", 'if="$(var a)" '), "</launch>"),
     "calls": ("calls", "", "1 0 0 0 0 0 a b{at}\n", ""),

@@ -295,6 +295,13 @@ def test_a_missing_file_is_trouble_with_files_and_states_need_a_form_that_has_th
     assert (done.status, "a.yaml: has no states with names; " in done.err) == (1, True)
 
 
+def test_states_of_srdf_are_refused_with_what_gives_values_of_joints(run: Run) -> None:
+    files = {"arm.urdf": URDF, "arm.srdf": '<robot name="r"><group_state name="home" group="arm"/></robot>'}
+    done = run("lookup", "arm.urdf", "base", "tip", "--joints", "arm.srdf:home", files=files)
+    assert (done.status, done.err.count("\n")) == (1, 1)
+    assert "arm.srdf: SRDF, the semantics of a robot: give values of joints, --joints FILE with {JOINT: VALUE}" in done.err
+
+
 def test_what_tools_print_between_messages_is_passed_over_and_told(arm: Callable[..., Any]) -> None:
     with pytest.warns(FrametoolWarning, match=r"joints:1: a line printed between messages skipped"):
         tree = arm(content="WARNING: topic [/joint_states] x\n" + ROS2.format(1, 0.0) + ROS2.format(2, 0.5))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Run = Callable[..., Any]
 
-CHILD = {"kitti": "cam0", "colmap": "camera", "nerf": "camera", "open3d": "camera", "bundler": "camera", "open3d-json": "camera"}
+CHILD = {"kitti": "cam0", "colmap": "camera", "nerf": "camera"}
 WRITTEN = tuple(name for name in writers("trajectory") if name != "csv")
 TIMED = ("tum", "euroc", "csv")
 OPTICAL_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -84,22 +84,12 @@ def text_of(form: str, poses: np.ndarray) -> str:
     if form == "nerf":
         frames = [{"file_path": f"{at}.png", "transform_matrix": pose.tolist()} for at, pose in enumerate(poses)]
         return json.dumps({"camera_angle_x": 0.7, "frames": frames})
-    if form == "g2o":
-        rows = [[*pose[:3, 3], *turn] for pose, turn in zip(poses, xyzw, strict=True)]
-        edge = "EDGE_SE3:QUAT 0 1 9 9 9 0 0 0 1 " + "1 " * 21
-        return "".join(f"VERTEX_SE3:QUAT {at} {words(row)}\n" for at, row in enumerate(rows)) + edge + "\nFIX 0\n"
-    if form == "open3d":
-        return "".join(f"{at} {at} {at + 1}\n" + "".join(f"{words(row)} \n" for row in pose) for at, pose in enumerate(poses))
-    if form == "open3d-json":
-        views = [{"class_name": "PinholeCameraParameters", "extrinsic": pose.T.ravel().tolist()} for pose in inverse]
-        return json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": views})
-    blocks = "".join(
-        "500 0 0\n" + "".join(f"{words(row)}\n" for row in pose[:3, :3]) + f"{words(pose[:3, 3])}\n" for pose in inverse
-    )
-    return f"# Bundle file v0.3\n{len(poses)} 1\n{blocks}1 2 3\n0 0 0\n1 0 0 1 1\n"
+    rows = [[*pose[:3, 3], *turn] for pose, turn in zip(poses, xyzw, strict=True)]
+    edge = "EDGE_SE3:QUAT 0 1 9 9 9 0 0 0 1 " + "1 " * 21
+    return "".join(f"VERTEX_SE3:QUAT {at} {words(row)}\n" for at, row in enumerate(rows)) + edge + "\nFIX 0\n"
 
 
-FORMS = ("tum", "euroc", "csv", "kitti", "colmap", "nerf", "g2o", "open3d", "open3d-json", "bundler")
+FORMS = ("tum", "euroc", "csv", "kitti", "colmap", "nerf", "g2o")
 
 
 def samples_of(path: Path | str, **options: Any) -> tuple[np.ndarray, list[int]]:
@@ -135,8 +125,8 @@ def test_any_trajectory_comes_out_in_any_form(source: str, target: str, run: Run
     poses = matrices(9)
     done = run("convert", "-i", "file", "-f", target, "-o", "out", "--quiet", files={"file": text_of(source, poses)})
     assert (done.status, done.out) == (0, "")
-    axes = {"nerf": "opengl", "bundler": "opengl", "tum": "", "euroc": "", "g2o": ""}
-    wanted = {"nerf": "opengl", "kitti": "optical", "colmap": "optical", "open3d": "optical"}.get(target, "")
+    axes = {"nerf": "opengl", "tum": "", "euroc": "", "g2o": ""}
+    wanted = {"nerf": "opengl", "kitti": "optical", "colmap": "optical"}.get(target, "")
     is_turned = wanted and axes.get(source, "optical") not in ("", wanted)
     expected = poses @ OPTICAL_FROM_OPENGL if is_turned else poses
     assert ("camera axes turned" in done.err) == bool(is_turned)
@@ -165,14 +155,14 @@ def test_what_is_written_reads_back_to_the_same_bits_and_is_written_the_same_in_
 
 
 def test_round_the_forms_and_back_keeps_the_trajectory(run: Run, tmp_path: Path) -> None:
-    way = ("tum", "euroc", "kitti", "tum", "colmap", "g2o", "open3d", "nerf", "csv", "tum")
+    way = ("tum", "euroc", "kitti", "tum", "colmap", "g2o", "colmap", "nerf", "csv", "tum")
     poses = matrices(30)
     (tmp_path / "0").write_text(text_of("tum", poses))
     for at, (source, target) in enumerate(pairwise(way)):
         told = ("--in", "csv") if source == "csv" else ()
         assert run("convert", "-i", str(at), *told, "-f", target, "-o", str(at + 1)).status == 0
     found, _ = samples_of(tmp_path / "9")
-    assert abs(found @ OPTICAL_FROM_OPENGL - poses).max() < 1e-11  # Open3D's axes are optical, NeRF's are not
+    assert abs(found @ OPTICAL_FROM_OPENGL - poses).max() < 1e-11  # COLMAP's axes are optical, NeRF's are not
 
 
 def test_evo_reads_what_is_written_and_agrees(run: Run, tmp_path: Path) -> None:
@@ -204,32 +194,10 @@ def test_the_list_of_frames_of_a_rig_holds_the_world_in_the_rig(run: Run) -> Non
     )
 
 
-def test_the_two_directions_of_open3d(run: Run) -> None:
-    log = "0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n"
-    whole = json.dumps({"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1]}]})
-    assert json.loads(run("lookup", "-", "world", "camera", "-f", "json", stdin=log).out)["xyz"] == [1.0, 2.0, 3.0]
-    assert json.loads(run("lookup", "-", "world", "camera", "-f", "json", stdin=whole).out)["xyz"] == [-1.0, -2.0, -3.0]
-
-
-def test_an_extrinsic_row_by_row_is_refused(run: Run) -> None:
-    rows = [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]
-    done = run("tree", "-", stdin=json.dumps({"parameters": [{"extrinsic": rows}]}))
-    assert (done.status, "an extrinsic stands column by column" in done.err) == (1, True)
-
-
-def test_a_camera_of_bundler_looks_along_minus_z(run: Run) -> None:
-    # seen from the camera at the origin of its world a point ahead has z = -1; in optical axes it has z = 1
-    text = "# Bundle file v0.3\n2 0\n500 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
-    done = run("lookup", "-", "world", "camera", "-f", "kitti", stdin=text)
-    assert done.out == "1.0 0.0 0.0 0.0 0.0 -1.0 0.0 0.0 0.0 0.0 -1.0 0.0\n"
-    assert "1 of 2 cameras were not estimated" in done.err
-    assert "camera axes turned from opengl to optical" in done.err
-
-
 # --- axes of cameras ---
 
-AXES = {"nerf": "opengl", "bundler": "opengl", "kitti": "optical", "colmap": "optical", "open3d": "optical", "open3d-json": "optical"}
-INTO = {**{form: AXES[form] for form in ("nerf", "kitti", "colmap", "open3d")}, "tum": "", "csv": ""}
+AXES = {"nerf": "opengl", "kitti": "optical", "colmap": "optical"}
+INTO = {**{form: AXES[form] for form in ("nerf", "kitti", "colmap")}, "tum": "", "csv": ""}
 WAYS: dict[str, tuple[str, ...]] = {
     "convert": ("convert", "-i", "file"), "apply": ("apply", "--transform", "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}", "-i", "file"),
     "relative": ("relative", "--first", "-i", "file"), "mean": ("mean", "-i", "file"),
@@ -401,7 +369,7 @@ def test_other_notations_are_refused_where_a_form_has_its_own(run: Run) -> None:
     assert (done.status, "writes rotations in its own way" in done.err) == (1, True)
 
 
-@pytest.mark.parametrize("form", ["colmap", "nerf", "open3d", "bundler", "g2o"])
+@pytest.mark.parametrize("form", ["colmap", "nerf", "g2o"])
 def test_other_notations_of_a_list_of_poses_come_as_a_table(form: str, run: Run) -> None:
     done = run("convert", "--to", "rpy_deg", stdin=text_of(form, matrices(3)))
     assert (done.status, done.out.splitlines()[0][:34]) == (0, "x,y,z,roll_deg,pitch_deg,yaw_deg,s")
@@ -433,14 +401,9 @@ BAD: dict[str, tuple[str, str]] = {
     "colmap frames, data": ("# Frame list with\n1 1 1 0 0 0 0 0 1 2 CAMERA 1 1\n", "2: expected FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .., three words of each, found 4"),
     "g2o, no tag": ("VERTEX_SE2 0 1 2 3\n1 1 2 3\n", "2: expected a tag as VERTEX_SE3:QUAT, found '1'"),
     "g2o, a long id": (f"VERTEX_SE2 {'1' * 5000} 1 2 3\n", "1: expected the id of a vertex, a whole number, found '1111"),
-    "open3d, no number": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n1 1 x\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n", "6: expected the number of a pose, a whole number, found 'x'"),
     "g2o, cut short": ("VERTEX_SE3:QUAT 0 1 2 3 0 0 0\n", "1: expected VERTEX_SE3:QUAT id x y z qx qy qz qw, found 8 words"),
     "g2o, no number": ("VERTEX_SE2 0 1 2 3\nVERTEX_SE2 a 1 2 3\n", "2: expected the id of a vertex, a whole number, found 'a'"),
     "g2o, too large": ("VERTEX_SE2 99999999999999 1 2 3\n", "1: 99999999999999 is too large to count seconds"),
-    "open3d, cut short": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n", "4: expected four rows of four numbers"),
-    "open3d, last row": ("0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 1 1\n", "5: the last row of a pose is 0 0 0 1"),
-    "bundler, cut short": ("# Bundle file v0.3\n1 0\n500 0 0\n1 0 0\n", "4: camera 0: expected 5 lines"),
-    "bundler, no counts": ("# Bundle file v0.3\nx\n", "2: expected how many cameras and points"),
     "nerf, a word": ('{"frames": [{"transform_matrix": [[1,0,0,"x"],[0,1,0,0],[0,0,1,0]]}]}', "1:42: 'x' is not a number"),
     "nerf, mirrored": ('{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,-1,0]]}]}', "1:34: matrix has determinant -1"),
     "nerf, cut short": ('{"frames": [{"transform_matrix": [[1,0,0,0],[0,1', "1:"),
@@ -758,7 +721,7 @@ def test_ground_truth_at_the_times_of_pictures_is_one_command(run: Run) -> None:
     assert done.out == "1.250000000 1.25 0.0 0.0 0.0 0.0 0.0 1.0\n2.500000000 2.5 0.0 0.0 0.0 0.0 0.0 1.0\n"
 
 
-@pytest.mark.parametrize(("name", "form"), [("a.tum", "tum"), ("images.txt", "colmap"), ("transforms.json", "nerf"), ("a.g2o", "g2o"), ("a.log", "open3d"), ("a.csv", "csv")])
+@pytest.mark.parametrize(("name", "form"), [("a.tum", "tum"), ("images.txt", "colmap"), ("transforms.json", "nerf"), ("a.g2o", "g2o"), ("a.csv", "csv")])
 def test_the_name_of_the_output_says_its_form(name: str, form: str, run: Run, tmp_path: Path) -> None:
     assert run("convert", "--in", "tum", "-o", name, stdin=text_of("tum", matrices(3))).status == 0
     assert (tmp_path / name).read_text() == run("convert", "--in", "tum", "-f", form, stdin=text_of("tum", matrices(3))).out

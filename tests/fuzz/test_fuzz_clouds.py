@@ -32,12 +32,6 @@ def _npy(array: Any) -> bytes:
     return file.getvalue()
 
 
-def _npz() -> bytes:
-    file = io.BytesIO()
-    np.savez_compressed(file, points=CLOUD, other=np.zeros((2, 2)))
-    return file.getvalue()
-
-
 def _las(*, packed: bool) -> bytes:
     laspy = pytest.importorskip("laspy")
     pytest.importorskip("lazrs")
@@ -67,7 +61,6 @@ GOOD: dict[str, Callable[[], bytes]] = {
     "mesh.ply": lambda: ply(CLOUD, after=FACES) + b"\x03\0\0\0\0\1\0\0\0\2\0\0\0" * 3,
     "npy": lambda: _npy(CLOUD),
     "plain.npy": lambda: _npy(np.zeros((30, 3))),
-    "npz": _npz,
     "las": lambda: _las(packed=False),
     "laz": lambda: _las(packed=True),
     "parquet": lambda: _arrow("parquet"),

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from oracles_of_use import Ending, Tool
 
 pytestmark = pytest.mark.fuzz
-ROW_FORMS = {"tum": [], "euroc": [], "colmap": ["--camera-axes", "optical"], "nerf": ["--camera-axes", "opengl"], "kitti": [], "g2o": [], "open3d": []}
+ROW_FORMS = {"tum": [], "euroc": [], "colmap": ["--camera-axes", "optical"], "nerf": ["--camera-axes", "opengl"], "kitti": [], "g2o": []}
 STREAMS = ("json", "yaml", "csv")
-BINARY = ("npy", "npz", "parquet", "arrow")
-STAMPED = {"json", "yaml", "csv", "tum", "euroc", "npz", "parquet", "arrow"}
+BINARY = ("npy", "parquet", "arrow")
+STAMPED = {"json", "yaml", "csv", "tum", "euroc", "parquet", "arrow"}
 MOVED = "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 LIES = ["0", "-1", "1", "2", "3", "7", "41", "1000000", "4294967295", "99999999999999999999", "1e3", "x", "", "F", "U", "float", "list uchar int", "ascii", "binary"]
 

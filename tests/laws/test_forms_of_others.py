@@ -27,8 +27,6 @@ ANGLES = {
     "calls": ("a.calls", "static_transform_publisher {} 0 0 {} 0 0 a b\n"),
     "calls with flags": ("a.calls", "static_transform_publisher " + FLAGS),
     "autoware": ("a.yaml", "base:\n  cam: {{x: {}, y: 0, z: 0, roll: 0, pitch: 0, yaw: {}}}\n"),
-    "drake": ("a.yaml", "directives:\n- add_frame: {{name: f, X_PF: {{base_frame: world, translation: [{}, 0, 0], rotation: !Rpy {{deg: [0, 0, {}]}}}}}}\n"),
-    "drake, an axis": ("a.yaml", "directives:\n- add_frame: {{name: f, X_PF: {{base_frame: world, translation: [{}, 0, 0], rotation: !AngleAxis {{angle_deg: {}, axis: [0, 0, 1]}}}}}}\n"),
     "opencv": ("a.yaml", "%YAML:1.0\n---\ntvec: [{}, 0, 0]\nrvec: [0, 0, {}]\n"),
     "opencv, XML": ("a.xml", "<opencv_storage><tvec type_id='opencv-matrix'><rows>3</rows><cols>1</cols><dt>d</dt><data>{} 0 0</data></tvec><rvec type_id='opencv-matrix'><rows>3</rows><cols>1</cols><dt>d</dt><data>0 0 {}</data></rvec></opencv_storage>"),
     "urdf": ("a.urdf", f'<robot name="r"><link name="a"/><link name="b"/>{JOINT}</robot>'),

@@ -113,7 +113,7 @@ THINGS: dict[str, tuple[dict[str, Any], str, str]] = {
 OTHERS: dict[str, Any] = {"id": 7, "label": 'a "b", c', "much": {"k": [1, 2]}}
 ROW = '7,"a ""b"", c","{""k"": [1, 2]}"'
 HOLDING = ("csv", "json", "yaml")
-DROPPING = ("tum", "euroc", "kitti", "colmap", "g2o", "nerf", "open3d", "ros1", "ros2", "foxglove")
+DROPPING = ("tum", "euroc", "kitti", "colmap", "g2o", "nerf", "ros1", "ros2", "foxglove")
 
 
 def given(kind: str, form: str) -> str:

@@ -90,7 +90,7 @@ def test_a_trajectory_is_read_back_to_the_same_bits_and_nanoseconds(run: Run, tm
 def test_every_form_of_input_becomes_the_same_recording(run: Run, tmp_path: Path) -> None:
     stamps, poses = rows(8)
     run("convert", "-i", "walk.tum", "-o", "tum.mcap", files={"walk.tum": as_tum(stamps, poses)})
-    for form in ("csv", "json", "yaml", "euroc", "npz"):
+    for form in ("csv", "json", "yaml", "euroc"):
         run("convert", "-i", "walk.tum", "-f", form, "-o", f"walk.{form}", "--force")
         assert run("convert", "-i", f"walk.{form}", "-o", f"{form}.mcap").status == 0, form
         assert (tmp_path / f"{form}.mcap").read_bytes() == (tmp_path / "tum.mcap").read_bytes(), form

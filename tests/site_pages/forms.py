@@ -32,7 +32,6 @@ KNOWN = {  # kinds of signs, in words; of a pattern that is more than words only
     "magic": "its first bytes",
     "folder": "a folder that holds {}",
     "xml text": "what its XML holds",
-    "xml child": "the first element of its XML",
     "xml": "the root element {} of its XML",
     "json path": "the keys {} of its JSON",
     "json key": "the outermost key {} of its JSON",
@@ -54,15 +53,14 @@ ASKED = {  # why there is such an option
     "dh": "which of the two conventions its parameters follow",
     "order": "the order of its quaternions",
     "edges": "to take its edges instead of its vertices",
-    "array": "which of its arrays is meant",
 }
 
 
 def section() -> Section:
-    """Return the pages of all forms: those that are read, only written, only known."""
-    groups: dict[str, list[Page]] = {"Read": [], "Only written": [], "Known and not read": []}
+    """Return the pages of all forms: those that are read, those only written."""
+    groups: dict[str, list[Page]] = {"Read": [], "Only written": []}
     for name, row in FORMATS.items():
-        kind = "Read" if row.reads else "Only written" if row.writes else "Known and not read"
+        kind = "Read" if row.reads else "Only written"
         groups[kind].append(Page(f"formats/{name}.md", name, f"{name}: {row.summary}", row.summary, _text(name, row)))
     about = "What is in a file, what its numbers mean, how it is known: `frametool formats NAME` prints the same."
     return Section("formats", "Forms of files", about, groups)
@@ -71,7 +69,6 @@ def section() -> Section:
 def _text(name: str, row: Format) -> str:
     facts = {
         "What its numbers mean": [inline(row.states)],
-        "What to do": [inline(row.instead)],
         "Suffixes": [f"`{each}`" for each in row.suffixes],
         "Files called": [f"`{each}`" for each in row.names],
         "Columns": [f"`{' '.join(row.columns)}`" if row.columns else ""],

@@ -71,14 +71,11 @@ RECORDS = {
     "ecef": {"ecef": XYZ},
     "of a message": {"header": {"frame_id": "gps"}, "latitude": LAT, "longitude": LON, "altitude": ALT},
     "marks": {"lat": DMS, "lon": "11.576E", "alt": ALT},
-    "datum": {"lat": LAT, "lon": LON, "alt": ALT, "datum": "WGS84", "epsg": 4979},
 }
 NEARLY = {  # by another kernel: 5e-9 m
     "utm": {"utm": UTM},
     "flat utm": UTM,
     "utm_zone": {"utm_zone": ZONE, "easting": EASTING, "northing": NORTHING, "alt": ALT},
-    "epsg": {"utm": {"epsg": 32632, "easting": EASTING, "northing": NORTHING, "alt": ALT}},
-    "flat epsg": {"epsg": 32632, "easting": EASTING, "northing": NORTHING, "alt": ALT},
     "radians": {"lat_rad": math.radians(LAT), "lon_rad": math.radians(LON), "alt": ALT},
 }
 TABLES = {
@@ -89,15 +86,12 @@ TABLES = {
     "gps_lat,gps_lon,gps_alt": (LAT, LON, ALT),
     "field.latitude,field.longitude,field.altitude": (LAT, LON, ALT),
     "lat,lon,msl,undulation": (LAT, LON, 470.0, 49.0),
-    "lat,lon,alt,datum": (LAT, LON, ALT, "WGS84"),
-    "lat,lon,alt,epsg": (LAT, LON, ALT, "EPSG:4979"),
     "lat,lon,alt,field.status.service": (LAT, LON, ALT, 1),
     "ecef_x,ecef_y,ecef_z": XYZ,
 }
 TABLES_NEARLY = {
     "utm_zone,easting,northing,alt": (ZONE, EASTING, NORTHING, ALT),
     "zone,easting,northing,alt": (ZONE, EASTING, NORTHING, ALT),
-    "epsg,easting,northing,alt": (32632, EASTING, NORTHING, ALT),
     "lat_rad,lon_rad,alt": (math.radians(LAT), math.radians(LON), ALT),
 }
 
@@ -393,7 +387,8 @@ def test_the_sigmas_of_a_row_need_axes_and_are_turned(run: Callable[..., Any]) -
 
 SEA = "'msl' is above sea level, alt above the ellipsoid; give undulation (the geoid there) too, or alt"
 UNSAID = "a pose at lat, lon does not say what its rotation is given in; axes: enu, ned, grid or ecef; for rows --local-axes"
-EPSG = "epsg '31467' is not read; convert with cs2cs or pyproj to one of 4326, 4979 (lat lon), 4978 (ecef), 32601 to 32660 and 32701 to 32760 (utm)"
+DATUM = "datum is not read, all is WGS84; leave it out, or convert from another one first (cs2cs, pyproj)"
+EPSG = "codes of EPSG are not read; write utm_zone: 32N or lat, lon; convert from others first (cs2cs, pyproj)"
 MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
 REFUSED: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {  # the sentence, a place, what stands beside it
     "swapped": ("lat 95.0 is beyond 90 degrees; are lat and lon swapped?", {"lat": 95.0, "lon": 11.5, "alt": 1}, {}),
@@ -401,11 +396,9 @@ REFUSED: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {  # the senten
     "sea": (SEA, {"lat": 45.0, "lon": 11.5, "msl": 1}, {}),
     "ele": (SEA.replace("msl", "ele"), {"lat": 45.0, "lon": 11.5, "ele": 1}, {}),
     "elevation": (SEA.replace("msl", "elevation"), {"lat": 45.0, "lon": 11.5, "elevation": 1}, {}),
-    "datum": (
-        "datum 'ETRS89' is not WGS84 (up to a metre off, and drifting); convert with cs2cs or pyproj first",
-        {"lat": 45.0, "lon": 11.5, "alt": 1, "datum": "ETRS89"}, {},
-    ),
+    "datum": (DATUM, {"lat": 45.0, "lon": 11.5, "alt": 1, "datum": "ETRS89"}, {}),
     "epsg": (EPSG, {"lat": 45.0, "lon": 11.5, "alt": 1, "epsg": 31467}, {}),
+    "epsg of utm": (EPSG, {"epsg": 32632, "easting": 691607.86, "northing": 5334760.4, "alt": 1}, {}),
     "mgrs": (MGRS, {"mgrs": "32UPU9160734760"}, {}),
     "axes": (UNSAID, {"lat": 45.0, "lon": 11.5, "alt": 1}, {"qx": 0, "qy": 0, "qz": 0, "qw": 1}),
     "band": (

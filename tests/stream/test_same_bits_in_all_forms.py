@@ -45,7 +45,6 @@ FORMS: dict[str, tuple[bytes, Callable[[bytes], Any]]] = {
         lambda data: [json.loads(line)["point"] for line in data.splitlines()],
     ),
     "npy": (saved(np.save, POINTS), lambda data: rows_of(np.load(io.BytesIO(data)))),
-    "npz": (saved(np.savez, points=NAMED), lambda data: rows_of(next(iter(np.load(io.BytesIO(data)).values())))),
     "pcd": (pcd(NAMED), lambda data: rows_of(pcd_rows(data, NAMED.dtype)[1])),
     "ply": (ply(NAMED), lambda data: rows_of(ply_rows(data, NAMED.dtype, 200)[1])),
 }

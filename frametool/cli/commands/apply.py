@@ -16,7 +16,6 @@ from frametool.cli.options import (
     TIME,
     ColumnNames,
     Command,
-    array_option,
     at_ns,
     offset_option,
     pose_result_options,
@@ -70,7 +69,6 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @rules_options
 @offset_option
 @reading_options(streams=True)
-@array_option
 @partial(stream_options, first=SEVERAL)
 def command(
     arguments: tuple[str, ...],

@@ -3,7 +3,7 @@
     {shoulder: 30deg, gripper: 2cm, base: {xyz: [1, 0, 0]}}          with `stamp`, one of many: the joints move
     {name: [shoulder, gripper], position: [0.5, 0.02]}               JointState, of either ROS, one or many
     t,shoulder_deg,elbow [deg],finger (mm)                           a table; without a stamp its last row counts
-    robot.srdf:ready                                                 a state that another form has a name for
+    scene.xml:ready                                                  a key of MJCF
 
 A joint that mimics another follows it, in chains too; only its own name overrides that.  Each statement keeps its
 place; what it means is for those who know the joint.
@@ -142,9 +142,6 @@ class Posture:
             for setting in JointFile(path, self.joints).settings():
                 if setting.joint in self.joints:
                     found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
-                elif setting.loose and (setting.joint in self._fixed or type(setting.value) is dict):
-                    message = f"{path}: joint {shown(setting.joint)} does not move in the robot; its value is left out"
-                    self._options.tally.note(Note("odd", message, ()), 1)
                 else:
                     problem = unknown_joint(setting.joint, self.joints, self._fixed)
                     self._options.tally.unknown_joints.setdefault(setting.joint, setting.refuse(problem, ()))
@@ -352,17 +349,13 @@ DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
 
 class Setting(NamedTuple):
-    """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place.
-
-    loose: it is from a state that speaks of more than the robot has: a fixed joint, or a base that floats, is left out
-    """
+    """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place."""
 
     joint: str
     value: Any
     stamp_ns: int | None
     refuse: Callable[[str, Path], FormatError]
     source: Source
-    loose: bool = False
 
 
 class JointFile:

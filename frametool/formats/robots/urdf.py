@@ -22,6 +22,7 @@ from frametool.formats.load import Recording, refuse_unknown_joints
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
+from frametool.formats.unsupported import UNSUPPORTED
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
@@ -48,7 +49,7 @@ HELD = {
     "link": ("link", "joint"),
     "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
 }
-_XACRO = f"xacro, not yet URDF; {FORMATS['xacro'].instead}"
+_XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
 class RobotDescription(NamedTuple):

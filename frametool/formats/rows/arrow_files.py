@@ -1,8 +1,8 @@
 """Parquet and Arrow IPC (Feather), by pyarrow, the extra `frametool[arrow]`: one way in, one way out, any to any.
 
-Parquet is known by PAR1, a file of Arrow by ARROW1, a stream of Arrow by its first message.  Rows are read and written
-in groups, those of the input or of a million: types, metadata and compression stay.  A column that passes is not
-looked into; a new one stands in the type of the one it replaces, with its metadata.
+Parquet is known by PAR1, a file of Arrow by ARROW1.  Rows are read and written in groups, those of the input or of a
+million: types, metadata and compression stay.  A column that passes is not looked into; a new one stands in the type
+of the one it replaces, with its metadata.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Ints
 
-BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow", b"\xff\xff\xff\xff": "arrows"}
+BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow"}
 NEW_GROUP = 1 << 20  # rows of a group where the input has none
 HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory that writing a group may take: times its size, and bytes beside
 NULLS = True  # its columns have room for them
@@ -196,7 +196,7 @@ class GroupWriter:
         self.waiting, self.size, self.count, self.read = [], 0, 0, 0
 
 
-# --- Arrow IPC: batches as a file with a directory at its end (Feather), or as a stream that begins at once ---
+# --- Arrow IPC: batches as a file with a directory at its end (Feather) ---
 
 BODY_AT = 8  # behind the magic and two bytes that fill it up
 MESSAGE = b"\xff\xff\xff\xff"  # what each message begins with
@@ -205,18 +205,14 @@ RECORD_BATCH = 3
 
 
 class IpcFile(ArrowFile):
-    """A file or stream of Arrow."""
+    """A file of Arrow."""
 
     def opened(self, file: InputFile) -> Any:
         """Open the file and return its schema."""
         ipc = require_pyarrow(self.name, "ipc")
-        self.codec = codec_in(file.head()[BODY_AT if self.form == "arrow" else 0 :])
-        if self.form == "arrow":
-            self.source = self.random_access(file)
-            self.reader = ipc.open_file(self.source)
-        else:
-            self.source = require_pyarrow(self.name).PythonFile(file.stream, mode="r")
-            self.reader = ipc.open_stream(self.source)
+        self.codec = codec_in(file.head()[BODY_AT:])
+        self.source = self.random_access(file)
+        self.reader = ipc.open_file(self.source)
         return self.reader.schema
 
     def encoding(self) -> dict[str, Any]:
@@ -225,10 +221,7 @@ class IpcFile(ArrowFile):
 
     def _records(self) -> Iterator[Any]:
         """Yield the batches of the file."""
-        found = self.reader
-        if self.form == "arrow":
-            found = map(self.reader.get_batch, range(self.reader.num_record_batches))
-        for rows in found:
+        for rows in map(self.reader.get_batch, range(self.reader.num_record_batches)):
             rows.validate(full=True)  # what is broken ends the process where it is touched
             yield rows
             del rows
@@ -294,10 +287,9 @@ class IpcWriter(GroupWriter):
     """Write each group of rows as one batch."""
 
     def begin(self) -> Any:
-        """Return the writer of a file or a stream."""
+        """Return the writer of a file."""
         ipc = require_pyarrow("Arrow", "ipc")
-        new = ipc.new_file if self.form == "arrow" else ipc.new_stream
-        return new(self.file, self.schema, options=ipc.IpcWriteOptions(**self.how))
+        return ipc.new_file(self.file, self.schema, options=ipc.IpcWriteOptions(**self.how))
 
     def write(self, table: Any) -> None:
         """Write a batch."""
@@ -414,7 +406,7 @@ class ParquetWriter(GroupWriter):
         self.writer.write_table(table, row_group_size=max(table.num_rows, 1))
 
 
-WRITERS: dict[str, type[GroupWriter]] = {"parquet": ParquetWriter, "arrow": IpcWriter, "arrows": IpcWriter}
+WRITERS: dict[str, type[GroupWriter]] = {"parquet": ParquetWriter, "arrow": IpcWriter}
 
 
 def open_columns(file: InputFile, _options: Options) -> ArrowFile:

@@ -40,7 +40,7 @@ class RowForm(NamedTuple):
     """The text of one pose.
 
     row: constant text, `Numbers`, and what else is known of a pose: `seconds`, `nanoseconds`, `number` (counted from
-        `first`), `next` (one more), `image` (the name of its picture, else its seconds)
+        `first`), `image` (the name of its picture, else its seconds)
     numbers: from tx, ty, tz, x, y, z, w to the numbers in the order they are written
     head, between, tail: text before the first pose, between two, and behind the last
     holds: which of `frames`, `stamps` are written; other columns are not
@@ -116,7 +116,7 @@ def field(name: str, stamp_ns: int, number: int) -> str:
         return format_stamp(stamp_ns)
     if name == "nanoseconds":
         return str(stamp_ns)
-    return str(number + (name == "next"))
+    return str(number)
 
 
 def image_name(image: str | None, stamp_ns: int) -> str:

@@ -289,7 +289,6 @@ class Stated(NamedTuple):
     """One pose as it is stated: target_from_source; in a tree `child` hangs under the other one.
 
     chained: it is about neighbours in a chain, and only a check where both are known otherwise
-    firm: what the child hung under before hangs under the child from now on, never the other way round
     """
 
     target: str
@@ -298,7 +297,6 @@ class Stated(NamedTuple):
     components: Rigid
     path: Path
     chained: bool = False
-    firm: bool = False
 
     @property
     def parent(self) -> str:
@@ -316,7 +314,7 @@ class _Forest:
     def hang(self, each: Stated) -> None:
         """Add a pose that connects two trees."""
         child, parent = each.child, each.parent
-        if child in self.edges and parent not in self.edges and not each.firm:
+        if child in self.edges and parent not in self.edges:
             child, parent = parent, child
         self._make_root(child)
         self._groups[self._group(child)] = self._group(parent)

@@ -1,4 +1,4 @@
-"""NPZ and LAS: one array among others, integers with a scale; what is not moved is kept."""
+"""LAS: integers with a scale; what is not moved is kept."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from clouds import RNG, cloud, move, moved, xyz
+from clouds import RNG, move, moved, xyz
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,48 +17,6 @@ if TYPE_CHECKING:
     Run = Callable[..., Any]
 
 POINTS = RNG.normal(size=(30, 3), scale=20.0)
-POSES = np.hstack([POINTS, np.tile([0.0, 0.0, 0.6, 0.8], (30, 1))])
-
-
-def archive(save: Callable[..., None] = np.savez, **arrays: Any) -> bytes:
-    file = io.BytesIO()
-    save(file, **arrays)
-    return file.getvalue()
-
-
-@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
-def test_the_array_that_fits_moves_and_the_others_pass(run: Run, tmp_path: Path, save: Any) -> None:
-    others = {"stamps": np.arange(30), "grid": RNG.normal(size=(4, 4)), "tags": np.array(["a", "bc"])}
-    done = move(run, tmp_path, "npz", archive(save, **others, points=POINTS, last=np.arange(3)))
-    found = np.load(io.BytesIO(done.data or b""))
-    assert found.files == [*others, "points", "last"]
-    assert np.allclose(found["points"], moved(POINTS), rtol=1e-12)
-    assert all(found[name].tobytes() == others[name].tobytes() for name in others)
-
-
-def test_an_array_is_chosen_by_its_name(run: Run, tmp_path: Path) -> None:
-    given = archive(a=POINTS, b=POINTS + 1, poses=POSES)
-    found = np.load(io.BytesIO(move(run, tmp_path, "npz", given, "--array", "b").data or b""))
-    assert np.allclose(found["b"], moved(POINTS + 1), rtol=1e-12)
-    assert found["a"].tobytes() == POINTS.tobytes()
-    poses = np.load(io.BytesIO(move(run, tmp_path, "npz", given, "--array", "poses", "--from", "xyzw").data or b""))["poses"]
-    assert np.allclose(poses[:, :3], moved(POINTS), rtol=1e-12)
-    assert np.allclose(poses[:, 3:] @ POSES[0, 3:], np.cos(np.radians(15)))
-
-
-def test_fields_of_an_array_in_an_archive_pass(run: Run, tmp_path: Path) -> None:
-    given = cloud(20, "<f8", ring="<u2")
-    found = np.load(io.BytesIO(move(run, tmp_path, "npz", archive(scan=given)).data or b""))["scan"]
-    assert found.dtype == given.dtype
-    assert found["ring"].tolist() == given["ring"].tolist()
-    assert np.allclose(xyz(found), moved(xyz(given)), rtol=1e-12)
-
-
-def test_an_archive_through_a_pipe_is_the_same(run: Run, tmp_path: Path) -> None:
-    given = archive(points=POINTS)
-    run("apply", "--transform", '{"xyz": [1, -2, 0.5], "rpy_deg": [0, 0, 30]}', "-o", "piped.npz", stdin=given)
-    found = np.load(tmp_path / "piped.npz")["points"]
-    assert np.allclose(found, moved(POINTS), rtol=1e-12)
 
 
 def scan(form: str = "las", **header: Any) -> bytes:
