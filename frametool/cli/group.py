@@ -14,6 +14,7 @@ from click.core import iter_params_for_processing
 
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
+from frametool.cli.replaced import replacement
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, any_near, did_you_mean, shown
 from frametool.stream.faults import Misused
@@ -146,7 +147,7 @@ GROUPS = {
         "given", "notations", "deg", "normalize", "keep_sign", "local_axes", "origin", "zone",
     ),
     "Rows (help streams)": (
-        "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "jobs", "unwrap", "frame_column",
+        "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "unwrap", "frame_column",
         "target_column", "source_column",
     ),
     "Result (help errors)": (
@@ -266,6 +267,8 @@ class Group(WithHelp, click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
+            if gone := replacement(ctx.info_name or "", cmd_name):
+                raise click.UsageError(gone, ctx)
             otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
             hint = any_near(cmd_name, self.table, otherwise)
             raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
@@ -366,7 +369,8 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     message = error.format_message().replace("\n", " ").rstrip(".")
     if isinstance(error, click.NoSuchOption):  # each version of click has its own words
         name, near = error.option_name, error.possibilities or ()
-        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
+        gone = replacement(ctx.info_name or "" if ctx else "", name)
+        message = gone or f"no such option {shown(name)}{did_you_mean(name, near)}"
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():

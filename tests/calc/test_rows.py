@@ -193,12 +193,6 @@ def test_the_result_replaces_ours_or_stands_beside(run: Callable[..., Any]) -> N
     assert run("calc", "row", "--as", "vector", "-f", "json", "--in", "json", stdin="[1, 2, 3]\n").out == "[1.0, 2.0, 3.0]\n"
 
 
-def test_jobs_change_no_byte(run: Callable[..., Any]) -> None:
-    rows = "x,y,z,k\n" + "1,2,3,4\n" * 90_000
-    arguments = ("calc", "--tree", ROBOT, "-e", "p=(map<-lidar) * row", "-e", "d=norm(p) * row.k")
-    assert run(*arguments, "--jobs", "2", "--quiet", stdin=rows).out == run(*arguments, "--quiet", stdin=rows).out
-
-
 def test_a_table_of_poses_is_a_list_with_a_name(run: Callable[..., Any]) -> None:
     done = run("calc", "l=t.csv", "mean(l)", "-f", "csv", files={"t.csv": TABLE})
     expected = by.mean(*POSES)

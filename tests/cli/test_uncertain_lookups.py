@@ -283,13 +283,6 @@ def test_the_covariance_of_a_point_is_three_sigmas_and_nine_columns() -> None:
     assert unknown == "1.0  2.0  3.0  m in map  sigma unknown\n"
 
 
-def test_rows_with_covariances_are_looked_up_in_one_process(run: Run) -> None:
-    rows = ["lookup", "robot.yaml", "map", "--source-column", "s", "--covariance"]
-    done = run(*rows, "--jobs", "2", stdin="s\ntool\narm\n", files=FILES)
-    assert (done.status, done.out) == (2, "")
-    assert "--jobs is not for --covariance: the edges that are taken for exact are counted in one process" in done.err
-
-
 @pytest.mark.parametrize("policy", ["ros1", "ros2"])
 def test_a_buffer_with_the_rules_of_tf2_keeps_covariances(policy: str, run: Run) -> None:
     ours = run("lookup", "drive.yaml", "map", "cart", "--at", "0.5", "--covariance", "-f", "json", files=FILES)

@@ -39,7 +39,6 @@ def flow(
     *,
     header: bool = True,
     size: int = 0,
-    jobs: int = 1,
     most: int = MOST,
 ) -> Flow:
     stream = io.BytesIO(text) if isinstance(text, bytes) else text
@@ -48,9 +47,9 @@ def flow(
     bad = BadRows("in", request.on_error, most=most, tell=lambda error: told.append(str(error)))
     try:
         if form in readers("records"):
-            outcomes = run_records(stream, form, request, source="in", size=size, jobs=jobs)
+            outcomes = run_records(stream, form, request, source="in", size=size)
         else:
-            outcomes = run_table(stream, form, request, source="in", header=header, size=size, jobs=jobs)
+            outcomes = run_table(stream, form, request, source="in", header=header, size=size)
         status = run(outcomes, lambda block: [out.write(block)].clear(), bad, lambda _rows, _size: None)
     except FrametoolError as error:
         told.append(str(error))

@@ -152,8 +152,6 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
         raise click.UsageError("--explain derives poses; leave --covariance out")
     if fixed is not None:
         raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
-    if by_row:
-        refuse_unused("is not for --covariance: the edges that are taken for exact are counted in one process", "jobs")
     if output.style.place is not None:
         name = output.style.place.name
         raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
