@@ -14,7 +14,6 @@ from click.core import iter_params_for_processing
 
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
-from frametool.cli.replaced import replacement
 from frametool.cli.sink import writing
 from frametool.errors import SHOWN, any_near, did_you_mean, shown
 from frametool.stream.faults import Misused
@@ -152,7 +151,7 @@ GROUPS = {
     ),
     "Result (help errors)": (
         "output", "force", "precision", "covariance", "messages", "topic_out", "recorded_frames", "explain",
-        "explain_full", "explain_step", "color",
+        "explain_step", "color",
     ),
     "Forms that leave something open (help formats)": (
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "array", "order",
@@ -169,7 +168,7 @@ OWN = {
     "apply": ("at", "time_column", "frame_column", "input_path", "output", "covariance"), "calc": ("input_path",),
     "fk": ("input_path", "joints"), "tree": ("at", "notations", "joints"), "view": ("at", "fixed", "output"),
     "resample": ("times",), "diff": ("at", "with_a", "with_b"),
-    "record": ("more", "topics", "on_error", "output"), "sweep": ("gain_linear", "gain_angular"),
+    "record": ("more", "topics", "on_error", "output"),
 }  # fmt: skip
 WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
@@ -267,8 +266,6 @@ class Group(WithHelp, click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
-            if gone := replacement(ctx.info_name or "", cmd_name):
-                raise click.UsageError(gone, ctx)
             otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
             hint = any_near(cmd_name, self.table, otherwise)
             raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
@@ -365,12 +362,14 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    from frametool.cli.replaced import replacement
+
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     if isinstance(error, click.NoSuchOption):  # each version of click has its own words
         name, near = error.option_name, error.possibilities or ()
-        gone = replacement(ctx.info_name or "" if ctx else "", name)
-        message = gone or f"no such option {shown(name)}{did_you_mean(name, near)}"
+        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
+    message = replacement(arguments) or message
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():

@@ -75,7 +75,7 @@ class Command(WithHelp, Reused):
 
 
 # options that may stand bare, and their values: the first is what they mean then
-OPTIONAL = {"--explain": ("text", "markdown", "latex"), "--rows": ("ate", "rpe", "kitti")}
+OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
 
 OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments

@@ -1,14 +1,27 @@
-"""What went in this release, and what to use instead; imports nothing."""
+"""What went in this release, and what to use instead."""
 
-# what is typed, an option alone or behind its command -> what to use instead
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
 REPLACED = {
     "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
+    "sim sweep": "`frametool.simulate_many` in Python tries many gains at once",
+    "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
+    "--explain-full": "--explain writes every product",
 }
 
 
-def replacement(command: str, word: str) -> str | None:
-    """Return the sentence on an option or a subcommand of a command that went; None for any other word."""
-    for name in (f"{command} {word}", word):
-        if name in REPLACED:
-            return f"{name} is gone: {REPLACED[name]}"
+def replacement(arguments: Sequence[str]) -> str | None:
+    """Return the sentence on the first word of a command line that went; None where all are in use."""
+    for before, word in pairwise(("", *arguments)):
+        option, _, value = word.partition("=")
+        for name in (option, f"{option} {value}", f"{before} {word}", f"{arguments[0]} {word}"):
+            if name in REPLACED:
+                return f"{name} is gone: {REPLACED[name]}"
     return None

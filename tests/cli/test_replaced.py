@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 TYPED = {
     "--jobs": "invert --jobs 2 -i rows.csv",
+    "sim sweep": "sim sweep --gain-linear 1,2",
+    "--explain latex": "convert --from rpy 0 0 1 --explain=latex",
+    "--explain-full": "convert --explain-full --from rpy 0 0 1",
 }
 
 
@@ -32,4 +35,4 @@ def test_what_went_names_what_to_use_instead(name: str, typed: str, run: Run) ->
 
 
 def test_an_option_that_never_was_is_not_told_to_be_gone() -> None:
-    assert replacement("convert", "--jbos") is None
+    assert replacement(["convert", "--jbos", "sweep", "--explain=text"]) is None

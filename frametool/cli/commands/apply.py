@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
-from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options
+from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -63,7 +63,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @pose_result_options("points", "trajectory")
 @click.option("--covariance", is_flag=True, help="also that of the tree's edges, or of --transform")
 @scale_option
-@explain_options
+@EXPLAIN
 @click.option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
 @click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import PoseTask, explain_options
+from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
@@ -59,7 +59,7 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @pose_options
 @rotation_options
 @result_options("poses")
-@explain_options
+@EXPLAIN
 @column_options
 @stream_options
 def command(
