@@ -139,7 +139,7 @@ HELP_ALL = click.Option(
 GROUPS = {
     "Files (help formats)": ("input_forms", "more", "with_a", "with_b", "topics", "quiet", "verbose"),
     "Time (help time)": (
-        "at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2",
+        "at", "times", "source_at", "fixed", "time_column", "moving", "cache",
         "start", "stop", "time_offset",
     ),
     "Rotations (help rotations, help earth)": (

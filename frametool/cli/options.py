@@ -473,7 +473,6 @@ def pose_result_options(*what: str) -> Callable[[Function], Function]:
 # --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
-POLICIES = ("ros1", "ros2")
 MOST_TIMES = 100_000_000
 MOST_TOLD = 10  # times without a result
 
@@ -566,7 +565,6 @@ rules_options = together(
     click.option(
         "--cache", type=Time(latest=False), metavar="SECONDS", help="forget what is older  [default: nothing]"
     ),
-    click.option("--tf2", type=click.Choice(POLICIES), help="take, refuse and complain as tf2 does"),
 )
 times_option = click.option(
     "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or the stamps of FILE"
@@ -603,20 +601,18 @@ def window_of(start: int | None, stop: int | None, column: str | None = None) ->
     return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
 
 
-def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
+def rules(*, moving: bool, cache: int | None, normalize: bool = False) -> Rules:
     """Collect what the options say about how frames are taken."""
-    if tf2 is not None and normalize:
-        raise click.UsageError("--tf2 takes rotations as tf2 does; leave --normalize out")
     if cache is not None and cache < 0:
         raise click.UsageError("--cache takes seconds, not less than 0")
     from frametool.formats.load import Rules
 
-    return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache, normalize=normalize)
+    return Rules(moving=moving, keep_ns=cache, normalize=normalize)
 
 
 def rules_of(options: dict[str, Any]) -> Rules:
     """Take out of a command's options what they say about how frames are taken."""
-    return rules(**{name: options.pop(name) for name in ("moving", "cache", "tf2", "normalize") if name in options})
+    return rules(**{name: options.pop(name) for name in ("moving", "cache", "normalize") if name in options})
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

@@ -19,6 +19,7 @@ TYPED = {
     "--jobs": "invert --jobs 2 -i rows.csv",
     "sim sweep": "sim sweep --gain-linear 1,2",
     "--explain latex": "convert --from rpy 0 0 1 --explain=latex",
+    "--tf2": "lookup robot.yaml map base_link --tf2 ros1",
     "--explain-full": "convert --explain-full --from rpy 0 0 1",
 }
 

@@ -82,7 +82,6 @@ def command(
     at: int | str | None,
     moving: bool,
     cache: int | None,
-    tf2: str | None,
     covariance: bool,
     scale: bool,
     **options: Any,
@@ -104,7 +103,7 @@ def command(
     several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
     clouds = clouds_of(stream, output) if stream.path and several is None else None
     if pose is None:
-        chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
+        chosen = rules(moving=moving, cache=cache, normalize=task.normalize)
         if scale:
             raise click.UsageError("--scale is about the matrix of --transform; frames of a tree have none")
         numbers = bool(stream.given_place)

@@ -65,7 +65,7 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
     source_at: int | str | None, fixed: str | None, covariance: bool, times: str | None, moving: bool,
-    cache: int | None, tf2: str | None, **options: Any,
+    cache: int | None, **options: Any,
 ) -> int:  # fmt: skip
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
@@ -99,7 +99,7 @@ def command(
         refuse_unused("is about rows: give --time-column, --target-column or --source-column", *rows)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
+    chosen = rules(moving=moving, cache=cache, normalize=task.normalize)
     frames = load_tree(tree, more, chosen, streams=bool(by_row))
     if not any("order" in asks for _, asks in settings().inputs):
         refuse_unused("changes nothing: that is not left open here", "given")
@@ -108,9 +108,8 @@ def command(
         tell_unused_sigmas(frames)
     if by_row or target is None or source is None:
         return by_row.run(task, frames, target, source, at_ns(at), sigmas, window)
-    if tf2 is None:
-        target, source = frame_name(target, frames), frame_name(source, frames)
-        fixed = fixed and frame_name(fixed, frames)
+    target, source = frame_name(target, frames), frame_name(source, frames)
+    fixed = fixed and frame_name(fixed, frames)
     if plan is not None:
         from frametool.explain import derive
 
