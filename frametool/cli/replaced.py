@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 REPLACED = {
     "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
     "sim sweep": "`frametool.simulate_many` in Python tries many gains at once",
+    "view --live": "the page plays what moves, `frametool view TREE --open`",
     "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
     "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
     "--explain-full": "--explain writes every product",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 TYPED = {
     "--jobs": "invert --jobs 2 -i rows.csv",
     "sim sweep": "sim sweep --gain-linear 1,2",
+    "view --live": "view drive.yaml --at 1 --live",
     "--explain latex": "convert --from rpy 0 0 1 --explain=latex",
     "--tf2": "lookup robot.yaml map base_link --tf2 ros1",
     "--explain-full": "convert --explain-full --from rpy 0 0 1",
