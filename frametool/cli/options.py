@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
+from frametool.cli.group import WithHelp, keep_setting, refuse_unused, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -40,12 +40,28 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup,
 NEEDS = {"force": ("output", "plot", "report", "view"), "tolerance": ("find",)}
 
 
-class Command(WithHelp, Reused):
+class Command(WithHelp):
     """A command whose arguments may be negative numbers.
 
     click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
     own check of misspelled options; `Text` takes the blank off again.
     """
+
+    def make_parser(self, ctx: click.Context) -> Any:
+        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
+        parser: Any = super().make_parser(ctx)
+        parse = parser.parse_args
+
+        def parse_once(args: list[str]) -> Any:
+            found = parse(args=args)
+            told = [] if ctx.resilient_parsing else found[2]
+            for each in told:
+                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
+                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
+            return found
+
+        parser.parse_args = parse_once
+        return parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
