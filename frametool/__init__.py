@@ -49,8 +49,6 @@ if TYPE_CHECKING:
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
     from frametool.stream.engines import apply_arrow as apply_arrow
-    from frametool.stream.engines import polars_exprs as polars_exprs
-    from frametool.stream.engines import sql as sql
     from frametool.stream.trajectories import load_trajectory as load_trajectory
 
 __version__ = "0.2.0"
@@ -81,7 +79,6 @@ _HOMES = {
     "load": "frametool.formats.load",
     "load_robot": "frametool.formats.robots.urdf",
     "load_trajectory": "frametool.stream.trajectories",
-    "polars_exprs": "frametool.stream.engines",
     "resample": "frametool.fit.api",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
@@ -89,7 +86,6 @@ _HOMES = {
     "solve_hand_eye": "frametool.fit.api",
     "solve_mean": "frametool.fit.api",
     "solve_points": "frametool.fit.api",
-    "sql": "frametool.stream.engines",
     "tutorial": "frametool.sim.scene",
     "utm_from_lla": "frametool.earth",
 }

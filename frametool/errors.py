@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     Result = TypeVar("Result")
-    Listener = Callable[[str, str, "type[FrametoolWarning]"], None]
+    Listener = Callable[[str, str], None]
 
 SHOWN = 60  # characters of the input that a message quotes at most
 LONGEST_NAME = 200  # characters of a name that is compared with others
@@ -39,12 +39,10 @@ class FrametoolError(Exception):
 
     exit_code: the status its commands end with
     rule: the rule of `check` that is broken, if any
-    many_lines: the message is tf2's and has several lines; no other has
     """
 
     exit_code = 1
     rule = ""
-    many_lines = False
 
     def __init__(self, *message: object, **fields: object) -> None:
         """Keep what the message says as fields too, for those who do not read sentences."""
@@ -174,24 +172,20 @@ class FrametoolWarning(UserWarning):
     """Mark what was read, used and is nevertheless worth a look."""
 
 
-class Tf2Warning(FrametoolWarning):
-    """Mark what tf2 would have logged, in its words."""
-
-
 _listeners: list[Listener] = []
 
 
-def warn(message: str, *, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
+def warn(message: str, *, rule: str = "") -> None:
     """Report something odd that does not stop the work: to whoever listens, else as a Python warning.
 
     rule: the rule of `check` that finds it, if any
     """
     if _listeners:
-        _listeners[-1](message, rule, kind)
+        _listeners[-1](message, rule)
         return
     import warnings
 
-    warnings.warn(message, kind, stacklevel=3)
+    warnings.warn(message, FrametoolWarning, stacklevel=3)
 
 
 @contextmanager
@@ -209,7 +203,7 @@ def overheard(
 ) -> tuple[Result, list[tuple[str, str]]]:
     """Return what a function returns, and its warnings as (rule, message), for a reader to add the place."""
     warned: list[tuple[str, str]] = []
-    _listeners.append(lambda message, rule, _: warned.append((rule, message)))
+    _listeners.append(lambda message, rule: warned.append((rule, message)))
     try:  # as `heard_by`, which would cost half a microsecond for each of a million rotations
         return call(*arguments, **options), warned
     finally:

@@ -53,7 +53,6 @@ COMMANDS: tuple[tuple[str, str], ...] = (
     ("solve --hand-eye examples/gripper.csv examples/target.csv -f json", ""),
     ("compare examples/truth.tum examples/mono.tum --align sim3 --offset auto -f json", ""),
     ("align examples/truth.tum examples/mono.tum -f json", ""),
-    ("sim sweep --gain-linear 0.5,1.5 --gain-angular 1,4 -f json", ""),
     ("convert --from wxyz 1 0 0 0 --to matrix,rpy -f json", ""),
     ("convert --from rpy 0.1 -0.2 3 --keep-sign -f json --precision 4", ""),
     (f"convert {A} -f csv", ""),

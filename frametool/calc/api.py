@@ -5,13 +5,12 @@ Values as results: the mappings that machine formats write and read back, and th
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any, Self
 
-from frametool.calc.evaluate import Scope, evaluate, evaluate_line, read_line
+from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.parser import RADIAN, frame_text
 from frametool.calc.rules import in_radians
-from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, Term, Type, unit_text
+from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, Term, Type
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.frames.lookups import Frames
 from frametool.geometry.floats import RADIAN as DEGREES
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class Measure(float):
-    """A number that knows its unit: `m`, `rad`, `s`, `m^2`, ..; "" for a plain one.  Angles are in radians."""
+    """A number that knows its unit: `m`, `rad`, `s`; "" for a plain one.  Angles are in radians."""
 
     __slots__ = ("unit",)
     unit: str
@@ -145,7 +144,7 @@ def _result(term: Term) -> Any:
     if term.type.kind != NUMBER:
         return Framed(term)
     (value,) = in_radians(term).at(None)
-    return Measure(value, unit_text(term.type.unit)) if type(value) is float else value
+    return Measure(value, term.type.unit) if type(value) is float else value
 
 
 def _term(name: str, value: Any) -> Term:
@@ -159,15 +158,14 @@ def _term(name: str, value: Any) -> Term:
     elif isinstance(value, Rotation):
         found = Term(Type(POSE), (0.0, 0.0, 0.0, *value.components))
     elif isinstance(value, Measure):
-        unit = re.sub(r"[a-z]+", r"1\g<0>", value.unit) or "1"  # m/s as 1m/1s
-        found = Term(evaluate(unit, Scope()).type, (float(value),))
+        found = Term(Type(NUMBER, unit=value.unit), (float(value),))
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses what is not finite
     elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
         found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
     else:
         found = _of_numbers(name, value)
-    return found._replace(text=name, atomic=True, inverse_of=None)
+    return found._replace(text=name)
 
 
 def _of_numbers(name: str, value: Any) -> Term:
@@ -224,7 +222,7 @@ def line_of_value(term: Term, style: Style) -> str:
         radians, degrees = (text(angle_in(term, degrees=each)) for each in (False, True))
         return f"{degrees} deg  ({radians} rad)\n" if style.degrees else f"{radians} rad  ({degrees} deg)\n"
     if type_.kind == NUMBER:
-        return f"{text(numbers[0])} {unit_text(type_.unit)}".rstrip() + "\n"
+        return f"{text(numbers[0])} {type_.unit}".rstrip() + "\n"
     if type_.kind == ANGLES:
         return f"rpy  {text(*numbers)}  rad{frame}\n     {text(*(each * DEGREES for each in numbers))}  deg\n"
     return f"linear  {text(*numbers[:3])}  m\nangular  {text(*numbers[3:])}  rad{frame}\n"  # a twist

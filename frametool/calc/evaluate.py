@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.calc import rules
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import ATOMS, PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, parse_line
+from frametool.calc.parser import PLAIN, RESERVED, UNITS, CalcError, NoTree, column_name, parse_line
 from frametool.calc.values import LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TWIST, VECTOR, Term, Type
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
@@ -160,8 +160,8 @@ def evaluate_line(line: Line, scope: Scope) -> Term:
     except FrametoolError as error:
         raise pointed(error, line.text) from None
     if line.name:
-        scope.names[line.name] = term._replace(text=line.name, atomic=True, inverse_of=None)
-    scope.names["ans"] = term._replace(text="ans", atomic=True, inverse_of=None)
+        scope.names[line.name] = term._replace(text=line.name)
+    scope.names["ans"] = term._replace(text="ans")
     return term
 
 
@@ -179,7 +179,7 @@ class _Walk:
         except FrametoolError as error:
             raise placed(error, branch.at) from None
         self.scope.seen.update((found.type.target, found.type.source))
-        return found._replace(text=self.text[branch.start : branch.end], atomic=branch.kind in ATOMS)
+        return found._replace(text=self.text[branch.start : branch.end])
 
     def _value(self, branch: Branch) -> Term:
         """Return what is one value, neither a tree nor a list."""
@@ -268,17 +268,16 @@ class _Walk:
             count = f"{len(branch.parts)} value{'s' * (len(branch.parts) != 1)}"
             raise CalcError(f"{name}() takes {row.takes}; found {count}")
         read = self.term if name == "mean" and len(branch.parts) == 1 else self._value
-        return row.rule(name, [read(part) for part in branch.parts], self.scope.trees)
+        return row.rule(name, [read(part) for part in branch.parts])
 
     def _chain(self, branch: Branch) -> Term:
         left = self._value(branch.parts[0])
         for (operator, at), part in zip(branch.value, branch.parts[1:], strict=True):
             right = self._value(part)
             try:
-                found = rules.OPERATORS[operator](left, right, self.scope.trees)
+                left = rules.OPERATORS[operator](left, right)
             except FrametoolError as error:
                 raise placed(error, at) from None
-            left = found._replace(text=self.text[branch.left : part.right], atomic=False)
         return left
 
     def _sign(self, branch: Branch) -> Term:

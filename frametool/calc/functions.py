@@ -28,11 +28,10 @@ from frametool.geometry import euler, floats, quaternion, rigid
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.calc.rules import Trees
     from frametool.calc.values import Kernel
     from frametool.geometry.types import Components, Namespace, Number
 
-    Rule = Callable[[str, Sequence[Term], Trees], Term]
+    Rule = Callable[[str, Sequence[Term]], Term]
 
 MANY = 1 << 16
 LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
@@ -41,7 +40,7 @@ LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
 def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
     """Return the rule of a function of an angle, made of its sine and cosine; exact at quarter turns in degrees."""
 
-    def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
+    def rule(name: str, terms: Sequence[Term]) -> Term:
         angle = rules.scalar(rules.wanted(terms[0]), f"{name}()", angle=True)
         halved = floats.half_sincos_deg if angle.type.degrees else floats.half_sincos
         return made(PLAIN_NUMBER, lambda value, xp: (pick(*halved(2.0 * value, xp)),), angle)
@@ -52,7 +51,7 @@ def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
 def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
     """Return the rule of a function whose value is an angle; `bound` is the largest number it takes."""
 
-    def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
+    def rule(name: str, terms: Sequence[Term]) -> Term:
         def check(value: float) -> str:
             return f"{name}() takes -1 .. 1, found {value:g}" if bound is not None and abs(value) > bound else ""
 
@@ -80,21 +79,20 @@ def arctangent(value: Number, xp: Namespace) -> Number:
     return xp.where(steep, xp.copysign(floats.RIGHT_ANGLE, value) - angle, angle)
 
 
-def sqrt(name: str, terms: Sequence[Term], _: Trees) -> Term:
-    """Take the square root of a number and of its unit."""
+def sqrt(name: str, terms: Sequence[Term]) -> Term:
+    """Take the square root of a plain number."""
 
     def check(value: float) -> str:
         return f"{name}() takes what is not negative, found {value:g}" if value < 0.0 else ""
 
-    number = rules.in_radians(rules.need(rules.wanted(terms[0]), (NUMBER,), name))
-    type_ = Type(NUMBER, unit=rules.raised(number.type.unit, 0.5))
-    return made(type_, lambda value, xp: (xp.sqrt(value),), number, check=check)
+    number = rules.scalar(rules.wanted(terms[0]), f"{name}()")
+    return made(PLAIN_NUMBER, lambda value, xp: (xp.sqrt(value),), number, check=check)
 
 
 class Builtin(NamedTuple):
     """A function: how many values it takes, in words what and what for, and its rule.
 
-    rule: from its name, its values and the trees there are to the result
+    rule: from its name and its values to the result
     """
 
     least: int
@@ -107,14 +105,14 @@ class Builtin(NamedTuple):
 def of_one(kinds: Sequence[str], type_of: Callable[[Type], Type], kernel: Kernel) -> Rule:
     """Return the rule of a function of one pose, point or vector."""
 
-    def rule(name: str, terms: Sequence[Term], _: Trees) -> Term:
+    def rule(name: str, terms: Sequence[Term]) -> Term:
         term = rules.need(terms[0], kinds, name)
         return made(type_of(term.type), kernel, term)
 
     return rule
 
 
-def _exp(name: str, terms: Sequence[Term], _: Trees) -> Term:
+def _exp(name: str, terms: Sequence[Term]) -> Term:
     def check(*numbers: float) -> str:
         rigid.check_twist(*numbers)
         return ""
@@ -125,20 +123,20 @@ def _exp(name: str, terms: Sequence[Term], _: Trees) -> Term:
     return made(Type(POSE, twist.type.target), rigid.exp, twist, check=check)
 
 
-def _interp(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+def _interp(name: str, terms: Sequence[Term]) -> Term:
     def line(*numbers: Number) -> Components:
         f = numbers[6]
         return tuple(a + f * (b - a) for a, b in zip(numbers[:3], numbers[3:6], strict=True))
 
     a, b, fraction = terms
     if a.type.kind == b.type.kind and a.type.kind in rules.PLACED:
-        type_ = a.type._replace(target=rules.common(a, b, trees))
+        type_ = a.type._replace(target=rules.common(a, b))
         return arithmetic(type_, line, a, b, rules.scalar(fraction, "a fraction"))
     type_ = rules.same_frames([rules.need(a, (POSE,), name), rules.need(b, (POSE,), name)], f"{name}()")
     return made(type_, rigid.interpolate, a, b, rules.scalar(fraction, "a fraction"))
 
 
-def _mean(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+def _mean(name: str, terms: Sequence[Term]) -> Term:
     each = terms[0].items if len(terms) == 1 and terms[0].type.kind == LIST else tuple(map(rules.wanted, terms))
     if not each:
         raise CalcError("mean() of nothing")
@@ -152,7 +150,7 @@ def _mean(name: str, terms: Sequence[Term], trees: Trees) -> Term:
         if kind == NUMBER and term.type.unit != type_.unit:
             raise CalcError(f"mean() of {type_.named} and {term.type.named}")
         if kind != NUMBER:
-            type_ = type_._replace(target=rules.common(Term(type_, text=each[0].text), term, trees))
+            type_ = type_._replace(target=rules.common(Term(type_), term))
     kernel = _mean_parts(1 if kind == NUMBER else 3)
     return arithmetic(type_._replace(degrees=False), kernel, *map(rules.in_radians, each))
 
@@ -178,7 +176,7 @@ def _mean_pose(*parts: Number) -> Components:
     return (*shift, *xp.canonical_sign(*quaternion.largest_eigenvector(moment, xp)))
 
 
-def _dist(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+def _dist(name: str, terms: Sequence[Term]) -> Term:
     def points(*numbers: Number) -> Components:
         ax, ay, az, bx, by, bz, xp = numbers
         return (quaternion.magnitude(bx - ax, by - ay, bz - az, xp),)
@@ -187,13 +185,13 @@ def _dist(name: str, terms: Sequence[Term], trees: Trees) -> Term:
     if a.type.kind != b.type.kind:
         raise CalcError(f"{name}() compares two poses or two points, found {a.type.named} and {b.type.named}")
     if a.type.kind == POSE:
-        rules.one_target(a, b, f"{name}()", trees)
+        rules.one_target(a, b, f"{name}()")
         return made(LENGTH, lambda *numbers: (rigid.distance(*numbers)[0],), a, b)
-    rules.common(a, b, trees)
+    rules.common(a, b)
     return made(LENGTH, points, a, b)
 
 
-def _angle(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+def _angle(name: str, terms: Sequence[Term]) -> Term:
     def own(*pose: Number) -> Components:
         return (rigid.extent(*rules.unit_pose(*pose), pose[-1])[1],)
 
@@ -209,9 +207,9 @@ def _angle(name: str, terms: Sequence[Term], trees: Trees) -> Term:
     if (a.type.kind == POSE) != (b.type.kind == POSE):
         raise CalcError(f"{name}() compares two poses or two vectors, found {a.type.named} and {b.type.named}")
     if a.type.kind == POSE:
-        rules.one_target(a, b, f"{name}()", trees)
+        rules.one_target(a, b, f"{name}()")
         return made(ANGLE, poses, a, b)
-    rules.common(a, b, trees)
+    rules.common(a, b)
     return made(ANGLE, _between_vectors, a, b, check=_no_direction)
 
 
@@ -230,18 +228,18 @@ def _between_vectors(
     return (2.0 * floats.incline(apart, along, xp),)
 
 
-def _cross(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+def _cross(name: str, terms: Sequence[Term]) -> Term:
     a, b = (rules.need(each, rules.PLACED, name) for each in terms)
-    return arithmetic(Type(VECTOR, rules.common(a, b, trees)), quaternion.cross, a, b)
+    return arithmetic(Type(VECTOR, rules.common(a, b)), quaternion.cross, a, b)
 
 
-def _dot(name: str, terms: Sequence[Term], trees: Trees) -> Term:
+def _dot(name: str, terms: Sequence[Term]) -> Term:
     a, b = (rules.need(each, rules.PLACED, name) for each in terms)
-    rules.common(a, b, trees)
+    rules.common(a, b)
     return arithmetic(PLAIN_NUMBER, lambda ax, ay, az, bx, by, bz: (ax * bx + ay * by + az * bz,), a, b)
 
 
-def _inv(name: str, terms: Sequence[Term], _: Trees) -> Term:
+def _inv(name: str, terms: Sequence[Term]) -> Term:
     return rules.inverse(rules.need(terms[0], (POSE,), name))
 
 
@@ -276,5 +274,5 @@ FUNCTIONS = {
     "asin": Builtin(1, 1, "number", "angle of a sine", arc(arcsine, 1.0)),
     "acos": Builtin(1, 1, "number", "angle of a cosine", arc(arccosine, 1.0)),
     "atan": Builtin(1, 1, "number", "angle of a tangent", arc(arctangent, None)),
-    "sqrt": Builtin(1, 1, "number", "square root; that of m^2 is m", sqrt),
+    "sqrt": Builtin(1, 1, "number", "square root", sqrt),
 }

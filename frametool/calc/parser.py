@@ -22,21 +22,17 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    Dimension = tuple[float, float, float]  # exponents of metre, radian and second
-
 LONGEST = 1 << 16  # characters of an expression
 DEEPEST = 100  # levels of brackets, signs and exponents within one another
 RESERVED = ("row", "as", "in", "ans", "pi")
-PLAIN: Dimension = (0.0, 0.0, 0.0)
-METRE, RADIAN, SECOND = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+PLAIN, METRE, RADIAN, SECOND = "", "m", "rad", "s"
 # how many of the base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
-UNITS: dict[str, tuple[float, float, Dimension]] = {
+UNITS: dict[str, tuple[float, float, str]] = {
     "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
 TIME_UNITS = {"s": "", "ms": "e-3", "us": "e-6", "ns": "ns"}
-ATOMS = frozenset(("number", "lookup", "name", "column", "call", "pose", "list"))  # need no brackets anywhere
 ARROW = "<-"
 LOOKUP = "a look-up is written TARGET<-SOURCE"
 HINTS = {
@@ -188,7 +184,7 @@ class Branch(NamedTuple):
 
     kind: number, lookup, name, column, call, pose, list, chain, sign, power, as, in
     at: the place that a message about it points to
-    start, end: where its text stands; left, right: with the brackets around it
+    start, end: where its text stands, without brackets around it
     value: what it holds apart from its parts, by kind; parts: those in order
     """
 
@@ -196,15 +192,8 @@ class Branch(NamedTuple):
     at: int
     start: int
     end: int
-    left: int
-    right: int
     value: Any = None
     parts: tuple[Branch, ...] = ()
-
-    @classmethod
-    def of(cls, kind: str, at: int, start: int, end: int, value: Any = None, parts: tuple[Branch, ...] = ()) -> Branch:
-        """Return a part without brackets around it."""
-        return cls(kind, at, start, end, start, end, value, parts)
 
 
 class Line(NamedTuple):
@@ -327,7 +316,7 @@ class _Parser:
             parts.append(part())
         if not joined:
             return parts[0]
-        return Branch.of("chain", joined[0][1], parts[0].left, parts[-1].right, tuple(joined), tuple(parts))
+        return Branch("chain", joined[0][1], parts[0].start, parts[-1].end, tuple(joined), tuple(parts))
 
     def factor(self) -> Branch:
         """Read signs and what they stand before."""
@@ -337,7 +326,7 @@ class _Parser:
         self._deeper(token.start)
         below = self.factor()
         self.depth -= 1
-        return Branch.of("sign", token.start, token.start, below.right, token.text, (below,))
+        return Branch("sign", token.start, token.start, below.end, token.text, (below,))
 
     def power(self) -> Branch:
         """Read a value and its exponent."""
@@ -348,7 +337,7 @@ class _Parser:
         self._deeper(token.start)
         exponent = self.factor()
         self.depth -= 1
-        return Branch.of("power", token.start, base.left, exponent.right, None, (base, exponent))
+        return Branch("power", token.start, base.start, exponent.end, None, (base, exponent))
 
     def named(self) -> Branch:
         """Read a value and the frames that `as` or `in` gives it."""
@@ -362,7 +351,7 @@ class _Parser:
             if word.text == "in" and token.kind != "frame":
                 raise CalcError("in names one frame: .. in FRAME", token.start)
             value = token.frames or token.text
-            branch = Branch.of(word.text, word.start, branch.left, token.end, value, (branch,))
+            branch = Branch(word.text, word.start, branch.start, token.end, value, (branch,))
         self.depth = before
         return branch
 
@@ -373,24 +362,24 @@ class _Parser:
         if kind == "op" and text == "(":
             self._deeper(start)
             inside = self.sum()
-            close = self.expect(")")
+            self.expect(")")
             self.depth -= 1
-            return inside._replace(left=start, right=close.end)
+            return inside
         if kind == "op" and text == "[":
             parts, end = self._items("]", start)
-            return Branch.of("list", start, start, end, None, parts)
+            return Branch("list", start, start, end, None, parts)
         if kind == "number":
-            return Branch.of(kind, start, start, end, (text, token.unit))
+            return Branch(kind, start, start, end, (text, token.unit))
         if kind == "lookup":
             return self._lookup(token, start, "")
         if kind == "name" and self.has("("):
             self.take()
             parts, end = self._items(")", start)
-            return Branch.of("call", start, start, end, text, parts)
+            return Branch("call", start, start, end, text, parts)
         if kind == "name" and self.has("["):
             return self._asked(token)
         if kind in ("column", "pose") or (kind == "name" and text not in ("as", "in")):
-            return Branch.of(kind, start, start, end, text)
+            return Branch(kind, start, start, end, text)
         if kind == "end":
             raise CalcError("something is missing here", start)
         hint = "; a frame is asked for as TARGET<-SOURCE" if kind == "text" else ""
@@ -417,7 +406,7 @@ class _Parser:
             raise CalcError(f"expected a look-up like {name.text}[TARGET<-SOURCE]", token.start)
         branch = self._lookup(token, name.start, name.text)
         end = self.expect("]").end
-        return branch._replace(end=end, right=end)
+        return branch._replace(end=end)
 
     def _lookup(self, token: Token, start: int, tree: str) -> Branch:
         when: int | str | None = None
@@ -425,7 +414,7 @@ class _Parser:
         if self.has("@"):
             self.take()
             when, end = self._time()
-        return Branch.of("lookup", token.start, start, end, (token.frames, tree, when))
+        return Branch("lookup", token.start, start, end, (token.frames, tree, when))
 
     def _time(self) -> tuple[int | str, int]:
         """Read a time as nanoseconds, never through a float, or one of the words."""

@@ -1,13 +1,8 @@
-"""What the operators need and give: frames that touch, units that agree, and the kernels that then run.
-
-Where frames do not touch: what to write instead, found by trying, as texts that can be pasted.  There a term appears
-as it was typed: bound names by their names, literals as they are, look-ups in a named tree as d[..].
-"""
+"""What the operators need and give: frames that touch, units that agree, and the kernels that then run."""
 
 from __future__ import annotations
 
 import operator
-from contextlib import suppress
 from functools import partial
 from math import inf, nan
 from typing import TYPE_CHECKING
@@ -29,112 +24,17 @@ from frametool.calc.values import (
     made,
     meet,
 )
-from frametool.errors import LookupFailed, shown
+from frametool.errors import shown
 from frametool.geometry import floats, quaternion, rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.calc.parser import Dimension
     from frametool.calc.values import Kernel
-    from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Namespace, Number, Rigid
-    Trees = Sequence[tuple[str, Frames]]
 
-MOST = 2  # suggestions in one message
 PLACED = (POINT, VECTOR)
-
-
-def inverse_text(term: Term) -> str:
-    """Write the inverse of a term: that of an inverse is what was inverted."""
-    term = _simplest(term)
-    return f"inv({term.text})" if term.inverse_of is None else term.inverse_of.bracketed
-
-
-def _simplest(term: Term) -> Term:
-    """Return what was inverted twice."""
-    while term.inverse_of is not None and term.inverse_of.inverse_of is not None:
-        term = term.inverse_of.inverse_of
-    return term
-
-
-def _forms(term: Term) -> tuple[tuple[str, str | None, str | None], ...]:
-    """Return a pose and its inverse: text, target, source."""
-    target, source = term.type.target, term.type.source
-    return (_simplest(term).bracketed, target, source), (inverse_text(term), source, target)
-
-
-def rewritten_products(left: Term, right: Term) -> Iterator[str]:
-    """Yield the products of two poses, either inverted or not, in either order, whose frames touch."""
-    pairs = [(a, b) for a in _forms(left) for b in _forms(right)]
-    swapped = [(b, a) for a, b in pairs]
-    tried = [pairs[2], pairs[1], pairs[3], swapped[0], swapped[1], swapped[2], swapped[3]]
-    for (first, target, between), (second, touching, source) in tried:
-        if between is not None and between == touching:
-            yield f"{first} * {second}  (= {frame_text(target)}<-{frame_text(source)})"
-
-
-def for_product(left: Term, right: Term, trees: Trees) -> str:
-    """Say how two poses that do not touch can be multiplied."""
-    found = list(rewritten_products(left, right))[:MOST]
-    if found:
-        return f"frames that touch: {', or '.join(found)}"
-    between = _looked_up(left.type.source, right.type.target, trees)
-    return f"a lookup between them is missing: {between or _arrow(left.type.source, right.type.target)}"
-
-
-def for_point(pose: Term, point: Term, trees: Trees) -> str:
-    """Say how a point in another frame can be moved."""
-    if point.type.target == pose.type.target:
-        return f"{inverse_text(pose)} takes points in {frame_text(pose.type.target)}"
-    between = _looked_up(pose.type.source, point.type.target, trees)
-    return f"{between or _arrow(pose.type.source, point.type.target)} stands between"
-
-
-def for_same_frames(left: Term, right: Term) -> str:
-    """Say how two poses of different frames go together; "" where nothing is found."""
-    a, b = left.type, right.type
-    if a.target is not None and a.target == b.source and a.source == b.target:
-        return f"; {inverse_text(right)} is {frame_text(b.source)}<-{frame_text(b.target)}"
-    if a.target is not None and a.target == b.target and a.source != b.source:
-        seen = f"{frame_text(b.source)} seen from {frame_text(a.source)}"
-        return f"; for {seen}: {inverse_text(left)} * {_simplest(right).bracketed}"
-    return ""
-
-
-def for_one_target(left: Term, right: Term, trees: Trees) -> str:
-    """Say how two poses come to be seen from one frame; "" where nothing is found."""
-    a, b = left.type, right.type
-    if b.source == a.target:
-        return f"; write {inverse_text(right)} for the second"
-    if a.source == b.target:
-        return f"; write {inverse_text(left)} for the first"
-    if a.source is not None and a.source == b.source:
-        return f"; write inv(..) for both: {inverse_text(left)}, {inverse_text(right)}"
-    return for_other_frame(left, right, trees)
-
-
-def for_other_frame(left: Term, right: Term, trees: Trees) -> str:
-    """Say how the second of two points or vectors comes into the frame of the first."""
-    over = _looked_up(left.type.target, right.type.target, trees)
-    if over is None:
-        return f"; a lookup between them is missing: {_arrow(left.type.target, right.type.target)}"
-    return f"; bring the second over: ({over}) * {right.bracketed}"
-
-
-def _arrow(target: str | None, source: str | None) -> str:
-    return f"{frame_text(target)}<-{frame_text(source)}"
-
-
-def _looked_up(target: str | None, source: str | None, trees: Trees) -> str | None:
-    """Return a look-up of one of some trees, by name, that knows both frames; None where none does."""
-    for name, tree in trees:
-        if target in tree.frames and source in tree.frames:
-            with suppress(LookupFailed):
-                tree.lookup_components(str(target), str(source))
-                return f"{name}[{_arrow(target, source)}]" if name else _arrow(target, source)
-    return None
 
 
 def in_radians(term: Term) -> Term:
@@ -153,24 +53,21 @@ def wanted(term: Term) -> Term:
     return term
 
 
-def common(left: Term, right: Term, trees: Trees) -> str | None:
+def common(left: Term, right: Term) -> str | None:
     """Return the one frame that two points or vectors are seen in."""
     a, b = left.type, right.type
     if not meet(a.target, b.target):
-        hint = for_other_frame(left, right, trees)
-        raise CalcError(f"{a.named} and {b.named}: both must be seen from one frame{hint}")
+        raise CalcError(f"{a.named} and {b.named}: both must be seen from one frame")
     return a.target if a.target is not None else b.target
 
 
 def same_frames(terms: Sequence[Term], what: str) -> Type:
     """Return the frames that all of some poses have; refuse poses of different ones."""
-    first = terms[0]
-    type_ = first.type
+    type_ = terms[0].type
     for term in terms[1:]:
         other = term.type
         if not (meet(type_.target, other.target) and meet(type_.source, other.source)):
-            hint = for_same_frames(first, term)
-            raise CalcError(f"{what} needs two poses of the same frames, found {type_} and {other}{hint}")
+            raise CalcError(f"{what} needs two poses of the same frames, found {type_} and {other}")
         type_ = Type(
             POSE,
             other.target if type_.target is None else type_.target,
@@ -179,11 +76,10 @@ def same_frames(terms: Sequence[Term], what: str) -> Type:
     return type_
 
 
-def one_target(left: Term, right: Term, what: str, trees: Trees) -> None:
+def one_target(left: Term, right: Term, what: str) -> None:
     """Refuse two poses that are not seen from one frame; whose poses they are may differ."""
     if not meet(left.type.target, right.type.target):
-        hint = for_one_target(left, right, trees)
-        raise CalcError(f"{what} compares two poses seen from one frame, found {left.type} and {right.type}{hint}")
+        raise CalcError(f"{what} compares two poses seen from one frame, found {left.type} and {right.type}")
 
 
 def scalar(term: Term, what: str, *, angle: bool = False) -> Term:
@@ -225,19 +121,18 @@ def _no_division(*parts: float) -> str:
 # --- products ---
 
 
-def times(left: Term, right: Term, trees: Trees) -> Term:
+def times(left: Term, right: Term) -> Term:
     """Multiply: poses whose frames touch, a pose and what it moves, numbers, a number and a vector."""
     a, b = left.type.kind, right.type.kind
     if a == b == POSE:
-        return _composed(left, right, trees)
+        return _composed(left, right)
     if a == POSE and b in PLACED:
-        return _moved(left, right, trees)
+        return _moved(left, right)
     if a == b == NUMBER:
-        unit = _added(left.type.unit, right.type.unit)
-        if PLAIN in (left.type.unit, right.type.unit):  # degrees stay degrees
-            type_ = Type(NUMBER, unit=unit, degrees=left.type.degrees or right.type.degrees)
-            return arithmetic(type_, _TIMES, left, right)
-        return arithmetic(Type(NUMBER, unit=unit), _TIMES, in_radians(left), in_radians(right))
+        if PLAIN not in (left.type.unit, right.type.unit):
+            raise CalcError(f"cannot multiply {left.type.named} by {right.type.named}; units have no powers")
+        type_ = left.type if right.type.unit == PLAIN else right.type  # degrees stay degrees
+        return arithmetic(type_, _TIMES, left, right)
     if {a, b} == {NUMBER, VECTOR}:
         number, vector = (left, right) if a == NUMBER else (right, left)
         _require_scale(number)
@@ -251,20 +146,17 @@ def times(left: Term, right: Term, trees: Trees) -> Term:
     raise CalcError(f"cannot multiply {left.type.named} by {right.type.named}")
 
 
-def _composed(left: Term, right: Term, trees: Trees) -> Term:
+def _composed(left: Term, right: Term) -> Term:
     a, b = left.type, right.type
     if not meet(a.source, b.target):
-        apart = f"{shown(a.source)} and {shown(b.target)} do not touch"
-        raise CalcError(f"{a} * {b}: {apart}; {for_product(left, right, trees)}")
+        raise CalcError(f"{a} * {b}: {shown(a.source)} and {shown(b.target)} do not touch")
     return arithmetic(Type(POSE, a.target, b.source), rigid.compose, left, right)
 
 
-def _moved(pose: Term, point: Term, trees: Trees) -> Term:
+def _moved(pose: Term, point: Term) -> Term:
     a, b = pose.type, point.type
     if not meet(a.source, b.target):
-        what = f"{b.kind}s"
-        hint = for_point(pose, point, trees).replace("points", what)
-        raise CalcError(f"{a} takes {what} in {shown(a.source)}, found one in {shown(b.target)}; {hint}")
+        raise CalcError(f"{a} takes {b.kind}s in {shown(a.source)}, found one in {shown(b.target)}")
     kernel = rigid.apply if b.kind == POINT else _turned
     return arithmetic(Type(b.kind, a.target), kernel, pose, point)
 
@@ -274,27 +166,19 @@ def _require_scale(number: Term) -> None:
         raise CalcError(f"a vector is scaled by a plain number or a length, found {number.type.named}")
 
 
-def _added(a: Dimension, b: Dimension) -> Dimension:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def raised(unit: Dimension, power: float) -> Dimension:
-    """Return a power of a unit."""
-    return unit[0] * power, unit[1] * power, unit[2] * power
-
-
-def over(left: Term, right: Term, _: Trees) -> Term:
+def over(left: Term, right: Term) -> Term:
     """Divide by a number."""
     a, b = left.type, right.type
     if b.kind != NUMBER:
-        hint = f"; for poses: {inverse_text(right)} * {_simplest(left).bracketed}" if a.kind == b.kind == POSE else ""
-        raise CalcError(f"cannot divide by {b.named}{hint}")
+        raise CalcError(f"cannot divide by {b.named}")
     if a.kind == NUMBER:
-        type_ = Type(NUMBER, unit=_added(a.unit, raised(b.unit, -1.0)))
-        if b.unit == PLAIN or (a.degrees and b.degrees):
-            type_ = type_._replace(degrees=a.degrees and not b.degrees)
-            return arithmetic(type_, _OVER, left, right, check=_no_division)
-        return arithmetic(type_, _OVER, in_radians(left), in_radians(right), check=_no_division)
+        if b.unit not in (PLAIN, a.unit):
+            raise CalcError(f"cannot divide {a.named} by {b.named}")
+        if b.unit == PLAIN:
+            return arithmetic(a, _OVER, left, right, check=_no_division)
+        if a.degrees != b.degrees:
+            left, right = in_radians(left), in_radians(right)
+        return arithmetic(Type(NUMBER), _OVER, left, right, check=_no_division)
     if a.kind == VECTOR:
         _require_scale(right)
         return arithmetic(a, lambda x, y, z, n: (x / n, y / n, z / n), left, right, check=_no_division)
@@ -305,7 +189,7 @@ def over(left: Term, right: Term, _: Trees) -> Term:
 # --- sums ---
 
 
-def _sum(left: Term, right: Term, trees: Trees, *, adding: bool) -> Term:
+def _sum(left: Term, right: Term, *, adding: bool) -> Term:
     """Add or subtract what can be added."""
     a, b = left.type, right.type
     verb, sign, kernel = ("add", "+", _PLUS) if adding else ("subtract", "-", _MINUS)
@@ -316,7 +200,7 @@ def _sum(left: Term, right: Term, trees: Trees, *, adding: bool) -> Term:
             return arithmetic(a, kernel, left, right)
         return arithmetic(a._replace(degrees=False), kernel, in_radians(left), in_radians(right))
     if (a.kind in PLACED and b.kind in PLACED) or a.kind == b.kind == TWIST:
-        frame = common(left, right, trees)
+        frame = common(left, right)
         return arithmetic(Type(_kind_of_sum(a, b, adding=adding), frame), kernel, left, right)
     if POSE in (a.kind, b.kind):
         raise CalcError(f"poses are composed with *, not {sign}; the difference of two is inv(a) * b")
@@ -334,7 +218,7 @@ def _kind_of_sum(a: Type, b: Type, *, adding: bool) -> str:
     return a.kind if a.kind == b.kind else POINT
 
 
-OPERATORS: dict[str, Callable[[Term, Term, Trees], Term]] = {
+OPERATORS: dict[str, Callable[[Term, Term], Term]] = {
     "*": times,
     "/": over,
     "+": partial(_sum, adding=True),
@@ -366,8 +250,7 @@ def unsigned(term: Term) -> Term:
 
 def inverse(term: Term) -> Term:
     """Return b<-a of a<-b."""
-    found = arithmetic(Type(POSE, term.type.source, term.type.target), rigid.inverse, term)
-    return found._replace(inverse_of=term)
+    return arithmetic(Type(POSE, term.type.source, term.type.target), rigid.inverse, term)
 
 
 def power(base: Term, exponent: Term) -> Term:
@@ -386,11 +269,7 @@ def power(base: Term, exponent: Term) -> Term:
         return made(Type(POSE, a.target), _part_of_motion, base, exponent)
     if a.kind != NUMBER:
         raise CalcError(f"{a.named} has no powers; poses and numbers have")
-    if a.unit == PLAIN:
-        return made(a, _powered, base, exponent, check=_no_power)
-    if known is None:
-        raise CalcError(f"the exponent of {a.named} must be a number that is known")
-    return made(Type(NUMBER, unit=raised(a.unit, known)), _powered, in_radians(base), exponent, check=_no_power)
+    return made(scalar(base, "a power").type, _powered, base, exponent, check=_no_power)
 
 
 def _part_of_motion(*numbers: Number) -> Components:
@@ -444,7 +323,7 @@ def as_frames(term: Term, target: str | None, source: str | None) -> Term:
         raise CalcError(f"only a pose has two frames; found {type_.named}")
     if not (meet(type_.target, target) and meet(type_.source, source)):
         raise CalcError(f"this is {type_} already")
-    return term._replace(type=type_._replace(target=target, source=source), inverse_of=None)
+    return term._replace(type=type_._replace(target=target, source=source))
 
 
 def in_frame(term: Term, frame: str) -> Term:

@@ -17,7 +17,6 @@ from frametool.geometry.validation import single
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from frametool.calc.parser import Dimension
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Components, Namespace
 
@@ -33,13 +32,14 @@ class Type(NamedTuple):
     """What is known of a value without its numbers.
 
     target, source: the frames of a pose; a point, vector, twist or angles are seen in `target`
-    unit: the dimension of a number; degrees: an angle whose number counts degrees, so that right angles stay exact
+    unit: that of a number: m, rad, s or none
+    degrees: of an angle whose number counts degrees, so that right angles stay exact
     """
 
     kind: str
     target: str | None = None
     source: str | None = None
-    unit: Dimension = PLAIN
+    unit: str = PLAIN
     degrees: bool = False
 
     def __str__(self) -> str:
@@ -52,7 +52,7 @@ class Type(NamedTuple):
         if self.kind == POSE:
             return f"the pose {self}"
         if self.kind == NUMBER:
-            return "a number" if self.unit == PLAIN else f"a number in {unit_text(self.unit)}"
+            return "a number" if self.unit == PLAIN else f"a number in {self.unit}"
         if self.kind == LIST:
             return "a list"
         what = "angles" if self.kind == ANGLES else f"a {self.kind}"
@@ -79,8 +79,7 @@ class Term(NamedTuple):
     """A part of an expression, understood: its type, and its numbers, or what computes them from a row.
 
     parts: None where they depend on a row; items: those of a list; tree: what can be asked for look-ups
-    text: as it was written, for suggestions; atomic: it needs no brackets
-    inverse_of: what was inverted, where that is all
+    text: as it was written
     """
 
     type: Type
@@ -89,8 +88,6 @@ class Term(NamedTuple):
     items: tuple[Term, ...] = ()
     tree: Frames | None = None
     text: str = ""
-    atomic: bool = True
-    inverse_of: Term | None = None
 
     def at(self, row: RowValues | None) -> Components:
         """Return the numbers, of a row where they depend on it."""
@@ -99,12 +96,6 @@ class Term(NamedTuple):
         if row is None or self.compute is None:
             raise CalcError("row is known in streams only: -i FILE, or standard input")
         return self.compute(row)
-
-    @property
-    def bracketed(self) -> str:
-        """Return its text, in brackets unless it needs none."""
-        return self.text if self.atomic else f"({self.text})"
-
 
 def arithmetic(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
     """Do as `made` with a kernel that needs no namespace."""
@@ -165,11 +156,3 @@ def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
 def meet(a: str | None, b: str | None) -> bool:
     """Tell whether two frames can be one."""
     return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)
-
-
-def unit_text(unit: Dimension) -> str:
-    """Write a dimension: `m`, `m^2`, `m/s`; "" for a plain number."""
-    powers = [(name, power) for name, power in zip(("m", "rad", "s"), unit, strict=True) if power]
-    above = [f"{name}^{power:g}" if power != 1.0 else name for name, power in powers if power > 0.0]
-    below = [f"{name}^{-power:g}" if power != -1.0 else name for name, power in powers if power < 0.0]
-    return "/".join(["*".join(above) or "1", *below]) if below else "*".join(above)

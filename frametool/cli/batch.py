@@ -143,7 +143,7 @@ def print_as_json(name: str, context: click.Context) -> None:
     if "json" not in getattr(formats, "choices", ()):
         raise Misused(f"{name}: {context.info_name} has no result that can be kept; {KEPT_ARE}")
     params = context.params
-    for param, option in (("output", "-o FILE"), ("explain", "--explain"), ("explain_full", "--explain-full")):
+    for param, option in (("output", "-o FILE"), ("explain", "--explain")):
         if params.get(param):
             raise Misused(f"{name}: a result is kept or written, not both; leave {option} or {name} = out")
     if params["format_name"] not in (None, *READABLE):

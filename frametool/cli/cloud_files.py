@@ -131,7 +131,7 @@ class BagOfClouds:
 
 
 _NOT_OF_SEVERAL = (
-    "columns", "keep", "prefix", "given", "header", "jobs", "frame_column", "time_column", "kinds",
+    "columns", "keep", "prefix", "given", "header", "frame_column", "time_column", "kinds",
 )  # fmt: skip
 
 

@@ -24,16 +24,13 @@ if TYPE_CHECKING:
     from frametool.explain.render import Explanation
     from frametool.stream.request import Request
 
-FORMS = ("text", "markdown", "latex")
+FORMS = ("text", "markdown")
 ONE_RECORD = "--explain derives one record; write it as an argument"
 EXPLAIN = click.option(
     "--explain", type=click.Choice(FORMS), metavar="[=FORM]", help="derive the result step by step (help explain)",
 )  # fmt: skip
 
 
-explain_options = together(
-    EXPLAIN, click.option("--explain-full", is_flag=True, help="that with all products of long chains")
-)
 pose_stream_options = together(stream_options, pose_reading_options)
 
 
@@ -44,12 +41,8 @@ class PoseTask:
     """
 
     def __init__(self, options: dict[str, Any], *what: str) -> None:
-        """Take the options out of a command's; `--explain-full` alone wants text.
-
-        what: the results that the command writes
-        """
-        self._every: bool = options.pop("explain_full", False)
-        self._form: str = options.pop("explain", None) or ("text" if self._every else "")
+        """Take the options out of a command's; `what` are the results that the command writes."""
+        self._form: str = options.pop("explain", None) or ""
         self._precision: int | None = options["precision"]
         self.derives = bool(self._form)
         self.normalize: bool = options.pop("normalize")
@@ -123,7 +116,7 @@ class PoseTask:
             instead = f"{', '.join(FORMS)}, not {self.output.told}"
             raise click.UsageError(f"--explain writes {instead}; leave one of them out")
         refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "edges"} - {"given", "quiet"}))
-        return DerivationStyle(self.output.style, significant(self._precision), self._every)
+        return DerivationStyle(self.output.style, significant(self._precision))
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> Given:
         """Read the one pose of an argument as it is written.

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import iter_params_for_processing
 
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
@@ -139,19 +138,19 @@ HELP_ALL = click.Option(
 GROUPS = {
     "Files (help formats)": ("input_forms", "more", "with_a", "with_b", "topics", "quiet", "verbose"),
     "Time (help time)": (
-        "at", "times", "source_at", "fixed", "time_column", "moving", "cache", "tf2",
+        "at", "times", "source_at", "fixed", "time_column", "moving", "cache",
         "start", "stop", "time_offset",
     ),
     "Rotations (help rotations, help earth)": (
         "given", "notations", "deg", "normalize", "keep_sign", "local_axes", "origin", "zone",
     ),
     "Rows (help streams)": (
-        "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "jobs", "unwrap", "frame_column",
+        "input_path", "columns", "keep", "prefix", "on_error", "max_errors", "header", "unwrap", "frame_column",
         "target_column", "source_column",
     ),
     "Result (help errors)": (
         "output", "force", "precision", "covariance", "messages", "topic_out", "recorded_frames", "explain",
-        "explain_full", "explain_step", "color",
+        "explain_step", "color",
     ),
     "Forms that leave something open (help formats)": (
         "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "edges", "order",
@@ -168,7 +167,7 @@ OWN = {
     "apply": ("at", "time_column", "frame_column", "input_path", "output", "covariance"), "calc": ("input_path",),
     "fk": ("input_path", "joints"), "tree": ("at", "notations", "joints"), "view": ("at", "fixed", "output"),
     "resample": ("times",), "diff": ("at", "with_a", "with_b"),
-    "record": ("more", "topics", "on_error", "output"), "sweep": ("gain_linear", "gain_angular"),
+    "record": ("more", "topics", "on_error", "output"),
 }  # fmt: skip
 WIDEST = 24  # of the left column
 LONGEST_CHOICE = 14  # of choices beside their option
@@ -337,7 +336,7 @@ def called(arguments: list[str]) -> object:
 def called_in(
     parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None] | None = None
 ) -> object:
-    """Call the command that words begin with, as `called` does, without making a context for the group.
+    """Call the command that words begin with, in a context of the group that is there.
 
     parent: context of the group
     prepare: is shown the command's context before it runs
@@ -362,11 +361,14 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    from frametool.cli.replaced import replacement
+
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     if isinstance(error, click.NoSuchOption):  # each version of click has its own words
         name, near = error.option_name, error.possibilities or ()
         message = f"no such option {shown(name)}{did_you_mean(name, near)}"
+    message = replacement(arguments) or message
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():
@@ -375,82 +377,3 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
         return message
     pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
     return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
-
-
-class Prepared(NamedTuple):
-    """What does not change from one call of a command to the next.
-
-    parser: click's, in which short names are found at once
-    absent: what the parser says of arguments that are not there
-    values, settings: what parameters that are not there leave in a context
-    """
-
-    parser: Any
-    absent: Mapping[str, Any]
-    values: Mapping[str, Any]
-    settings: CommandSettings
-
-
-class Reused(click.Command):
-    """A command that is parsed by click at its first call, and with what that left at all others.
-
-    There is no second list of options: a value that is in the arguments is processed by its parameter, and one that is
-    not is what click made of an empty line. So its parameters must not change, and their callbacks must do no more for
-    an absent value than keep it in the settings.
-    """
-
-    _calls = 0
-    _params: list[click.Parameter] | None = None
-    _prepared: Prepared | None = None
-
-    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return the parameters, collected and checked once."""
-        if self._params is None:
-            self._params = super().get_params(ctx)
-        return self._params
-
-    def make_parser(self, ctx: click.Context) -> Any:
-        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
-        parser: Any = super().make_parser(ctx)
-        parse = parser.parse_args
-
-        def parse_once(args: list[str]) -> Any:
-            found = parse(args=args)
-            told = [] if ctx.resilient_parsing else found[2]
-            for each in told:
-                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
-                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
-            return found
-
-        parser.parse_args = parse_once
-        return parser
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse as click does; only parameters that stand in the arguments are processed anew."""
-        self._calls += 1
-        is_first = self._calls == 1  # and the only one in most processes
-        if is_first or ctx.resilient_parsing or any(each[2:3] == "=" for each in args):  # -f=x is no -f x
-            return super().parse_args(ctx, args)
-        self._prepared = self._prepared or self._prepare(ctx)
-        parser, absent, values, unset = self._prepared
-        parser.ctx = ctx
-        given, rest, order = parser.parse_args(args=list(args))
-        if rest or not args:
-            return super().parse_args(ctx, args)  # has the words for what is wrong
-        vars(settings(ctx)).update(vars(unset))
-        names = {name for name, value in given.items() if name not in absent or value is not absent[name]}
-        wanted = [each for each in self.get_params(ctx) if each.required or each.name in names]
-        for param in iter_params_for_processing(order, wanted):
-            param.handle_parse_result(ctx, given, rest)
-        ctx.params = {**values, **ctx.params}
-        ctx.args = []
-        return []
-
-    def _prepare(self, ctx: click.Context) -> Prepared:
-        """Parse no arguments, once, without what may not be missing."""
-        optional: list[click.Parameter] = [each for each in self.get_params(ctx) if not each.required]
-        empty = click.Command(None, params=optional, add_help_option=False).make_context("", [])
-        parser = self.make_parser(ctx)
-        # click looks for -f among the long names first, and fails with all that an error message needs
-        parser._long_opt.update(parser._short_opt)  # noqa: SLF001
-        return Prepared(parser, parser.parse_args(args=[])[0], empty.params, settings(empty))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, settings
+from frametool.cli.group import WithHelp, keep_setting, refuse_unused, settings
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -41,12 +41,28 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup,
 NEEDS = {"force": ("output", "plot", "report", "view"), "tolerance": ("find",)}
 
 
-class Command(WithHelp, Reused):
+class Command(WithHelp):
     """A command whose arguments may be negative numbers.
 
     click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
     own check of misspelled options; `Text` takes the blank off again.
     """
+
+    def make_parser(self, ctx: click.Context) -> Any:
+        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
+        parser: Any = super().make_parser(ctx)
+        parse = parser.parse_args
+
+        def parse_once(args: list[str]) -> Any:
+            found = parse(args=args)
+            told = [] if ctx.resilient_parsing else found[2]
+            for each in told:
+                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
+                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
+            return found
+
+        parser.parse_args = parse_once
+        return parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
@@ -76,7 +92,7 @@ class Command(WithHelp, Reused):
 
 
 # options that may stand bare, and their values: the first is what they mean then
-OPTIONAL = {"--explain": ("text", "markdown", "latex"), "--rows": ("ate", "rpe", "kitti")}
+OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
 
 OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
@@ -489,7 +505,6 @@ def pose_result_options(*what: str) -> Callable[[Function], Function]:
 # --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
-POLICIES = ("ros1", "ros2")
 MOST_TIMES = 100_000_000
 MOST_TOLD = 10  # times without a result
 
@@ -582,7 +597,6 @@ rules_options = together(
     click.option(
         "--cache", type=Time(latest=False), metavar="SECONDS", help="forget what is older  [default: nothing]"
     ),
-    click.option("--tf2", type=click.Choice(POLICIES), help="take, refuse and complain as tf2 does"),
 )
 times_option = click.option(
     "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or the stamps of FILE"
@@ -619,20 +633,18 @@ def window_of(start: int | None, stop: int | None, column: str | None = None) ->
     return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
 
 
-def rules(*, moving: bool, cache: int | None, tf2: str | None, normalize: bool = False) -> Rules:
+def rules(*, moving: bool, cache: int | None, normalize: bool = False) -> Rules:
     """Collect what the options say about how frames are taken."""
-    if tf2 is not None and normalize:
-        raise click.UsageError("--tf2 takes rotations as tf2 does; leave --normalize out")
     if cache is not None and cache < 0:
         raise click.UsageError("--cache takes seconds, not less than 0")
     from frametool.formats.load import Rules
 
-    return Rules(moving=moving, policy=tf2 or "frametool", keep_ns=cache, normalize=normalize)
+    return Rules(moving=moving, keep_ns=cache, normalize=normalize)
 
 
 def rules_of(options: dict[str, Any]) -> Rules:
     """Take out of a command's options what they say about how frames are taken."""
-    return rules(**{name: options.pop(name) for name in ("moving", "cache", "tf2", "normalize") if name in options})
+    return rules(**{name: options.pop(name) for name in ("moving", "cache", "normalize") if name in options})
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

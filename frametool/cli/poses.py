@@ -313,8 +313,8 @@ class ArgumentPoses(NamedTuple):
         """Return the poses alone; tell what was odd, and what else stood there, but stamps that count as `timed`."""
         from frametool.grammar.names import stamp_column
 
-        for message, rule, kind in self.odd:
-            warn(message, rule=rule, kind=kind)
+        for message, rule in self.odd:
+            warn(message, rule=rule)
         left_out = [key for key in sorted(self.beside) if not (timed and stamp_column([key]) is not None)]
         if left_out:
             warn(f"{self.source.name}: {', '.join(map(shown, left_out))} left out: only its pose is used")

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 _DOLLAR = rf"\$(?:{NAME}|\{{[^}}]*\}}|[$({{0-9@*\#?!-])?"
-_SPECIAL = re.compile(r"[\\'\"#$|&;<>`~]")
 _TOKEN = re.compile(
     rf"""(?xs)
       (?P<blank> [ \t\r\n]+)
@@ -70,8 +69,6 @@ class ShellWords(NamedTuple):
 
 def split(line: str) -> ShellWords:
     """Take a line apart; a `#` that begins a word begins a comment."""
-    if not _SPECIAL.search(line):
-        return ShellWords([[WordPart(word)] for word in line.replace("\t", " ").split(" ") if word])
     words: list[list[WordPart]] = []
     word: list[WordPart] | None = None
     problem = ""

@@ -46,16 +46,6 @@ SECONDS = Parsed("seconds", parse_seconds)
 DURATION = Parsed("seconds", lambda text: math.inf if text == "inf" else parse_seconds(text))
 LEADER = click.option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
                       help="still, circle, square, figure8, random, a file of commands, or - for standard input")
-LAW = click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
-                   help="the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)")
-RATE = click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second")
-MAX_LINEAR = click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]")
-MAX_ANGULAR = click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]")
-SPAWN = click.option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
-                     help="where turtle2 begins: metres, radians (or 90deg)")
-SEED = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader")
-REACH = click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
-                     help="metres that count as having come to the target")
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
@@ -63,39 +53,39 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
     options = [
         click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
                      help="each follows the one before, the first follows turtle1"),
-        LAW,
-        RATE,
+        click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
+                     help="the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)"),
+        click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second"),
         click.option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
         click.option("--gain-angular", type=NUMBER, metavar="K", help="turn rate for each radian of bearing"),
-        MAX_LINEAR,
-        MAX_ANGULAR,
+        click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]"),
+        click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]"),
         click.option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
                      help="the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m"),
         click.option("--delay", type=SECONDS, default=0.0, metavar="S",
                      help="follow where the target was so long ago, looked up through world  [default: 0]"),
-        SPAWN,
+        click.option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
+                     help="where turtle2 begins: metres, radians (or 90deg)"),
         click.option("--duration", type=DURATION, default=duration, show_default=True, metavar="S",
                      help="simulated seconds, or inf"),
         click.option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
                      help="whose turtlesim"),
         click.option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
-        SEED,
+        click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader"),
     ]  # fmt: skip
     return together(*options)
 
 
-def sweep_options(function: Any) -> Any:
-    """Add to a command the options of one run for each pair of gains."""
-    duration = click.option(
-        "--duration", type=DURATION, default="20", show_default=True, metavar="S", help="simulated seconds"
-    )
-    options = (LEADER, LAW, RATE, MAX_LINEAR, MAX_ANGULAR, SPAWN, duration, REACH, SEED, format_options)
-    return together(*options)(function)
-
-
-def format_options(function: Any) -> Any:
-    """Add to a command the options that say in which form, and where to, its result is written."""
+def output_options(function: Any) -> Any:
+    """Add to a command the options that say what is shown of a run."""
     options = (
+        click.option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
+                     help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
+        click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
+                     help="metres that count as having come to the target"),
+        click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
+        click.option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
+        click.option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
         click.option("-f", "--format", "format_name", type=click.Choice(FORMS),
                      help="form of the records  [default: text on a terminal, yaml otherwise]"),
         click.option("--precision", type=Digits(), metavar="N|full",
@@ -104,20 +94,6 @@ def format_options(function: Any) -> Any:
                      help="write there instead of stdout, whole or not at all"),
         click.option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
         click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
-    )  # fmt: skip
-    return together(*options)(function)
-
-
-def output_options(function: Any) -> Any:
-    """Add to a command the options that say what is shown of a run."""
-    options = (
-        click.option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
-                     help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
-        REACH,
-        click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
-        click.option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
-        click.option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
-        format_options,
     )  # fmt: skip
     return together(*options)(function)
 
@@ -250,7 +226,7 @@ def suffix_of(path: str) -> str:
     return os.path.splitext(path)[1].lower()
 
 
-def check_files(plot: str | None, output: str | None, view: str | None = None, *, force: bool) -> None:
+def check_files(plot: str | None, output: str | None, view: str | None, *, force: bool) -> None:
     """Refuse before any work what could not be written after it.
 
     Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.

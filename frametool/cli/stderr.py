@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FrametoolError, FrametoolWarning, Tf2Warning, printable
+from frametool.errors import FrametoolError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -75,8 +75,8 @@ def folded(line: str) -> str:
     return fill(line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
-def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = FrametoolWarning) -> None:
-    """Write a warning; what tf2 would have logged stands there in its own words.
+def say_warning(message: str, rule: str = "") -> None:
+    """Write a warning.
 
     With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
     """
@@ -85,10 +85,7 @@ def say_warning(message: str, rule: str = "", kind: type[FrametoolWarning] = Fra
 
         if settings().quiet:
             return
-    if kind is Tf2Warning:
-        tell(printable(message))
-    else:
-        _tell_folded(f"frametool: {_place()}warning: {message}")
+    _tell_folded(f"frametool: {_place()}warning: {message}")
 
 
 def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
@@ -99,10 +96,7 @@ def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
     if in_json:
         tell(as_json(error, _lines[-1] if _lines else None, fate))
         return
-    first, *rest = str(error).split("\n") if error.many_lines else [str(error)]
-    tell(printable(f"frametool: {_place()}{f'{first} ({fate})' if fate else first}"))
-    for line in rest:
-        tell(printable(line))
+    tell(printable(f"frametool: {_place()}{error}{f' ({fate})' if fate else ''}"))
     if snippet := getattr(error, "snippet", ""):
         tell(snippet)
 

@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound=Callable[..., Any])
     About = Callable[[], str] | None  # what else there is to say of a form
 
-MOST_JOBS = 256
 BAGS = (".bag", ".mcap", ".db3")
 _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
@@ -81,10 +80,6 @@ OPTIONS = {
     "max_errors": click.option(
         "--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
         help="report at most N bad rows, count all",
-    ),
-    "jobs": click.option(
-        "--jobs", type=click.IntRange(0, MOST_JOBS), default=1, show_default=True, metavar="N",
-        help="processes for a stream; 0 is all cores",
     ),
     "quiet": click.option(
         "--quiet", is_flag=True, callback=keep_setting, help="no progress and no word on forms on stderr"
@@ -292,7 +287,6 @@ class Stream:
         from frametool.grammar.edges import Options, Tally, Topics
         from frametool.stream.column_stream import run_columns
 
-        self._jobs(f"{form} holds numbers, no text")
         if output.path is None and request.gathered is None and sys.stdout.isatty():
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
@@ -317,7 +311,6 @@ class Stream:
         target = output.told or (form if keeps else "csv")
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
-        self._jobs(f"rows become {target} one after the other")
         request = request._replace(by_default=not output.notations)
         converted = FormatConverter(form, request, output.style.in_form(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.options["header"])
@@ -327,14 +320,13 @@ class Stream:
         """Put the results where the numbers stood; all other text stays."""
         if request.gathered is not None:
             request = request._replace(notations=())
-        jobs = self._jobs("each row needs those before it" if request.in_order else "")
         if form in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, form, request, source=self.name, jobs=jobs), None
+            return run_records(stream, form, request, source=self.name), None
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, form, request, source=self.name, header=self.options["header"], jobs=jobs), None
+        return run_table(stream, form, request, source=self.name, header=self.options["header"]), None
 
     def _says_columns(self) -> bool:
         """Tell whether an option says that the stream is a table."""
@@ -363,7 +355,6 @@ class Stream:
         """Write the results of records in another form than theirs."""
         from frametool.stream.record_results import stream_results
 
-        self._jobs(f"records become {output.told} one after the other")
         if self.options["on_error"] == NULL and output.told not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
         bad = self.policy(self.name)
@@ -413,22 +404,9 @@ class Stream:
             nullcontext(lambda _: None) if gathers else output.opened() as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
             self.opened(),  # closed before a file takes its place, which Windows asks for
-            closing(outcomes),  # ends the processes of --jobs
+            closing(outcomes),
         ):
             return run(outcomes, write, self.policy(self.name, counted), progress.advance)
-
-    def _jobs(self, obstacle: str) -> int:
-        """Return how many processes do the work: one where something is in the way of more, which is said."""
-        if self.options["jobs"] == 1:
-            return 1
-        from frametool.stream.workers import can_spread, cores
-
-        jobs: int = min(self.options["jobs"] or cores(), MOST_JOBS)
-        obstacle = obstacle or ("" if can_spread() else "this system cannot fork processes")
-        if jobs == 1 or not obstacle:
-            return jobs
-        say(f"--jobs does not help here: {obstacle}; one process does the work")
-        return 1
 
 
 def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:

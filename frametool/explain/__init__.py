@@ -1,4 +1,4 @@
-"""How a result came about: the derivation step by step with the numbers of this run, as text, Markdown or LaTeX.
+"""How a result came about: the derivation step by step with the numbers of this run, as text or Markdown.
 
 The room is a function too, because `frametool.explain(..)` and `frametool.explain.api` share a name.
 """

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 
 def explain(
-    operation: str, *operands: Any, to: str = "quaternion", precision: int | None = DIGITS, full: bool = False,
-    degrees: bool = False, keep_sign: bool = False, **options: Any,
+    operation: str, *operands: Any, to: str = "quaternion", precision: int | None = DIGITS, degrees: bool = False,
+    keep_sign: bool = False, **options: Any,
 ) -> Explanation:  # fmt: skip
     """Derive what an operation does, step by step: formula, formula with these numbers, value with its unit.
 
@@ -36,8 +36,8 @@ def explain(
     operation, operands: convert POSE; compose POSE ..; invert POSE; relative A B; interpolate A B FRACTION;
         lookup TREE TARGET SOURCE (at_ns, source_at_ns, fixed); apply TREE TARGET SOURCE RECORD (at_ns, kind) or apply
         POSE RECORD (kind); follow STEPS of `follow_steps`.  A POSE is a mapping, its text, a Transform or a Rotation.
-    to: notations separated by commas.  precision: significant digits, None for all.  full: also all products of long
-    chains.  degrees: bare angles are in degrees, in and out.
+    to: notations separated by commas.  precision: significant digits, None for all.  degrees: bare angles are in
+    degrees, in and out.
     Raises ValueInvalid; what the operation raises.
     """
     if operation not in OPERATIONS:
@@ -45,7 +45,7 @@ def explain(
     if precision is not None and precision < 1:
         raise ValueInvalid(f"precision counts significant digits, 1 or more; found {precision}")
     chosen = tuple(form for spec in to.split(",") for form in notations(spec.strip()))
-    plan = DerivationStyle(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision, full)
+    plan = DerivationStyle(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision)
     try:
         signature(OPERATIONS[operation]).bind(plan, *operands, **options)
     except TypeError as error:

@@ -7,17 +7,14 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from frametool.errors import printable
-from frametool.explain.formula_tree import latex_number
 from frametool.explain.operations import between, compose, inverse
-from frametool.explain.sheet import upright
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import floats, rigid
 from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.explain.sheet import Matrix, Sheet
+    from frametool.explain.sheet import Sheet
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack, Track
     from frametool.geometry.types import Rigid
@@ -25,7 +22,6 @@ if TYPE_CHECKING:
     Sample = tuple[int, str, Rigid]
     Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
 
-MOST_SHOWN = 3  # edges of a chain whose products are written out
 STORED = "A stored edge is the pose of the child in its parent; it maps points in the child to points in the parent."
 
 
@@ -49,13 +45,12 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
     moving = [track for child in (*down, *up) if not (track := tracks[child]).standing]
     if moving and at_ns is not None:
         _say_time(sheet, moving, at_ns)
-    brief = len(tracks) > MOST_SHOWN and not sheet.every
     for child in (*down, *reversed(up)):
         if (track := tracks[child]).standing:
             sheet.reached(track.components[:3])
             sheet.say(f"{printable(track.parent)}_from_{printable(child)}: {_line(sheet, track.components)}")
-    edges = {child: _edge(sheet, tracks[child], at_ns or 0, brief=brief) for child in (*down, *up)}
-    return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)], brief=brief)
+    edges = {child: _edge(sheet, tracks[child], at_ns or 0) for child in (*down, *up)}
+    return _joined(sheet, [edges[each] for each in down], [edges[each] for each in reversed(up)])
 
 
 def _line(sheet: Sheet, pose: Rigid) -> str:
@@ -99,7 +94,7 @@ def _say_time(sheet: Sheet, moving: Sequence[MovingTrack], at_ns: int) -> None:
     sheet.say(text)
 
 
-def _edge(sheet: Sheet, track: Track, at_ns: int, *, brief: bool) -> Edge:
+def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
     """Return an edge as it is at a time, with the steps to it if it moves."""
     if track.standing:
         return printable(track.parent), printable(track.child), track.components
@@ -109,7 +104,7 @@ def _edge(sheet: Sheet, track: Track, at_ns: int, *, brief: bool) -> Edge:
     if after is not None and before[0] != at_ns and after[1] == before[1]:
         sheet.reached(after[2][:3])
         with sheet.about(edge):
-            return printable(before[1]), printable(track.child), _interpolated(sheet, before, after, at_ns, brief=brief)
+            return printable(before[1]), printable(track.child), _interpolated(sheet, before, after, at_ns)
     text = f"{edge}: {_line(sheet, before[2])}, the sample at {format_stamp(before[0])}"
     if after is not None and before[0] != at_ns:
         text += (
@@ -137,43 +132,30 @@ def fraction(sheet: Sheet, begin_ns: int, end_ns: int, at_ns: int) -> float:
     return sheet.step(values, "f", "past/gap")
 
 
-def _interpolated(sheet: Sheet, before: Sample, after: Sample, at_ns: int, *, brief: bool) -> Rigid:
+def _interpolated(sheet: Sheet, before: Sample, after: Sample, at_ns: int) -> Rigid:
     """Go from one sample towards the next."""
     (begin, _, a), (end, _, b) = before, after
     sheet.heading("the two samples around the time")
     f = fraction(sheet, begin, end, at_ns)
     sheet.say(f"a: {_line(sheet, a)}")
     sheet.say(f"b: {_line(sheet, b)}")
-    if not brief:
-        return between(sheet, a, b, f)
-    found = rigid.interpolate(*a, *b, f, floats)
-    x, y, z = (sheet.inner((1.0 - f, f), pair) for pair in zip(a[:3], b[:3], strict=True))
-    weights = f"{sheet.number(1.0 - f)}·", f"{sheet.number(f)}·"
-    parts: list[str | Matrix] = [weights[0], upright(a[:3]), "+", weights[1], upright(b[:3]), "=", upright((x, y, z))]
-    sheet.grid("t", "(1 - f) ta + f tb", r"(1 - f)\,t_a + f\,t_b", parts, "m")
-    number, name = sheet.number(f), r"\operatorname{slerp}"
-    latex = rf"{name}\left(%s, %s, {latex_number(number)}\right)"
-    text = "slerp(a, b, f)", f"slerp(%s, %s, {number})"
-    sheet.quaternions(text, (f"{name}(a, b, f)", latex), a[3:], b[3:], found[3:])
-    return x, y, z, *found[3:]
+    return between(sheet, a, b, f)
 
 
-def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge], *, brief: bool) -> Rigid:
+def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge]) -> Rigid:
     """Multiply both branches and join them; where the branch to the target is empty nothing is inverted."""
-    if brief:
-        sheet.say("A long chain: one product a line; --explain-full writes every product out.")
-    products = [_product(sheet, edges, brief=brief) for edges in (to_target, to_source) if edges]
+    products = [_product(sheet, edges) for edges in (to_target, to_source) if edges]
     top, target, pose = products[0]
     if not to_target:
         return pose
     back = inverse(sheet, pose, top, target)
-    return compose(sheet, back, products[1][2], (target, top, products[1][1]), brief=brief) if to_source else back
+    return compose(sheet, back, products[1][2], (target, top, products[1][1])) if to_source else back
 
 
-def _product(sheet: Sheet, edges: list[Edge], *, brief: bool) -> Edge:
+def _product(sheet: Sheet, edges: list[Edge]) -> Edge:
     """Multiply the edges of a branch, topmost first."""
     top, here, pose = edges[0]
     for _, child, edge in edges[1:]:
-        pose = compose(sheet, pose, edge, (top, here, child), brief=brief)
+        pose = compose(sheet, pose, edge, (top, here, child))
         here = child
     return top, here, pose

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain import operations
-from frametool.explain.chain import MOST_SHOWN, chain
+from frametool.explain.chain import chain
 from frametool.explain.from_quaternion import blocks_of, run
 from frametool.explain.given import Given, frames_of, given_of
 from frametool.explain.render import Explanation
 from frametool.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
-from frametool.explain.to_quaternion import SHORT
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
@@ -54,12 +53,10 @@ class DerivationStyle(NamedTuple):
 
     style: notations, unit and sign of the result
     digits: significant ones; None for all
-    every: all products of long chains are written out
     """
 
     style: Style
     digits: int | None = DIGITS
-    every: bool = False
 
     @property
     def notations(self) -> Sequence[Notation]:
@@ -70,7 +67,7 @@ class DerivationStyle(NamedTuple):
 def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
     """Write a derivation; where setting noise to 0 leads too far away, as near singular numbers, without that."""
     for clean in dict.fromkeys((plan.digits is not None, False)):
-        sheet = Sheet(plan.digits, clean=clean, every=plan.every)
+        sheet = Sheet(plan.digits, clean=clean)
         try:
             write(sheet)
             break
@@ -170,16 +167,11 @@ def convert(
 
     def write(sheet: Sheet) -> None:
         sheet.reached(pose.position)
-        hub: Rigid | None = None
+        hub = _hub(sheet, pose, change)
+        if result.pose.position is not None:
+            check_vector(sheet, hub[:3], result.pose.position)
         for form in plan.notations:
-            numbers = None if change or pose.inverse else _short_way(sheet, pose, form, plan)
-            if numbers is None:
-                if hub is None:
-                    hub = _hub(sheet, pose, change)
-                    if result.pose.position is not None:
-                        check_vector(sheet, hub[:3], result.pose.position)
-                numbers = written(sheet, hub[3:], form, plan)
-            check_rotation(sheet, form, numbers, result, plan)
+            check_rotation(sheet, form, written(sheet, hub[3:], form, plan), result, plan)
         end(sheet, result, plan)
 
     title = "identity" if pose.notation is None else pose.notation.spec
@@ -194,20 +186,6 @@ def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
     if given.inverse:
         pose = operations.inverse(sheet, pose, "child", "parent")
     return pose if change is None else operations.with_other_axes(sheet, pose, change)
-
-
-def _short_way(sheet: Sheet, given: Given, form: Notation, plan: DerivationStyle) -> Sequence[float] | None:
-    """Add the way that passes the quaternion by, where there is one."""
-    if given.notation is None:
-        return None
-    way = SHORT.get((given.notation.representation.name, form.representation.name))
-    if way is None:
-        return None
-    wanted = plan.style.in_degrees(form)
-    numbers: Sequence[float] | None = run(
-        way, sheet, given.numbers, given.notation, degrees=given.degrees, wanted_degrees=wanted
-    )
-    return numbers
 
 
 def _say_given(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
@@ -226,16 +204,11 @@ def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
     labels = list(itertools.pairwise(names))
 
     def write(sheet: Sheet) -> None:
-        brief = len(poses) > MOST_SHOWN and not sheet.every
         _say_given(sheet, poses, labels)
-        if brief:
-            sheet.say("A long chain: one product a line; --explain-full writes every product out.")
-            factors: list[Rigid] = [each.pose.components for each in poses]
-        else:
-            factors = [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
+        factors = [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
         pose = factors[0]
         for at, factor in enumerate(factors[1:], 1):
-            pose = operations.compose(sheet, pose, factor, (names[0], names[at], names[at + 1]), brief=brief)
+            pose = operations.compose(sheet, pose, factor, (names[0], names[at], names[at + 1]))
         end_with_pose(sheet, pose, own, plan)
 
     return explained(plan, f"{names[0]}_from_{names[-1]}", write)

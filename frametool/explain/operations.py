@@ -43,28 +43,22 @@ def _named(prefix: str, numbers: Sequence[float], names: Sequence[str]) -> dict[
     return {f"{prefix}{name}": number for name, number in zip(names, numbers, strict=True)}
 
 
-def product(sheet: Sheet, a: Quaternion, b: Quaternion, *, brief: bool = False) -> Quaternion:
-    """Multiply two quaternions; brief: on one line."""
+def product(sheet: Sheet, a: Quaternion, b: Quaternion) -> Quaternion:
+    """Multiply two quaternions."""
     values = _named("a", a, XYZW) | _named("b", b, XYZW)
-    if not brief:
-        sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
-    steps = sheet.aside() if brief else sheet
-    x, y, z, w = (steps.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
-    if brief:
-        sheet.quaternions(("a b", "%s·%s"), (r"a\,b", r"%s \cdot %s"), a, b, (x, y, z, w))
-    else:
-        sheet.caveat(ORDER)
+    sheet.say("c = a b (Hamilton: ij = k, ji = -k; not commutative)")
+    x, y, z, w = (sheet.step(values, f"c{name}", formula) for name, formula in HAMILTON.items())
+    sheet.caveat(ORDER)
     return x, y, z, w
 
 
-def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str], *, brief: bool = False) -> Rigid:
+def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
     """Multiply two poses: `frames` are those of a_from_b and b_from_c, in this order."""
     first, middle, last = frames
     sheet.heading(f"{first}_from_{last} = {first}_from_{middle} @ {middle}_from_{last}")
-    if not brief:
-        sheet.say(TOUCH)
+    sheet.say(TOUCH)
     position = turned(sheet, a[3:], b[:3], "t", ("R(a) tb + ta", r"R(a)\,t_b + t_a"), METRES, shift=a[:3])
-    return *position, *product(sheet, a[3:], b[3:], brief=brief)
+    return *position, *product(sheet, a[3:], b[3:])
 
 
 def turned(

@@ -1,20 +1,20 @@
-"""Derivations in their forms: text, Markdown with formulas, a LaTeX document.
+"""Derivations in their forms: text of 80 columns, Markdown with formulas.
 
-A derivation as text of 80 columns. A line that begins with = + - or · goes on with the one before.
+A line that begins with = + - or · goes on with the one before.
 """
 
 from __future__ import annotations
 
 from itertools import groupby
 from textwrap import wrap
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain.formula_tree import latex_number
 from frametool.explain.sheet import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.explain.sheet import Item, Row
 
@@ -154,24 +154,14 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
 
 
 LONG = 90  # characters of LaTeX that a line of a formula holds, about
-MARKDOWN_SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
-LATEX_SPECIAL = {
-    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
-    "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "<": r"\textless{}", ">": r"\textgreater{}",
-    "|": r"\textbar{}", '"': "''", "`": r"\char96{}", "-": "-{}",
-}  # fmt: skip
-PREAMBLE = r"""\documentclass{article}
-\usepackage{amsmath}
-\usepackage[a4paper,landscape,margin=2cm]{geometry}
-\setlength{\parindent}{0pt}
-\setlength{\parskip}{6pt}
-\allowdisplaybreaks
-\begin{document}
-"""
+SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
+WORDS = {HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"}
+FORMULAS = "$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$"
+RESULT = "**Result**%s\n\n```text\n%s\n```"
 
 
 class Explanation:
-    """A derivation: `str` of it is the text, `markdown()` and `latex()` its other forms; Jupyter shows it as Markdown.
+    """A derivation: `str` of it is the text, `markdown()` its other form, as which Jupyter shows it.
 
     title: what is derived
     """
@@ -191,44 +181,33 @@ class Explanation:
 
     def markdown(self) -> str:
         """Return Markdown with formulas between dollar signs, as GitHub and Jupyter show it."""
-        return _document(self, MARKDOWN)
+        return "\n\n".join([f"## {_escaped(self.title)}", *_paragraphs(self.items)]) + "\n"
 
     _repr_markdown_ = markdown
 
-    def latex(self) -> str:
-        """Return a LaTeX document."""
-        return _document(self, LATEX)
-
     def render(self, form: str = "text") -> str:
-        """Return the derivation as text, markdown or latex; raises ValueInvalid for another form."""
+        """Return the derivation as text or markdown; raises ValueInvalid for another form."""
         if form not in FORMS:
             raise ValueInvalid(f"no form {shown(form)}{alternatives(form, FORMS, 'forms')}")
         return FORMS[form](self)
 
 
-FORMS: dict[str, Callable[[Explanation], str]] = {
-    "text": Explanation.__str__,
-    "markdown": Explanation.markdown,
-    "latex": Explanation.latex,
-}
+FORMS: dict[str, Callable[[Explanation], str]] = {"text": Explanation.__str__, "markdown": Explanation.markdown}
 
 
-def _document(explanation: Explanation, markup: Markup) -> str:
-    """Write a derivation in a language with formulas; successive formulas stand in one block."""
-    parts = []
-    for is_formula, group in groupby(explanation.items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
+def _paragraphs(items: Sequence[Item]) -> Iterator[str]:
+    """Write the parts of a derivation in Markdown; successive formulas stand in one block."""
+    for is_formula, group in groupby(items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
         if is_formula:
             lines = [line for item in group if not isinstance(item, (Words, SheetResult)) for line in _aligned(item)]
-            parts.append(markup.formulas % " \\\\\n".join(lines))
+            yield FORMULAS % " \\\\\n".join(lines)
             continue
         for item in group:
             if isinstance(item, Words):
-                parts.append(markup.words[item.kind] % markup.escape(item.text))
+                yield WORDS[item.kind] % _escaped(item.text)
             elif isinstance(item, SheetResult):
                 lines = [line.removeprefix(INDENT) for line in result_lines(item.rows)]
-                head = f": {markup.escape(item.text)}" if item.text else ""
-                parts.append(markup.result % (head, markup.table(lines)))
-    return markup.document % (markup.escape(explanation.title), "\n\n".join(parts))
+                yield RESULT % (f": {_escaped(item.text)}" if item.text else "", "\n".join(lines))
 
 
 def _aligned(item: SheetStep | MatrixLine) -> list[str]:
@@ -243,7 +222,7 @@ def _aligned(item: SheetStep | MatrixLine) -> list[str]:
     elif sum(map(len, parts[1:])) <= 2 * LONG:
         parts = [parts[0], *filter(None, [" = ".join(parts[1:])])]
     if item.unit:
-        parts[-1] += rf"\ \text{{{_latex_text(item.unit)}}}"
+        parts[-1] += rf"\ \text{{{item.unit}}}"
     return [f"{name} &= {parts[0]}", *(f"&= {part}" for part in parts[1:])]
 
 
@@ -254,39 +233,5 @@ def _matrix(part: str | Sequence[Sequence[str]]) -> str:
     return rf"\begin{{bmatrix}} {rows} \end{{bmatrix}}"
 
 
-def _markdown_text(text: str) -> str:
-    return "".join(f"\\{each}" if each in MARKDOWN_SPECIAL else each for each in text)
-
-
-def _latex_text(text: str) -> str:
-    """Escape text; letters beyond ASCII are named, because not every TeX has them."""
-    return "".join(LATEX_SPECIAL.get(each, each) if each.isascii() else f"[U+{ord(each):04X}]" for each in text)
-
-
-class Markup(NamedTuple):
-    """A language with formulas: templates of a document, of its parts and of the result, and how text is escaped."""
-
-    document: str
-    words: Mapping[str, str]
-    formulas: str
-    result: str
-    escape: Callable[[str], str]
-    table: Callable[[Sequence[str]], str]
-
-
-MARKDOWN = Markup(
-    document="## %s\n\n%s\n",
-    words={HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"},
-    formulas="$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$",
-    result="**Result**%s\n\n```text\n%s\n```",
-    escape=_markdown_text,
-    table="\n".join,
-)
-LATEX = Markup(
-    document=PREAMBLE + "\\section*{%s}\n\n%s\n\\end{document}\n",
-    words={HEADING: r"\subsection*{%s}", SENTENCE: "%s", CAVEAT: r"\emph{Note.} %s"},
-    formulas="\\begin{align*}\n%s\n\\end{align*}",
-    result="\\textbf{Result}%s\n\n{\\ttfamily\n%s\n\\par}",
-    escape=_latex_text,
-    table=lambda lines: "\\\\\n".join(_latex_text(line).replace(" ", "~") for line in lines),
-)
+def _escaped(text: str) -> str:
+    return "".join(f"\\{each}" if each in SPECIAL else each for each in text)

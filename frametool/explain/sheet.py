@@ -109,16 +109,14 @@ class Sheet:
 
     digits: significant ones; None shows and continues with every bit
     clean: what rounding leaves of terms that cancel becomes 0 and stays 0 in what follows
-    every: all products of long chains are shown
     reach: the largest of the positions, in metres: rounding is measured by it
     stretch: how many times rounding grows where poses are extrapolated
     """
 
-    def __init__(self, digits: int | None = DIGITS, *, clean: bool | None = None, every: bool = False) -> None:
+    def __init__(self, digits: int | None = DIGITS, *, clean: bool | None = None) -> None:
         """Begin an empty sheet."""
         self.digits = digits
         self.clean = digits is not None if clean is None else clean
-        self.every = every
         self.items: list[Item] = []
         self.reach = 1.0
         self.stretch = 1.0
@@ -209,17 +207,6 @@ class Sheet:
         shown = [part if isinstance(part, str) else [[self.number(v) for v in row] for row in part] for part in parts]
         self.items.append(MatrixLine(name, text, latex, shown, unit))
 
-    def quaternions(self, text: tuple[str, str], latex: tuple[str, str], *values: Quaternion) -> None:
-        """Add what two quaternions make, on one line, each as (x, y, z, w).
-
-        text, latex: the formula, and the same with a place for each of the two
-        values: the two, and what they make
-        """
-        *texts, found = (f"({', '.join(map(self.number, each))})" for each in values)
-        *latex_texts, latex_found = map(latex_tuple, (*texts, found))
-        shown, latex_shown = text[1] % tuple(texts), latex[1] % tuple(latex_texts)
-        self.items.append(SheetStep("q", [text[0], shown, found], "q", [latex[0], latex_shown, latex_found]))
-
     def aside(self) -> Sheet:
         """Return an empty sheet for steps that are not shown."""
         return Sheet(self.digits, clean=self.clean)
@@ -253,11 +240,11 @@ class Sheet:
             self.say(f"{name}: {written!r} deg less whole double turns of 720 deg is {rest!r} deg, exactly.")
         self.step(values, name, f"{name}_deg*pi/180", RADIANS)
 
-    def sine_and_cosine(self, values: Values, name: str, sine: str, cosine: str, *, half: bool = True) -> None:
-        """Add the cosine and the sine of an angle or of its half; exact where degrees say so."""
-        inside = f"{name}/2" if half else name
-        turn = values.get(f"{name}_deg", 0.0) / (90.0 if half else 45.0)  # the argument, in 45 degrees
-        is_exact = turn != 0.0 and turn == int(turn) and (half or turn % 2 == 0)
+    def sine_and_cosine(self, values: Values, name: str, sine: str, cosine: str) -> None:
+        """Add the cosine and the sine of half an angle; exact where degrees say so."""
+        inside = f"{name}/2"
+        turn = values.get(f"{name}_deg", 0.0) / 90.0  # the argument, in 45 degrees
+        is_exact = turn != 0.0 and turn == int(turn)
         eighths = int(turn) if is_exact else 0
         self.step(values, cosine, f"cos({inside})", exactly=ROOTS[(eighths + 2) % 8] if is_exact else "")
         self.step(values, sine, f"sin({inside})", exactly=ROOTS[eighths % 8] if is_exact else "")
@@ -304,12 +291,6 @@ class Sheet:
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
         self.items.append(SheetResult(text, rows))
-
-
-def latex_tuple(text: str) -> str:
-    """Return numbers in parentheses as LaTeX."""
-    numbers = r",\ ".join(latex_number(each) for each in text[1:-1].split(", "))
-    return rf"\left({numbers}\right)"
 
 
 def norm(names: Sequence[str] = XYZW) -> str:

@@ -1,4 +1,4 @@
-"""From each representation to the quaternion, one block a representation; and the ways of textbooks that pass it by.
+"""From each representation to the quaternion, one block a representation.
 
 A block takes the sheet, the numbers as written, and what it names of their axes and units.
 """
@@ -7,21 +7,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.explain.sheet import COLUMNS, CYCLES, DEGREES, DET, ENTRIES, RADIANS, XYZ, XYZW, norm, rows
+from frametool.explain.sheet import CYCLES, DEGREES, ENTRIES, RADIANS, XYZ, XYZW, norm, rows
 from frametool.geometry import floats
 from frametool.geometry import matrix as kernel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from frametool.explain.sheet import Matrix, Sheet, Values
+    from frametool.explain.sheet import Sheet, Values
     from frametool.grammar.readers import Quaternion
 
 UNIT = 8.9e-16  # 4 eps: a length this near 1 is 1
 LAST_STEP = 1e-9  # the convergence is quadratic: what comes after such a step is rounding
 MOST_STEPS = 60
 HALF = "Half the angle stands inside: a quaternion acts twice (q v q*), so w = cos(angle/2)."
-NEAR_HALF_TURN = 1e-3  # of s: below, near half a turn, the axis loses more digits than the derivation may be off
 NOT_UNIT = "The axis is not a unit vector: it is divided by its length. With a longer axis q would be no rotation."
 SQUARES = (
     "ww, xx, yy, zz are four times the squares of w, x, y, z. The largest is taken: nothing is then divided by a "
@@ -35,12 +34,6 @@ SHEPPERD = {"w": "1 + r11 + r22 + r33", "x": "1 + r11 - r22 - r33", "y": "1 - r1
             "z": "1 - r11 - r22 + r33"}  # fmt: skip
 PAIRS = {"xy": "r12 + r21", "xz": "r13 + r31", "yz": "r23 + r32", "xw": "r32 - r23", "yw": "r13 - r31",
          "zw": "r21 - r12"}  # fmt: skip
-RODRIGUES = (
-    "c + vx**2*k", "vx*vy*k - vz*s", "vx*vz*k + vy*s",
-    "vy*vx*k + vz*s", "c + vy**2*k", "vy*vz*k - vx*s",
-    "vz*vx*k - vy*s", "vz*vy*k + vx*s", "c + vz**2*k",
-)  # fmt: skip
-NOT_ACOS = "atan2(s, tr - 1), not acos((tr - 1)/2): acos loses half the digits near 0 and 180 deg."
 
 
 def quaternion(sheet: Sheet, numbers: Sequence[float]) -> Quaternion:
@@ -73,7 +66,9 @@ def rpy(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
     sheet.heading("Roll, pitch, yaw to quaternion")
     sheet.say("About the fixed axes x, then y, then z: the same as z, y', x'' turning along.")
     sheet.say("q = qz(yaw) qy(pitch) qx(roll): what is done first stands rightmost.")
-    values = _roll_pitch_yaw(sheet, numbers, degrees=degrees)
+    values: Values = {}
+    for name, written in zip(("roll", "pitch", "yaw"), numbers, strict=True):
+        sheet.take_angle(values, name, written, degrees=degrees)
     for name in ("roll", "pitch", "yaw"):
         sheet.sine_and_cosine(values, name, f"s{name[0]}", f"c{name[0]}")
     sheet.caveat(HALF)
@@ -84,18 +79,17 @@ def rpy(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
     return _unit(sheet, values)
 
 
-def _roll_pitch_yaw(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Values:
-    values: Values = {}
-    for name, written in zip(("roll", "pitch", "yaw"), numbers, strict=True):
-        sheet.take_angle(values, name, written, degrees=degrees)
-    return values
-
-
 def euler(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -> Quaternion:
     """Multiply three elementary quaternions: two products."""
     values: Values = {}
     sheet.heading(f"Euler angles {axes} to quaternion")
-    outermost = _introduce(sheet, values, numbers, axes, degrees=degrees)
+    order, fixed = axes[1:], axes[0] == "s"
+    kind = "the fixed axes" if fixed else "the axes as they turn along,"
+    way = "right to left: what is done first stands rightmost" if fixed else "left to right, in the order of the turns"
+    sheet.say(f"{axes}: a1, a2, a3 about {kind} {', then '.join(order)}. The factors stand {way}.")
+    for at, written in enumerate(numbers, 1):
+        sheet.take_angle(values, f"a{at}", written, degrees=degrees)
+    outermost = (3, 2, 1) if fixed else (1, 2, 3)
     sheet.say(f"q = {' '.join(f'q{axes[at]}(a{at})' for at in outermost)}")
     for at in (1, 2, 3):
         sheet.sine_and_cosine(values, f"a{at}", f"s{at}", f"c{at}")
@@ -107,20 +101,9 @@ def euler(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -
         sheet.step(values, f"p{name}", formula)
     for name, formula in _times_elementary({part: f"p{part}" for part in XYZW}, axes[third], third).items():
         sheet.step(values, name, formula)
-    other = "turning axes read left to right" if axes[0] == "s" else "fixed axes read right to left"
+    other = "turning axes read left to right" if fixed else "fixed axes read right to left"
     sheet.caveat(f"The same product about {other}: s and r differ only in the order of the factors.")
     return _unit(sheet, values)
-
-
-def _introduce(sheet: Sheet, values: Values, numbers: Sequence[float], axes: str, *, degrees: bool) -> tuple[int, ...]:
-    """Say what three Euler angles mean and take them; return the numbers of the factors, outermost first."""
-    order, fixed = axes[1:], axes[0] == "s"
-    kind = "the fixed axes" if fixed else "the axes as they turn along,"
-    way = "right to left: what is done first stands rightmost" if fixed else "left to right, in the order of the turns"
-    sheet.say(f"{axes}: a1, a2, a3 about {kind} {', then '.join(order)}. The factors stand {way}.")
-    for at, written in enumerate(numbers, 1):
-        sheet.take_angle(values, f"a{at}", written, degrees=degrees)
-    return (3, 2, 1) if fixed else (1, 2, 3)
 
 
 def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, str]:
@@ -144,17 +127,12 @@ def axis_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quat
     """Take the axis' direction and half the angle."""
     sheet.heading("Axis and angle to quaternion")
     sheet.say("q = (v sin(angle/2), cos(angle/2)), v a unit axis.")
-    return _about_axis(sheet, _axis_and_angle(sheet, numbers, degrees=degrees))
-
-
-def _axis_and_angle(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Values:
-    """Add the unit axis vx, vy, vz, and take the angle."""
     values = dict(zip(("ax", "ay", "az"), numbers, strict=False))
     length = sheet.direction(values, ("ax", "ay", "az"), ("vx", "vy", "vz"), "n")
     if abs(length - 1.0) > UNIT:
         sheet.caveat(NOT_UNIT)
     sheet.take_angle(values, "angle", numbers[3], degrees=degrees)
-    return values
+    return _about_axis(sheet, values)
 
 
 def _about_axis(sheet: Sheet, values: Values) -> Quaternion:
@@ -242,84 +220,6 @@ def _four(values: Values, names: Sequence[str]) -> Quaternion:
     return x, y, z, w
 
 
-def euler_to_matrix(sheet: Sheet, numbers: Sequence[float], *, axes: str, degrees: bool) -> Sequence[float]:
-    """Multiply three elementary matrices."""
-    values: Values = {}
-    sheet.heading(f"Euler angles {axes} to matrix")
-    outermost = _introduce(sheet, values, numbers, axes, degrees=degrees)
-    return _product(sheet, values, [(axes[at], f"a{at}", f"{at}") for at in outermost])
-
-
-def rpy_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Sequence[float]:
-    """Multiply the elementary matrices about z, y, x."""
-    sheet.heading("Roll, pitch, yaw to matrix")
-    sheet.say("About the fixed axes x, then y, then z: what is done first stands rightmost.")
-    values = _roll_pitch_yaw(sheet, numbers, degrees=degrees)
-    return _product(sheet, values, [("z", "yaw", "y"), ("y", "pitch", "p"), ("x", "roll", "r")])
-
-
-def _product(sheet: Sheet, values: Values, factors: list[tuple[str, str, str]]) -> Sequence[float]:
-    """Add the product of turns about axes (axis, name of the angle, its letter), outermost first."""
-    for _, name, letter in reversed(factors):
-        sheet.sine_and_cosine(values, name, f"s{letter}", f"c{letter}", half=False)
-    matrices = [_elementary(axis, values[f"s{letter}"], values[f"c{letter}"]) for axis, _, letter in factors]
-    texts = [f"R{axis}({name})" for axis, name, _ in factors]
-    latex = [rf"R_{axis}(\mathrm{{{name}}})" for axis, name, _ in factors]
-    inner = sheet.product(matrices[1], matrices[2])
-    sheet.grid("P", " ".join(texts[1:]), r"\,".join(latex[1:]), [matrices[1], matrices[2], "=", inner])
-    found = sheet.product(matrices[0], inner)
-    sheet.grid("R", f"{texts[0]} P", rf"{latex[0]}\,P", [matrices[0], inner, "=", found])
-    sheet.caveat(COLUMNS)
-    entries = [entry for row in found for entry in row]
-    sheet.step(dict(zip(ENTRIES, entries, strict=True)), "det", DET)
-    return entries
-
-
-def _elementary(axis: str, s: float, c: float) -> Matrix:
-    minus = 0.0 - s
-    if axis == "x":
-        return [[1.0, 0.0, 0.0], [0.0, c, minus], [0.0, s, c]]
-    if axis == "y":
-        return [[c, 0.0, s], [0.0, 1.0, 0.0], [minus, 0.0, c]]
-    return [[c, minus, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
-
-
-def axis_angle_to_matrix(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Sequence[float]:
-    """Apply Rodrigues' formula."""
-    sheet.heading("Axis and angle to matrix (Rodrigues)")
-    sheet.say("R = c 1 + k v v^T + s (v x ..), v a unit axis, k = 1 - c.")
-    values = _axis_and_angle(sheet, numbers, degrees=degrees)
-    sheet.sine_and_cosine(values, "angle", "s", "c", half=False)
-    sheet.step(values, "k", "1 - c")
-    found = [sheet.step(values, name, formula) for name, formula in zip(ENTRIES, RODRIGUES, strict=True)]
-    sheet.grid("R", "", "", [rows(found)])
-    sheet.caveat(COLUMNS)
-    sheet.step(values, "det", DET)
-    return found
-
-
-def matrix_to_axis_angle(
-    sheet: Sheet, numbers: Sequence[float], *, wanted_degrees: bool
-) -> Sequence[float] | None:  # fmt: skip
-    """Read the angle off the trace and the axis off the differences; None near half a turn, where both vanish."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = numbers
-    if r11 + r22 + r33 < 1.0 and max(abs(r32 - r23), abs(r13 - r31), abs(r21 - r12)) < NEAR_HALF_TURN:
-        return None
-    values = dict(zip(ENTRIES, nearest_rotation(sheet, numbers), strict=True))
-    sheet.heading("Matrix to axis and angle, by the trace")
-    sheet.say("tr = 1 + 2 cos(angle); the differences across the diagonal are 2 v sin(angle).")
-    sheet.step(values, "tr", "r11 + r22 + r33")
-    for name, formula in (("dx", "r32 - r23"), ("dy", "r13 - r31"), ("dz", "r21 - r12")):
-        sheet.step(values, name, formula)
-    if not (values["dx"] or values["dy"] or values["dz"]):
-        sheet.say("No rotation: the angle is 0, any axis will do, and x is taken.")
-        return 1.0, 0.0, 0.0, 0.0
-    sheet.direction(values, ("dx", "dy", "dz"), ("vx", "vy", "vz"), "s")
-    sheet.step(values, "angle", "atan2(s, tr - 1)", RADIANS)
-    sheet.caveat(NOT_ACOS)
-    return values["vx"], values["vy"], values["vz"], *sheet.angles(values, ["angle"], degrees=wanted_degrees)
-
-
 def nearest_rotation(sheet: Sheet, entries: Sequence[float]) -> Sequence[float]:
     """Return the rotation nearest to a matrix, with the steps to it; what is one already stays as it is."""
     off = kernel.defect(*kernel.nine(entries), floats)
@@ -339,11 +239,3 @@ def nearest_rotation(sheet: Sheet, entries: Sequence[float]) -> Sequence[float]:
         if step < LAST_STEP:
             break
     return [part for row in here for part in row]
-
-
-SHORT: dict[tuple[str, str], Callable[..., Sequence[float] | None]] = {
-    ("rpy", "matrix"): rpy_to_matrix,
-    ("euler", "matrix"): euler_to_matrix,
-    ("axis_angle", "matrix"): axis_angle_to_matrix,
-    ("matrix", "axis_angle"): matrix_to_axis_angle,
-}

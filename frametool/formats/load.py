@@ -23,7 +23,6 @@ from frametool.errors import (
     BadTopology,
     FileProblem,
     FormatError,
-    Tf2Warning,
     ValueInvalid,
     alternatives,
     shown,
@@ -32,7 +31,6 @@ from frametool.errors import (
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import BAG, CHOICES, FORMATS, readers
 from frametool.frames.lookups import FrameTree, two_covariances
-from frametool.frames.policy import Refused
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, at_other_times, stop
@@ -121,26 +119,26 @@ class Recording(InputFile):
         return f"{said}; {states}" if states else said
 
     def edges(
-        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
+        self, report: Report = stop, *, tell: bool = True, normalize: bool = False
     ) -> Iterator[Edge]:
         """Yield the edges in the order they were written, then warn of what was odd; otherwise as `pieces`."""
-        for piece in self.pieces(report, tell=tell, raw=raw, normalize=normalize):
+        for piece in self.pieces(report, tell=tell, normalize=normalize):
             if isinstance(piece, Edge):
                 yield piece
             else:
                 yield from piece.edges()
 
     def pieces(
-        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False
+        self, report: Report = stop, *, tell: bool = True, normalize: bool = False
     ) -> Iterator[Edge | Samples | EdgeColumns]:
         """Yield edges, one by one or in bulk, in the order they were written.
 
         report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
-        tell: without it what was odd is only kept, in `tally`.  raw: messages as tf2 receives them, unchecked.
+        tell: without it what was odd is only kept, in `tally`.
         normalize: take any non-zero quaternion and any matrix near a rotation.
         """
         try:
-            options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
+            options = Options(self.tally, self.topics, report, normalize, self.answers)
             found = import_module(FORMATS[self.form].reader).read(self, options)
             if offset_ns := self.answers.time_offset:
                 found = (at_other_times(piece, offset_ns) for piece in found)
@@ -204,13 +202,12 @@ class Rules(NamedTuple):
     """How frames are taken that move, and rotations that are not quite rotations.
 
     moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still
-    policy, keep_ns: as TransformBuffer has them
+    keep_ns: as TransformBuffer has it
     normalize: any non-zero quaternion and any matrix near a rotation is taken
     earth: what the Earth's frame is called; "" as it is said first, `ecef` or `earth`
     """
 
     moving: bool = False
-    policy: str = "frametool"
     keep_ns: int | None = None
     normalize: bool = False
     earth: str = ""
@@ -253,13 +250,13 @@ class Assembly:
 
     def add_root(self, frame: str) -> None:
         """Make a frame known that has no parent (yet)."""
-        (self.tree if self.buffer is None else self.buffer).add_root(self._kept(frame))
+        (self.tree if self.buffer is None else self.buffer).add_root(frame)
 
     def renames(self, *names: str | None) -> bool:
-        """Tell whether the Earth's frame is among names by that of its two that did not come first; tf2 keeps both."""
-        if self.rules.policy == "frametool" and not self.earth:
+        """Tell whether the Earth's frame is among names by that of its two that did not come first."""
+        if not self.earth:
             self.earth = next((name for name in names if name and name in EARTH_FRAMES), "")
-        return any(name in EARTH_FRAMES and name != self.earth for name in names) and self.rules.policy == "frametool"
+        return any(name in EARTH_FRAMES and name != self.earth for name in names)
 
     def one_name(self, frame: str) -> str:
         """Return a name, the Earth's as it is here."""
@@ -284,31 +281,23 @@ class Assembly:
             self.add(parent, child, edge.components, edge.stamp_ns, place)
         return None
 
-    def _kept(self, name: str) -> str:
-        """Return the name under which the buffer keeps a frame: tf2 strips one slash."""
-        return name if self.rules.policy == "frametool" else name.removeprefix("/")
-
     def add(self, parent: str, child: str, components: Rigid, stamp_ns: int | None, place: EdgePlace) -> None:
         """Add one edge, or one sample of it.
 
-        Raises BadTopology and FormatError with the place; where tf2 would log and drop, that is a warning in its words.
+        Raises BadTopology and FormatError with the place.
         """
         try:
-            if self.buffer is None and stamp_ns is None and self.rules.policy == "frametool":
+            if self.buffer is None and stamp_ns is None:
                 self._first.setdefault(child, (parent, components, place))
                 self.tree.add_components(parent, child, components)
             else:
                 self._record(self._moving(), parent, child, components, stamp_ns, place)
         except BadTopology as error:
             raise self._placed(error, parent, child, place) from None
-        except Refused as refused:  # in the words that tf2 logs when it drops a transform
-            for line in refused.lines:
-                warn(line, kind=Tf2Warning)
-            return
         except ValueInvalid as error:
             raise place.error(str(error), FormatError) from None
         if place.edge.covariance is not None or child in self.covariances:
-            self._keep_covariance(parent, self._kept(child), place)
+            self._keep_covariance(parent, child, place)
 
     def _keep_covariance(self, parent: str, child: str, place: EdgePlace) -> None:
         """Keep the covariance of an edge; raises BadTopology with both places where it is not the one said before."""
@@ -361,8 +350,7 @@ class Assembly:
 
     def _takes_whole(self, samples: Samples) -> bool:
         """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
-        is_plain = self.rules.policy == "frametool" and self.rules.keep_ns is None
-        if not is_plain or len(samples.stamps_ns) == 1 or samples.child in self.covariances:
+        if self.rules.keep_ns is not None or len(samples.stamps_ns) == 1 or samples.child in self.covariances:
             return False
         track = None if self.buffer is None else self.buffer.track(samples.child)
         if track is None:
@@ -390,9 +378,8 @@ class Assembly:
             for child in standing:
                 made.make_stand(child)
             self._tell_replaced(standing)
-            if self.rules.policy == "frametool":
-                tree = self._standing_tree(made)
-                made = made if made.moves else tree
+            tree = self._standing_tree(made)
+            made = made if made.moves else tree
         made.camera_axes |= self.axes
         made.covariances |= self.covariances
         made.drawn |= self.drawn
@@ -403,7 +390,7 @@ class Assembly:
         if self.buffer is None:
             from frametool.frames.buffer import TransformBuffer
 
-            self.buffer = TransformBuffer(keep_ns=self.rules.keep_ns, policy=self.rules.policy, name=self.name)
+            self.buffer = TransformBuffer(keep_ns=self.rules.keep_ns, name=self.name)
             for frame in self.tree.frames:
                 self.buffer.add_root(frame)
             for child, (parent, components, _) in self._first.items():
@@ -415,7 +402,6 @@ class Assembly:
         place: EdgePlace,
     ) -> None:
         """Add a sample, or a standing edge beside samples."""
-        received, child = child, self._kept(child)
         track = buffer.track(child)
         settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
         if track is not None and settled and (track.parent, track.components) == (parent, components):
@@ -423,9 +409,7 @@ class Assembly:
         self._first.setdefault(child, (parent, components, place))
         if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
             self._moves.add(child)
-        elif stamp_ns is not None and track is not None and self.rules.policy != "frametool":
-            self._moves.add(child)  # tf2 takes no stamp twice: what comes twice was not latched
-        replaced = buffer.insert_components(parent, received, components, stamp_ns)
+        replaced = buffer.insert_components(parent, child, components, stamp_ns)
         if stamp_ns is not None:
             places = self._places.setdefault(child, {})
             if replaced:
@@ -510,7 +494,6 @@ class SamplesOfFile(NamedTuple):
 def load(
     *paths: str | PathLike[str],
     moving: bool = False,
-    policy: str = "frametool",
     keep_ns: int | None = None,
     normalize: bool = False,
     topics: Iterable[str] = (),
@@ -523,13 +506,13 @@ def load(
 
     paths: files in any form that `frametool.FORMATS` reads a tree from; `-` is standard input.  format: its name there.
     moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
-    policy, keep_ns: as TransformBuffer has them.  topics: those of a recording that are read  [default: all].
+    keep_ns: as TransformBuffer has it.  topics: those of a recording that are read  [default: all].
     normalize: take any non-zero quaternion and any matrix near a rotation.
     joints: values by name (radians, metres, or text with a unit), or a file of them.  frames: names of those that a
     form does not name, as (world, body).  answers: direction, camera_axes, dh, stamps as in `frametool.formats.table`.
     Raises FormatError, Unanswered and BadTopology with file, line and column; FileProblem.
     """
-    rules = Rules(moving=moving, policy=policy, keep_ns=keep_ns, normalize=normalize)
+    rules = Rules(moving=moving, keep_ns=keep_ns, normalize=normalize)
     chosen = tuple(topics)
     if format is not None and format not in readers("tree"):
         raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'forms')}")
@@ -583,7 +566,7 @@ def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
 def _add(assembly: Assembly, file: Recording) -> None:
     piece = None
     rules = assembly.rules
-    for piece in file.pieces(raw=rules.policy != "frametool", normalize=rules.normalize):
+    for piece in file.pieces(normalize=rules.normalize):
         if isinstance(piece, Samples) and not assembly.renames(piece.parent, piece.child):
             assembly.add_samples(SamplesOfFile(file, piece))
         elif isinstance(piece, EdgeColumns) and not assembly.renames(*dict.fromkeys((*piece.parents, *piece.children))):

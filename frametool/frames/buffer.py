@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import BadTopology, ValueInvalid, shown, warn
 from frametool.frames.lookups import Frames, taken, two_covariances
 from frametool.frames.path import cycle_message
-from frametool.frames.policy import FRAMETOOL
+from frametool.frames.refusals import check_age, check_edge, check_same
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
 from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
 
@@ -16,21 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from frametool.frames.policy import BufferPolicy
     from frametool.frames.track import Track
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Rigid
-
-
-def policy_named(name: str) -> BufferPolicy:
-    """Return the rules of `frametool`, `ros1` or `ros2`."""
-    if name == "frametool":
-        return FRAMETOOL
-    from frametool.frames.tf2 import TF2
-
-    if name not in TF2:
-        raise ValueInvalid(f"unknown policy {shown(name)}; expected frametool, {', '.join(TF2)}")
-    return TF2[name]
 
 
 class TransformBuffer(Frames):
@@ -45,16 +33,14 @@ class TransformBuffer(Frames):
         buffer.lookup("map", "camera", 1_700_000_000_000_000_000)         # map_from_camera then; without a time: latest
     """
 
-    def __init__(self, *, keep_ns: int | None = None, policy: str = "frametool", name: str = "") -> None:
+    def __init__(self, *, keep_ns: int | None = None, name: str = "") -> None:
         """Create an empty buffer.
 
         keep_ns: keep only so much before each frame's newest sample; None keeps everything.
-        policy: "ros1" and "ros2" accept, refuse and complain as tf2 does, and keep 10 s unless told.
         name: says in error messages where the frames come from.
         """
-        super().__init__(name, policy_named(policy))
-        self.keep_ns = self.policy.default_keep_ns if keep_ns is None else keep_ns
-        self._plain = self.policy is FRAMETOOL and self.keep_ns is None
+        super().__init__(name)
+        self.keep_ns = keep_ns
 
     def insert(
         self, parent: str, child: str, transform: Transform, stamp_ns: int | None = None, *,
@@ -62,7 +48,7 @@ class TransformBuffer(Frames):
     ) -> None:  # fmt: skip
         """Add parent_from_child, the pose of the child in its parent, at a time; without a time the frame stands still.
 
-        static: says so where a standing frame comes with a stamp, which is then ignored.  authority: for tf2's words.
+        static: says so where a standing frame comes with a stamp, which is then ignored.  authority: for tf2's listing.
         covariance: how uncertain the frame is, one for all its samples, said with any of them; None says nothing.
         A different pose at a stamp that is already there replaces the old one, with a warning.
         Raises ValueInvalid; BadTopology for two standing poses or covariances, standing and moving at once, a cycle.
@@ -76,7 +62,7 @@ class TransformBuffer(Frames):
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
             warn(f"frame {shown(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
         if found:
-            self.covariances[child if child in self._tracks else child.removeprefix("/")] = found
+            self.covariances[child] = found
 
     def insert_components(
         self, parent: str, child: str, components: Rigid, stamp_ns: int | None = None, *,
@@ -88,7 +74,7 @@ class TransformBuffer(Frames):
         """
         track = self._tracks.get(child)
         if (
-            self._plain and track is not None and type(stamp_ns) is int and not static and not track.standing
+            self.keep_ns is None and track is not None and type(stamp_ns) is int and not static and not track.standing
             and track.parent == parent and -FURTHEST_NS < stamp_ns < FURTHEST_NS
             and -1e300 < sum(components) < 1e300  # finite
         ):  # fmt: skip
@@ -104,7 +90,7 @@ class TransformBuffer(Frames):
                 return False
             if track.add_if_new(stamp_ns, components):
                 return False
-        parent, child, components = self.policy.admit(parent, child, components, authority)
+        check_edge(parent, child, components)
         standing = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
         return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
@@ -112,13 +98,13 @@ class TransformBuffer(Frames):
     def insert_many(self, parent: str, child: str, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
         """Add poses of one frame that moves, each later than the one before and than all that is known of the frame.
 
-        Otherwise as `insert_components`, and much faster; where that rule or the policy needs a look at each pose, they
+        Otherwise as `insert_components`, and much faster; where that rule or `keep_ns` needs a look at each pose, they
         are added one by one.
         """
         self.insert_components(parent, child, components[0], stamps_ns[0])
         track = self._tracks[child]
         within = stamps_ns[0] > -FURTHEST_NS and stamps_ns[-1] < FURTHEST_NS
-        if not self._plain or track.standing or not within or not all(map(isfinite, map(sum, components))):
+        if self.keep_ns is not None or track.standing or not within or not all(map(isfinite, map(sum, components))):
             for stamp_ns, each in zip(stamps_ns[1:], components[1:], strict=True):
                 self.insert_components(parent, child, each, stamp_ns)
         else:
@@ -130,45 +116,45 @@ class TransformBuffer(Frames):
         """Add what may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
         if track is not None and track.standing != standing:
-            standing = self.policy.settle_kind(track, standing=standing)
+            raise BadTopology(f"frame {shown(child)} both stands still and moves", rule="static-and-moving")
         replaced = False
-        if track is None or track.standing != standing:
+        if track is None:
             self._refuse_cycle(parent, child, stamp_ns, standing=standing)
             if standing:
                 track = self._put(StandingTrack(child, parent, components))
             else:
                 track = self._put(MovingTrack(child, stamp_ns, parent, components))
         elif track.standing:
-            self.policy.stand(track, parent, components)
-            self._queries.clear()
+            check_same(track, parent, components)
         else:
-            replaced = self._move(track, parent, components, stamp_ns, authority)
+            replaced = self._move(track, parent, components, stamp_ns)
         self._frames[parent] = None
         track.authority = authority
         return replaced
 
-    def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int, authority: str) -> bool:
+    def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:
         """Add a further sample of a frame that moves; returns whether it replaced another one."""
         if self.keep_ns is not None:
-            self.policy.refuse_old(track, stamp_ns, self.keep_ns, authority)
-            if self.policy.prunes_first:
-                track.drop_before(track.last_ns - self.keep_ns)
+            check_age(track, stamp_ns, self.keep_ns)
         if known := track.samples_at(stamp_ns):
             self._varies = self._varies or parent != known[-1][0]
             self._queries.clear()
-            return self.policy.repeat(track, stamp_ns, parent, components, authority)
+            if known[-1] == (parent, components):
+                return False
+            track.replace(stamp_ns, parent, components)
+            return True
         if parent != track.parent:
             self._refuse_cycle(parent, track.child, stamp_ns, standing=False)
             self._varies = True
             self._queries.clear()
         track.add(stamp_ns, parent, components)
-        if self.keep_ns is not None and not self.policy.prunes_first:
+        if self.keep_ns is not None:
             track.drop_before(track.last_ns - self.keep_ns)
         return False
 
     def _refuse_cycle(self, parent: str, child: str, stamp_ns: int, *, standing: bool) -> None:
         """Raise BadTopology if the child is its parent's ancestor at the same time."""
-        if not self.policy.refuses_cycles or child not in self._frames:
+        if child not in self._frames:
             return
         line = [parent]
         at_ns = None if standing else stamp_ns

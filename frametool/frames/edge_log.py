@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
 from frametool.frames.path import edges_between
-from frametool.frames.policy import seconds
+from frametool.frames.refusals import seconds
 from frametool.frames.stamps import BILLION
 from frametool.geometry import floats, rigid
 

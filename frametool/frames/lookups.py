@@ -11,9 +11,9 @@ from itertools import chain, repeat
 from math import ceil, floor
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, ValueInvalid, bare, shown, warn
+from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, shown, warn
 from frametool.frames.path import Query, cycle_message, edges_between, to_root
-from frametool.frames.policy import FRAMETOOL, left_out
+from frametool.frames.refusals import check_same, left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.errors import LookupFailed
-    from frametool.frames.policy import BufferPolicy
     from frametool.frames.track import Track
     from frametool.geometry.types import Components, Rigid
 
@@ -39,10 +38,9 @@ class Frames:
     Times are integer nanoseconds; None is the latest.  Frames that stand still answer all times alike.
     """
 
-    def __init__(self, name: str, policy: BufferPolicy) -> None:
+    def __init__(self, name: str) -> None:
         """Create an empty set of frames; `name` says in error messages where they come from."""
         self.name = name
-        self.policy = policy
         self._tracks: dict[str, Track] = {}
         self._frames: dict[str, None] = {}
         self._queries: dict[tuple[str, str], Query] = {}
@@ -71,8 +69,8 @@ class Frames:
         return tuple(self._frames)
 
     def called(self, frame: str) -> str:
-        """Return what a frame is called here: the Earth's, `ecef` or `earth`, is one by either name, save for tf2."""
-        if frame in EARTH_FRAMES and frame not in self._frames and self.policy is FRAMETOOL:
+        """Return what a frame is called here: the Earth's, `ecef` or `earth`, is one by either name."""
+        if frame in EARTH_FRAMES and frame not in self._frames:
             return next((other for other in EARTH_FRAMES if other in self._frames), frame)
         return frame
 
@@ -140,11 +138,11 @@ class Frames:
         if query.fixed is not None:
             return query.fixed
         if at_ns is None:  # the time comes first: at it the parents may be others than the newest
-            at_ns = query.latest(zero_counts=self.policy.zero_counts) or 0
+            at_ns = query.latest() or 0
             query = self.query(target, source, at_ns)
         found = query.at(at_ns if type(at_ns) is int else whole_stamp(at_ns))
         if found is None:
-            raise self.policy.missing(self, target, source, at_ns, self.way(target, source, at_ns))
+            raise no_data(target, source, at_ns, self.way(target, source, at_ns))
         return found
 
     def latest(self, target: str, source: str) -> int | None:
@@ -153,7 +151,7 @@ class Frames:
         None if nothing moves there.  Of a frame against itself it is that frame's own newest stamp.
         Raises UnknownFrame, NotConnected.
         """
-        newest = self.query(target, source, None).latest(zero_counts=self.policy.zero_counts)
+        newest = self.query(target, source, None).latest()
         own = self._tracks.get(source) if target == source else None
         return newest if own is None or own.standing else own.last_ns
 
@@ -165,8 +163,7 @@ class Frames:
         fixed: a frame that counts as standing in between, e.g. the map.  A time of None is that half's latest.
         Raises as `lookup`.
         """
-        for frame, role in ((target, "target_frame"), (source, "source_frame"), (fixed, "fixed_frame")):
-            self._require(frame, role)
+        self.require(target, source, fixed)
         fixed_from_source = self.lookup_components(fixed, source, source_at_ns)
         target_from_fixed = self.lookup_components(target, fixed, target_at_ns)
         return Transform.of(*rigid.compose(*target_from_fixed, *fixed_from_source))
@@ -339,23 +336,25 @@ class Frames:
         target, source = self.called(target), self.called(source)
         try:
             parent_of = partial(self.parent, at_ns=at_ns) if self._varies else self.parent
-            found = edges_between(target, source, parent_of)
+            return edges_between(target, source, parent_of)
         except NotConnected as error:
             raise self._unconnected(error, target, source, at_ns) from None
         except BadTopology as error:
             self._loops = self._varies = True
-            return self.policy.looped(self, error, target, source, at_ns)
-        self.policy.refuse_depth(self, target, source, at_ns)
-        return found
+            if at_ns is None:
+                raise error from None
+            return edges_between(target, source, partial(self._parent_exactly, at_ns=at_ns))
 
-    def require(self, target: str, source: str) -> None:
-        """Raise UnknownFrame unless both frames are there."""
-        self._require(target, "target_frame")
-        self._require(source, "source_frame")
+    def _parent_exactly(self, frame: str, at_ns: int) -> str | None:
+        """Return a frame's parent only if it has data at a time."""
+        track = self.track(frame)
+        return track.parent_at(at_ns) if track is not None and track.covers(at_ns) else None
 
-    def _require(self, frame: str, role: str) -> None:
-        if self.called(frame) not in self._frames or self.policy.is_bad_name(frame):
-            raise self.policy.unknown(frame, role, self)
+    def require(self, *frames: str) -> None:
+        """Raise UnknownFrame unless all frames are there."""
+        for frame in frames:
+            if self.called(frame) not in self._frames:
+                raise UnknownFrame(frame, known=self.frames, where=self.name)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
         """Make the error for two frames without a way: two trees, or a changing parent that is not known then."""
@@ -370,8 +369,8 @@ class Frames:
             except NotConnected:
                 pass
             else:
-                return self.policy.missing(self, target, source, at_ns, way)
-        return self.policy.unconnected(self, error, target, source, at_ns)
+                return no_data(target, source, at_ns, way)
+        return error
 
 
 class FrameTree(Frames):
@@ -387,7 +386,7 @@ class FrameTree(Frames):
 
     def __init__(self, name: str = "") -> None:
         """Create an empty tree; `name` says in error messages where the frames come from."""
-        super().__init__(name, FRAMETOOL)
+        super().__init__(name)
         self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
 
     def add(self, parent: str, child: str, transform: Transform, covariance: Any = None) -> None:
@@ -410,7 +409,7 @@ class FrameTree(Frames):
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._tracks.get(child)
         if known is not None and known.standing:
-            self.policy.stand(known, parent, components)
+            check_same(known, parent, components)
             return
         if parent == child:
             raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")

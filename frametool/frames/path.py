@@ -139,13 +139,9 @@ class Query:
         tx, ty, tz, x, y, z, w = found
         return tx, ty, tz, *quaternion.unit(x, y, z, w, floats)
 
-    def latest(self, *, zero_counts: bool = True) -> int | None:
-        """Return the newest stamp that every moving edge has reached; None when all stand still.
-
-        zero_counts: otherwise edges whose newest stamp is 0 are passed over, as tf2 does.
-        """
-        newest = [track.last_ns for track in self.moving]
-        return min((stamp for stamp in newest if stamp or zero_counts), default=None)
+    def latest(self) -> int | None:
+        """Return the newest stamp that every moving edge has reached; None when all stand still."""
+        return min((track.last_ns for track in self.moving), default=None)
 
     @property
     def span(self) -> tuple[int, int] | None:

@@ -273,7 +273,6 @@ class Options(NamedTuple):
     tally: takes what is worth telling at the end
     topics: which are read
     report: takes the errors, and reading goes on behind them
-    raw: messages are taken as tf2 receives them, unchecked
     normalize: any non-zero quaternion and any matrix near a rotation is taken
     answers: what the form leaves open
     """
@@ -281,6 +280,5 @@ class Options(NamedTuple):
     tally: Tally
     topics: Topics
     report: Report = stop
-    raw: bool = False
     normalize: bool = False
     answers: Answers = Answers()

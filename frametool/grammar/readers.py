@@ -62,15 +62,15 @@ class Note(NamedTuple):
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
-    __slots__ = ("bare_numbers", "degrees", "earth", "faults", "framed", "here", "normalize", "notes", "raw", "source")
+    __slots__ = ("bare_numbers", "degrees", "earth", "faults", "framed", "here", "normalize", "notes", "source")
 
     def __init__(
-        self, source: Source, *, degrees: bool = False, normalize: bool = False, raw: bool = False,
+        self, source: Source, *, degrees: bool = False, normalize: bool = False,
         earth: Earth | None = None,
     ) -> None:  # fmt: skip
         """Begin at the top of a document of `source`; `notes` collects what is odd.
 
-        raw: take messages as they are; whoever gets them judges.  `bare_numbers` is set for the forms of other tools,
+        `bare_numbers` is set for the forms of other tools,
         which read neither `90deg` nor `pi/2`.  earth: what is said of all places on the Earth.  `framed` is set where
         poses are those of frames: one at a place on the Earth has axes, even if nothing turns it
         """
@@ -78,7 +78,6 @@ class Reading:
         self.degrees = degrees
         self.normalize = normalize
         self.earth = earth
-        self.raw = raw
         self.bare_numbers = self.framed = False
         self.here: Path = ()
         self.notes: list[Note] = []

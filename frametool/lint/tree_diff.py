@@ -193,7 +193,7 @@ def diff(
     pair = _Pair(a, b, at_ns, Tolerance(*tolerance))
     if seen_from is not None:
         for tree in (a, b):
-            tree.require(seen_from, seen_from)
+            tree.require(seen_from)
     pair.see(seen_from)
     found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame))]
     order = {kind: number for number, kind in enumerate((*KINDS, SAME))}

@@ -246,7 +246,7 @@ _HEADER = re.compile(r"\bheader\b")
 
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of every message, in the order they were recorded."""
-    if file.form in {"echo", "jsonl"} and not options.raw and (file.form == "echo" or not options.topics.chosen):
+    if file.form in {"echo", "jsonl"} and (file.form == "echo" or not options.topics.chosen):
         cut, end = (documents, "---\n") if file.form == "echo" else (lines, "\n")
         for piece in cut(file.stream, file.name):
             for stretch in _cut(piece, end, sizes.STRETCH):
@@ -323,8 +323,6 @@ def _read(
     transform: dict[str, Any], reading: Reading, options: Options, line: int, topic: str
 ) -> tuple[str, str, Rigid, int | None]:
     """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
-    if options.raw and "header" in transform:
-        return messages.read_raw_transform(transform)
     if is_pose(transform):
         found = read_pose(transform, reading, body_of(topic, options.answers))
     else:

@@ -13,16 +13,14 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import shown
 from frametool.frames.stamps import BILLION
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import read_rotation
-from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Answers
     from frametool.grammar.readers import Path, Quaternion, Reading, Vector
 
@@ -51,9 +49,6 @@ _DATE = (
     r"(?a)(\d{4}-\d\d-\d\d)[Tt ](?P<h>[01]\d|2[0-3]):(?P<m>[0-5]\d):(?P<s>[0-5]\d|60)(?:\.(?P<part>\d{1,9})0*)?"
     r"(?:[Zz]|(?P<sign>[-+])(?P<oh>[01]\d|2[0-3]):(?P<om>[0-5]\d))"
 )
-ODD = {"nan": "nan", ".nan": "nan"} | {
-    f"{sign}{word}": f"{sign}inf" for sign in ("", "+", "-") for word in ("inf", ".inf", "infinity")
-}
 
 
 def is_message(value: dict[str, Any]) -> bool:
@@ -178,36 +173,6 @@ def _read_timestamp(value: Any) -> int:
     return whole * BILLION + int((found["part"] or "").ljust(9, "0"))
 
 
-def read_raw_transform(message: dict[str, Any]) -> tuple[str, str, Rigid, int | None]:
-    """Read a TransformStamped as tf2 takes it: any numbers, of any norm, and empty names; no stamp is None.
-
-    Returns parent, child, tx, ty, tz (metres), x, y, z, w and the stamp.  Raises Misfit where a number is none at all.
-    """
-    header = part(message, "header", PARTS)
-    transform = part(message, "transform", PARTS)
-    tx, ty, tz = within(("transform",), _raw_numbers, transform, "translation", "xyz")
-    x, y, z, w = within(("transform",), _raw_numbers, transform, "rotation", "xyzw")
-    names = header.get("frame_id"), message.get("child_frame_id")
-    parent, child = (name if type(name) is str else "" for name in names)
-    stamp_ns = None if header.get("stamp") is None else header_stamp(header, raw=True)
-    return parent, child, (tx, ty, tz, x, y, z, w), stamp_ns
-
-
-def _raw_numbers(transform: dict[str, Any], key: str, axes: str) -> list[float]:
-    """Read numbers, which may be infinite or none."""
-    mapping = part(transform, key, f"a transform has {key}")
-    return [within((key, axis), _raw_number, mapping.get(axis)) for axis in axes]
-
-
-def _raw_number(text: Any) -> float:
-    if type(text) is not str:
-        raise Misfit(f"expected a number, found {kind(text)}")
-    try:
-        return float(ODD[text.lower()]) if text.lower() in ODD else parse_number(text)
-    except ValueInvalid as error:
-        raise Misfit(str(error)) from None
-
-
 def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
     """Refuse keys that are not known."""
     for key in mapping:
@@ -232,24 +197,21 @@ def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) ->
     return reading.bare(name, *here)
 
 
-def header_stamp(header: dict[str, Any], *, raw: bool = False) -> int | None:
+def header_stamp(header: dict[str, Any]) -> int | None:
     """Read the stamp of a header as nanoseconds; None where there is none."""
     if "stamp" not in header:
         return None
-    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"], raw=raw)
+    stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
     return stamp_ns
 
 
-def read_stamp(value: Any, *, raw: bool = False) -> int:
-    """Read {sec, nanosec}, {secs, nsecs} or {sec, nsec} as nanoseconds.
-
-    raw: add up whatever stands there, as tf2 does.
-    """
+def read_stamp(value: Any) -> int:
+    """Read {sec, nanosec}, {secs, nsecs} or {sec, nsec} as nanoseconds."""
     stamp = as_mapping(value, "stamp as {sec, nanosec}")
     for names in STAMPS:
         if (*stamp,) == names or set(stamp) == set(names):
             seconds, nanoseconds = (_whole(stamp, name) for name in names)
-            if not raw and (problem := stamp_problem(seconds, nanoseconds, names)):
+            if problem := stamp_problem(seconds, nanoseconds, names):
                 raise problem
             return seconds * BILLION + nanoseconds
     raise Misfit("expected stamp as {sec, nanosec} or {secs, nsecs}")

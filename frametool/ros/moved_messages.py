@@ -30,7 +30,7 @@ class MessageMover:
 
         normalize: take any non-zero quaternion
         """
-        frames.require(into, into)
+        frames.require(into)
         self.frames, self.into = frames, frames.called(into)
         self.ros1, self.normalize = ros1, normalize
         self.tally = Tally()  # of names with a leading slash, and rough quaternions

@@ -45,18 +45,17 @@ def _number(text: str) -> float:
 
 
 def write_tree(tree: Frames, style: Style) -> str:  # noqa: ARG001 - tf2 has no say in it
-    """Return the listing; `{}`, or `[]` under ROS 2's rules, for no frames."""
-    decimals = tree.policy.listing_decimals
-    return "".join(_entry(each, decimals) for each in cache_entries(tree)) or ("{}\n" if decimals == 3 else "[]\n")
+    """Return the listing; `{}` for no frames."""
+    return "".join(map(_entry, cache_entries(tree))) or "{}\n"
 
 
-def _entry(each: CacheEntry, decimals: int) -> str:
+def _entry(each: CacheEntry) -> str:
     return (
         f"{each.child}: \n"
         f"  parent: '{each.parent}'\n"
         f"  broadcaster: '{each.authority}'\n"
         f"  rate: {each.rate:.3f}\n"
-        f"  most_recent_transform: {each.newest:.{decimals}f}\n"
-        f"  oldest_transform: {each.oldest:.{decimals}f}\n"
+        f"  most_recent_transform: {each.newest:.3f}\n"
+        f"  oldest_transform: {each.oldest:.3f}\n"
         f"  buffer_length: {each.length:.3f}\n"
     )

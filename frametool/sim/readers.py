@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 LONGEST_INTEGER = 30  # digits
 FLAGS = {"true": "1", "false": "0"}  # as turtlesim's services have them
-MOST_GAINS = 10_000
 
 
 def guarded(call: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
@@ -150,27 +149,6 @@ def parse_seconds(text: str) -> float:
     if not 0.0 <= seconds <= LONGEST:
         raise ValueInvalid(f"expected 0 or more, and at most {LONGEST}, found {seconds:g}")
     return seconds
-
-
-def parse_gains(text: str) -> list[float]:
-    """Read evenly spaced numbers, START:STOP:COUNT with both ends, or numbers separated by commas.
-
-    Raises ValueInvalid.
-    """
-    if ":" not in text:
-        return [parse_number(each.strip()) for each in text.split(",")]
-    try:
-        start_text, stop_text, count_text = text.split(":")
-        start, stop, count = parse_number(start_text), parse_number(stop_text), int(count_text)
-    except ValueInvalid:
-        raise
-    except ValueError:
-        usage = "expected START:STOP:COUNT (0.1:2:20), or numbers (0.5,1)"
-        raise ValueInvalid(f"{usage}; found {shown(text)}") from None
-    if not 1 <= count <= MOST_GAINS:
-        raise ValueInvalid(f"COUNT must be 1 .. {MOST_GAINS}, found {count}")
-    values = (start + (stop - start) * index / max(count - 1, 1) for index in range(count))
-    return [float(f"{value:.12g}") for value in values]  # 0.8 rather than 0.7999999999999999
 
 
 NEEDED = ("t", "linear", "angular")

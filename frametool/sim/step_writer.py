@@ -13,9 +13,8 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json import dump
-from frametool.documents.yaml_writer import flow
 from frametool.errors import ValueInvalid, printable
-from frametool.formats.rows.csv import row, write_points
+from frametool.formats.rows.csv import row
 from frametool.frames.stamps import BILLION
 from frametool.ros.echo_format import message_text
 
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 FORMS = ("text", "yaml", "json", "csv")
 EMITS = ("commands", "poses", "tf")
-DECIMALS = 6
 # of steps in text, where a line must fit a terminal: millimetres and milliradians, under short names
 STEP_DECIMALS = 3
 SHORT = {
@@ -92,7 +90,7 @@ class StepWriter:
             case "csv":
                 return row(emission.ros2_row or emission.cells.values(), style)
         t, *others = emission.cells.values()
-        cells = [f"{t:.3f}", *(_text_cell(cell, style, STEP_DECIMALS) for cell in others)]
+        cells = [f"{t:.3f}", *(_text_cell(cell, style) for cell in others)]
         return _aligned(cells, map(_step_width, emission.cells))
 
 
@@ -101,25 +99,11 @@ def _step_width(name: str) -> int:
     return 7 if name in ("turtle", "parent", "child") else max(6, len(SHORT.get(name, name)))
 
 
-def table(rows: Sequence[dict[str, float | None]], style: Style) -> str:
-    """Write rows of numbers, at least one, in one of FORMS; what is None is -, null or empty."""
-    match style.form:
-        case "json":
-            return "".join(f"{dump(each, style.number)}\n" for each in rows)
-        case "yaml":
-            return "".join(f"- {flow(each, style.number)}\n" for each in rows)
-        case "csv":
-            return write_points(rows, style)
-    columns = list(rows[0])
-    lines = ([_text_cell(cell, style, DECIMALS) for cell in each.values()] for each in rows)
-    return "".join(_aligned(line, (max(10, len(name)) for name in columns)) for line in (columns, *lines))
-
-
-def _text_cell(cell: Any, style: Style, decimals: int) -> str:
+def _text_cell(cell: Any, style: Style) -> str:
     """Round for reading; zero has no sign there."""
     if not isinstance(cell, float):
         return "-" if cell is None else printable(str(cell))
-    digits = decimals if style.precision is None else style.precision
+    digits = STEP_DECIMALS if style.precision is None else style.precision
     return f"{round(cell, digits) + 0.0:.{digits}f}"
 
 

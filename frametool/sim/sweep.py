@@ -21,8 +21,6 @@ from frametool.sim.simulate import simulate
 from frametool.sim.turtle import DT, FASTEST_TURN, SIZE, TICK_NS, TIMEOUT_NS, wrapped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from numpy.typing import ArrayLike, NDArray
 
     from frametool.sim.drivers import MakeLeader
@@ -82,26 +80,6 @@ def simulate_many(
         for at in range(0, max(flat[0].size, 1), sizes.FOLLOWERS)
     ]
     return SweepResult(*(np.concatenate(parts).reshape(shape) for parts in zip(*blocks, strict=True)))
-
-
-def grid(
-    gain_linear: ArrayLike, gain_angular: ArrayLike, leader: MakeLeader | str = "still", **options: Any,
-) -> SweepResult:  # fmt: skip
-    """Try every pair of gains; the fields have a row for each linear gain and a column for each angular one."""
-    linear, angular = (np.asarray(gains, dtype=float).reshape(-1) for gains in (gain_linear, gain_angular))
-    return simulate_many(leader, gain_linear=linear[:, None], gain_angular=angular[None, :], **options)
-
-
-def rows(
-    gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult,
-) -> Iterator[dict[str, float | None]]:  # fmt: skip
-    """Yield the result of `grid` as one record a pair of gains; None where there is no number."""
-    columns: dict[str, NDArray[Any]] = {"time_to_reach": result.time_to_reach, "overshoot": result.overshoot}
-    columns |= {"final_distance": result.distance, "wall_hits": result.wall_hits}
-    for row, column in np.ndindex(len(gain_linear), len(gain_angular)):
-        cells = {name: values[row, column].item() for name, values in columns.items()}
-        known = {name: None if math.isnan(cell) else cell for name, cell in cells.items()}
-        yield {"gain_linear": gain_linear[row], "gain_angular": gain_angular[column], **known}
 
 
 def _checked(name: str, value: ArrayLike) -> Floats:

@@ -254,11 +254,11 @@ class TransformsOfCopy(Recording):
         self.recording, self.more = recording, more
 
     def pieces(
-        self, report: Report = stop, *, tell: bool = True, raw: bool = False, normalize: bool = False  # noqa: ARG002
+        self, report: Report = stop, *, tell: bool = True, normalize: bool = False  # noqa: ARG002
     ) -> Iterator[Edge | Samples | EdgeColumns]:  # fmt: skip
         """Yield its edges, but for those that are replaced, and then the others."""
         self.close()
-        options = Options(self.tally, self.topics, report, raw, normalize, self.answers)
+        options = Options(self.tally, self.topics, report, normalize, self.answers)
         children = {edge.child for edge in self.more}
         for number, (channel, log_ns, data) in enumerate(self.recording.messages(TYPES), 1):
             with _on_topic(channel.topic, self.path):

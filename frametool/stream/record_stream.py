@@ -14,36 +14,31 @@ from frametool.stream import stamp_source
 from frametool.stream.answers import Outside
 from frametool.stream.faults import SKIP, STOP, Fault, RowNote
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
-from frametool.stream.run import Outcome, mapped
+from frametool.stream.run import Outcome
 from frametool.stream.splitter import ARRAY, Splitter
-from frametool.text.lines import Pieces, blocks_behind, extent_in_file, read_blocks
+from frametool.text.lines import Pieces, read_blocks
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Iterator
 
     from frametool.stream.request import Request
     from frametool.stream.splitter import Part
-    from frametool.text.lines import ByteRange, ByteStream
+    from frametool.text.lines import ByteStream
 
 SMALL = 1 << 14  # bytes of a stream that may be few records
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
 
 
-def run_records(stream: ByteStream, form: str, request: Request, *, source: str, jobs: int = 1) -> Generator[Outcome]:
+def run_records(stream: ByteStream, form: str, request: Request, *, source: str) -> Generator[Outcome]:
     """Yield the outcomes of a stream of records."""
     splitter = Splitter(form)
-    outcomes = _outcomes(stream, splitter, form, request, source=source, jobs=jobs)
-    try:
-        yield from _as_array(outcomes, request.on_error) if form == "json" else outcomes
-    finally:
-        outcomes.close()  # ends the processes of several jobs
+    outcomes = _outcomes(stream, splitter, form, request, source=source)
+    yield from _as_array(outcomes, request.on_error) if form == "json" else outcomes
 
 
 def _outcomes(
-    stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str, jobs: int
+    stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str
 ) -> Generator[Outcome]:
-    jobs = 1 if request.in_order else jobs
-    extent = extent_in_file(stream) if jobs > 1 else None
     blocks = read_blocks(stream, whole=splitter.whole)
     first = next(blocks, None)
     if first is None:
@@ -63,11 +58,7 @@ def _outcomes(
 
     process = RecordBlocks(splitter, form, request, source)
     begun = [first, second] if second else [first]
-    following: Iterator[bytes | ByteRange] = blocks
-    if extent is not None:
-        taken = sum(map(len, begun))
-        following = blocks_behind(stream, extent, taken, name=source, whole=lambda: splitter.whole)
-    yield from mapped(process, chain(begun, following), jobs)
+    yield from map(process, chain(begun, blocks))
 
 
 def _raising(error: FormatError) -> Iterator[bytes]:

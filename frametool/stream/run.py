@@ -8,10 +8,9 @@ from frametool.errors import warn
 from frametool.geometry.representations import UPPER_ROWS
 from frametool.grammar.edges import PROJECTED_IN_SILENCE, projection
 from frametool.stream.faults import ZONES, RowNote
-from frametool.text.lines import ByteRange, content
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from frametool.stream.evaluate import Run
     from frametool.stream.faults import BadRows, Fault
@@ -92,12 +91,3 @@ def tell_of_rounding(source: str, count: int, rows: int) -> None:
     """Tell at the end of a stream how many rotations were normalised, of which the first was told of."""
     if count > 1:
         warn(f"{source}: {count} of {rows} rotations were off by more than 1e-6 and were normalised")
-
-
-def mapped(process: Callable[[bytes], Outcome], blocks: Iterable[bytes | ByteRange], jobs: int) -> Iterator[Outcome]:
-    """Process blocks in order, over several processes if asked for."""
-    if jobs < 2:
-        return map(process, map(content, blocks))
-    from frametool.stream.workers import spread
-
-    return spread(process, blocks, jobs)

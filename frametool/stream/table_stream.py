@@ -13,7 +13,7 @@ from frametool.grammar.names import stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Misused, RowNote
 from frametool.stream.rows import written
-from frametool.stream.run import Outcome, mapped, notes_of
+from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     COMMENT,
@@ -26,7 +26,7 @@ from frametool.stream.table import (
 )
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import RecordEnds, torn_record
-from frametool.text.lines import blocks_behind, extent_in_file, read_blocks, whole_lines
+from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -36,26 +36,20 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
-    from frametool.text.lines import ByteRange, ByteStream
+    from frametool.text.lines import ByteStream
 
 
 def run_table(
-    stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True, jobs: int = 1
+    stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
-    jobs = 1 if request.in_order else jobs
-    extent = extent_in_file(stream) if jobs > 1 else None
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header)
     request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
     work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
-    following: Iterator[bytes | ByteRange] = blocks
-    if extent is not None:
-        whole = _record_ends(table.delimiter)
-        following = blocks_behind(stream, extent, taken + len(rest), name=source, whole=whole)
-    yield from mapped(work, chain((rest,) if rest else (), following), jobs)
+    yield from map(work, chain((rest,) if rest else (), blocks))
 
 
 class Begun(NamedTuple):

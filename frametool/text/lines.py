@@ -1,21 +1,19 @@
-"""Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces, a file also as ranges.
+"""Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces.
 
-Ranges are for processes that read them themselves.  Knows nothing of what lines hold, nor of numpy, so that a tool
+Knows nothing of what lines hold, nor of numpy, so that a tool
 which sees only a few lines stays light.
 """
 
 from __future__ import annotations
 
-import os
-import stat
 import sys
 from io import BufferedReader, RawIOBase
 from itertools import chain
 from time import monotonic
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool import sizes
-from frametool.errors import FileProblem, FormatError
+from frametool.errors import FormatError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -41,14 +39,12 @@ def read_blocks(
     stream: ByteStream,
     *,
     whole: Callable[[bytes], int] = whole_lines,
-    lines_before: Callable[[], int] = int,
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
     A block has `sizes.BLOCK` bytes when the stream delivers as fast as they are taken.
     whole: how many bytes of a text are finished records; for records of several lines. A negative number: so many
     bytes are the beginning of a record that goes on behind them, and need not be looked at again.
-    lines_before: counts the lines before the stream, for errors.
     Raises FormatError if one record is longer than `sizes.RECORD`, however the stream was cut.
     """
     size, longest = sizes.BLOCK, sizes.RECORD
@@ -71,7 +67,7 @@ def read_blocks(
                 begun.append(text[:-end])
             pieces = [text[abs(end) :]]
         if held >= longest:
-            what = f"the record that begins in line {lines_before() + line} is longer than {longest} bytes"
+            what = f"the record that begins in line {line} is longer than {longest} bytes"
             raise FormatError(f"{what}: this is no text in lines, or a quote is not closed")
     if rest := b"".join((*begun, *pieces)):
         yield rest
@@ -151,91 +147,3 @@ def arrived(stream: BufferedReader, is_enough: Callable[[bytes], bool], most: in
             break
     pieces = chain((held,) if held else (), iter(lambda: stream.read1(most), b""))
     return BufferedReader(Pieces(pieces, stream), most)
-
-
-class ByteRange(NamedTuple):
-    """Some bytes of a file.
-
-    file: its descriptor, which processes share; name: as messages name it
-    """
-
-    file: int
-    name: str
-    start: int
-    size: int
-
-    def read(self) -> bytes:
-        """Return the bytes; raises FileProblem if they are not there any more."""
-        pieces = []
-        at, end = self.start, self.start + self.size
-        while at < end and (piece := os.pread(self.file, end - at, at)):
-            pieces.append(piece)
-            at += len(piece)
-        if at < end:
-            raise _shrunk(self.name)
-        return b"".join(pieces)
-
-
-def content(block: bytes | ByteRange) -> bytes:
-    """Return the bytes of a block."""
-    return block.read() if isinstance(block, ByteRange) else block
-
-
-class Extent(NamedTuple):
-    """Where a stream begins in a file, and where the file ends."""
-
-    begin: int
-    end: int
-
-
-def extent_in_file(stream: ByteStream) -> Extent | None:
-    """Return what is left of a plain file, None if a stream is something else."""
-    try:
-        about = os.fstat(stream.fileno())
-        return Extent(stream.tell(), about.st_size) if stat.S_ISREG(about.st_mode) else None
-    except (AttributeError, OSError, ValueError):
-        return None
-
-
-def blocks_behind(
-    stream: ByteStream,
-    extent: Extent,
-    taken: int,
-    *,
-    name: str,
-    whole: Callable[[], Callable[[bytes], int]],
-) -> Iterator[bytes | ByteRange]:
-    """Yield the blocks of a file from a place on as `read_blocks` cuts them; as ranges up to the last.
-
-    extent: of the stream at its start; taken: the bytes of it that were read, whole records
-    whole: makes what tells how many bytes of a text are finished records
-    Raises FileProblem if the file ends before it did at the start: what was there is lost then.
-    """
-    at, file = extent.begin + taken, stream.fileno()
-    for each in _ranges(file, name, at, sizes.BLOCK, whole()):
-        yield each
-        at = each.start + each.size
-    stream.seek(at)
-    yield from read_blocks(stream, whole=whole(), lines_before=lambda: _count_lines(file, extent.begin, at))
-    if stream.tell() < extent.end:
-        raise _shrunk(name)
-
-
-def _shrunk(name: str) -> FileProblem:
-    return FileProblem(f"{name}: became shorter while it was read")
-
-
-def _ranges(file: int, name: str, at: int, size: int, whole: Callable[[bytes], int]) -> Iterator[ByteRange]:
-    """Yield ranges up to a record that does not fit into a block, or to where the file ends."""
-    while len(text := os.pread(file, size, at)) == size and b"\n" in text and (end := whole(text)) > 0:
-        yield ByteRange(file, name, at, end)
-        at += end
-
-
-def _count_lines(file: int, begin: int, end: int) -> int:
-    """Count the line ends between two places."""
-    count = 0
-    while begin < end and (piece := os.pread(file, min(sizes.BLOCK, end - begin), begin)):
-        count += piece.count(b"\n")
-        begin += len(piece)
-    return count

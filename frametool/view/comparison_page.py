@@ -97,13 +97,13 @@ def _paths(found: Comparison) -> Iterator[Shape]:
     begin = 0
     for at in range(1, len(levels) + 1):
         if at == len(levels) or levels[at] != levels[begin]:
-            colour = shade_of((levels[begin] + 0.5) / LEVELS, 0.0, 1.0)
+            colour = shade_of((levels[begin] + 0.5) / LEVELS)
             what = f"{found.names[1]}: {error[chosen[begin]]:.3g} m"
             yield PictureLine(points[begin : at + 1], colour, 2.0, title=what)
             begin = at
     yield PictureDot(*points[0], 4.0, "ink", f"{found.names[1]} begins")
     for level in range(LEVELS):
-        colour = shade_of(level / (LEVELS - 1), 0.0, 1.0)
+        colour = shade_of(level / (LEVELS - 1))
         yield PictureBox(MARGIN + level * 6.0, MARGIN + MAP + 18.0, 6.5, 10.0, colour)
     yield PictureWords(MARGIN + LEVELS * 6.0 + 8.0, MARGIN + MAP + 23.0, f"0 .. {worst:.3g} m", "soft")
     seen = f"{'xyz'[right]} right, {'xyz'[ahead]} up; {span:.4g} m"

@@ -121,8 +121,7 @@ class FrameScene:
         self.ground = None if tree.called(EARTH) in (fixed, below, target, source) else ground or _ground(tree)
         if self.ground is not None:  # the Earth's centre is no place to look from
             tree = _on(tree, self.ground)
-        for frame in filter(None, (fixed, below, target, source)):
-            tree.require(frame, frame)
+        tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
         self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.standing}
         self.names, self._roots = _in_order(tree, {name: _first_parent(tree, name) for name in tree.frames})

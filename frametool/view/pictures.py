@@ -39,11 +39,9 @@ STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 3
 PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
 
 
-def shade_of(value: float, low: float, high: float) -> str:
-    """Return the colour of a value between its bounds; that of the paper for nan."""
-    if value != value:  # noqa: PLR0124 - nan
-        return "paper"
-    place = (value - low) / (high - low) * (len(STOPS) - 1) if high > low else 0.0
+def shade_of(part: float) -> str:
+    """Return the colour of a part of the way from little, 0, to much, 1."""
+    place = part * (len(STOPS) - 1)
     at = min(int(place), len(STOPS) - 2)
     mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))
     return f"#{''.join(f'{part:02x}' for part in mixed)}"
@@ -78,11 +76,10 @@ class PictureBox(NamedTuple):
     width: float
     height: float
     colour: str
-    title: str = ""
 
 
 class PictureWords(NamedTuple):
-    """A text on one line, its middle at y; anchor: start, middle or end of it is at x; turn: degrees, clockwise."""
+    """A text on one line, its middle at y; anchor: start, middle or end of it is at x."""
 
     x: float
     y: float
@@ -91,7 +88,6 @@ class PictureWords(NamedTuple):
     anchor: str = "start"
     size: float = 12.0
     bold: bool = False
-    turn: float = 0.0
 
 
 Shape = PictureLine | PictureDot | PictureBox | PictureWords
@@ -143,14 +139,13 @@ def _element(shape: Shape) -> str:
         case PictureDot(x, y, radius, colour, title):
             place = f'cx="{_number(x)}" cy="{_number(y)}" r="{radius:g}"'
             return f"<circle {_fill(colour)} {place}>{_title(title)}</circle>\n"
-        case PictureBox(x, y, width, height, colour, title):
+        case PictureBox(x, y, width, height, colour):
             size = f'width="{_number(width)}" height="{_number(height)}"'
-            return f'<rect {_fill(colour)} x="{_number(x)}" y="{_number(y)}" {size}>{_title(title)}</rect>\n'
-        case PictureWords(x, y, text, colour, anchor, size_px, bold, turn):
+            return f'<rect {_fill(colour)} x="{_number(x)}" y="{_number(y)}" {size}/>\n'
+        case PictureWords(x, y, text, colour, anchor, size_px, bold):
             look = "" if anchor == "start" else f' text-anchor="{anchor}"'
             look += "" if size_px == 12.0 else f' font-size="{size_px:g}"'
             look += ' font-weight="bold"' if bold else ""
-            look += f' transform="rotate({turn:g} {_number(x)} {_number(y)})"' if turn else ""
             halo = " paper-line" if colour in PALETTE else ""
             return f'<text {_fill(colour, halo)} x="{_number(x)}" y="{_number(y)}"{look}>{_text(text)}</text>\n'
 
@@ -224,8 +219,8 @@ def _paint(axes: Any, shape: Shape, order: int) -> None:
         case PictureBox(x, y, width, height):
             right, bottom = x + width, y + height
             axes.fill([x, right, right, x], [y, y, bottom, bottom], linewidth=0.0, **look)
-        case PictureWords(x, y, text, _, anchor, size, bold, turn):
-            place = {"ha": ANCHORS[anchor], "va": "center", "rotation": -turn, "rotation_mode": "anchor"}
+        case PictureWords(x, y, text, _, anchor, size, bold):
+            place = {"ha": ANCHORS[anchor], "va": "center"}
             weight = "bold" if bold else "normal"
             axes.text(x, y, printable(text).replace("$", r"\$"), fontsize=size * POINTS, weight=weight, **place, **look)
 
@@ -288,7 +283,7 @@ def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> It
     size, done = -(-steps // PIECES), 0
     for stretch in stretches:
         for begin in range(0, max(len(stretch) - 1, 1), size):
-            shade = shade_of(LAST_SHADE * (done + begin) / steps, 0.0, 1.0)
+            shade = shade_of(LAST_SHADE * (done + begin) / steps)
             yield PictureLine(stretch[begin : begin + size + 1], shade, 1.5, 0.8, title=frame)
         done += len(stretch) - 1
 

@@ -1,6 +1,6 @@
-"""Runs of turtles as pictures: turtlesim's window with distance and commands over time, and maps of two gains.
+"""Runs of turtles as pictures: turtlesim's window with distance and commands over time.
 
-Knows what a plot needs of a run, and no file; a map is empty where the follower never was within reach.
+Knows what a plot needs of a run, and no file.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ from xml.sax.saxutils import escape
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
-from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords, shade_of
+from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
-    from frametool.sim.sweep import SweepResult
     from frametool.sim.turtle import Pen, TurtleState
     from frametool.view.pictures import Shape
 
@@ -219,51 +218,3 @@ def ticks(low: float, high: float) -> list[float]:
     step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return [count * step for count in range(first, max(last, first + 1) + 1)]
-
-
-SIDE = 400.0  # pixels of a map
-MAP_MARGIN = 70.0
-BAR = 15.0
-SHADES = 50  # of the bar
-
-
-def sweep_picture(gain_linear: Sequence[float], gain_angular: Sequence[float], result: SweepResult) -> Picture:
-    """Draw both maps side by side."""
-    columns = {"time to reach (s)": result.time_to_reach, "overshoot (m)": result.overshoot}
-    side = SIDE + 2.0 * MAP_MARGIN
-    shapes: list[Shape] = []
-    for index, (title, values) in enumerate(columns.items()):
-        shapes += _map(title, values.tolist(), gain_linear, gain_angular, MAP_MARGIN + index * side)
-    return Picture(2.0 * side, side, shapes)
-
-
-def _map(
-    title: str, rows: Sequence[Sequence[float]], linear: Sequence[float], angular: Sequence[float], left: float,
-) -> Iterator[Shape]:  # fmt: skip
-    """Draw one map: a rectangle for each pair, linear gains upwards, angular gains to the right, and their names."""
-    high, wide = SIDE / len(linear), SIDE / len(angular)
-    known = [value for row in rows for value in row if value == value]  # noqa: PLR0124 - nan
-    low, most = (min(known), max(known)) if known else (0.0, 0.0)
-    yield PictureWords(left, MAP_MARGIN - 16.0, title, size=14.0)
-    for row, values in enumerate(rows):
-        for column, value in enumerate(values):
-            label = f"linear {linear[row]:g}, angular {angular[column]:g}: {value:.4g}"
-            x, y = left + column * wide, MAP_MARGIN + SIDE - (row + 1) * high
-            yield PictureBox(x, y, wide, high, shade_of(value, low, most), label)
-    below, bottom = MAP_MARGIN + SIDE + 14.0, MAP_MARGIN + SIDE
-    yield PictureWords(left, below, f"{angular[0]:g}")
-    yield PictureWords(left + SIDE / 2.0, below, "angular gain (1/s)", anchor="middle")
-    yield PictureWords(left + SIDE, below, f"{angular[-1]:g}", anchor="end")
-    yield PictureWords(left - 6.0, bottom - 6.0, f"{linear[0]:g}", anchor="end")
-    yield PictureWords(left - 14.0, MAP_MARGIN + SIDE / 2.0, "linear gain (1/s)", anchor="middle", turn=-90.0)
-    yield PictureWords(left - 6.0, MAP_MARGIN + 6.0, f"{linear[-1]:g}", anchor="end")
-    yield from _bar(left + SIDE + 10.0, low, most)
-
-
-def _bar(left: float, low: float, high: float) -> Iterator[Shape]:
-    """Draw what the colours mean."""
-    for shade in range(SHADES):
-        y = MAP_MARGIN + SIDE * (SHADES - 1 - shade) / SHADES
-        yield PictureBox(left, y, BAR, SIDE / SHADES + 0.5, shade_of(shade / (SHADES - 1), 0.0, 1.0))
-    yield PictureWords(left, MAP_MARGIN - 8.0, f"{high:.3g}")
-    yield PictureWords(left, MAP_MARGIN + SIDE + 14.0, f"{low:.3g}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from itertools import groupby, pairwise
 from operator import itemgetter
-from time import monotonic, sleep
+from time import monotonic
 from typing import TYPE_CHECKING
 from unicodedata import east_asian_width
 
@@ -93,7 +93,6 @@ class Canvas:
 LINK, TRAIL, AXIS = range(3)  # ranks of dots
 AXES = ("red", "green", "blue")
 LEAST_LINES, LEAST_COLUMNS = 4, 20
-FRAME = 0.1  # seconds between two pictures
 SAME = 3.0  # dots within which frames share a name
 
 
@@ -185,22 +184,6 @@ def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color:
 
     columns, lines = get_terminal_size(stdout.fileno())
     coloured_console(color).print(_rich_text(TerminalPicture(scene, columns, lines - 1, eye)))
-
-
-def play(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
-    """Show a scene from its time on to the last stamp, a second a second, in the whole terminal."""
-    from rich.live import Live
-
-    begin_ns, (_, last_ns) = scene.at_ns or 0, scene.span_ns
-    console, begin = coloured_console(color), monotonic()
-    with Live(console=console, auto_refresh=False) as live:
-        while True:
-            scene.at_ns = min(begin_ns + round((monotonic() - begin) * BILLION), last_ns)
-            picture = TerminalPicture(scene, console.width, console.height - 1, eye)
-            live.update(_rich_text(picture), refresh=True)
-            if scene.at_ns >= last_ns:
-                return
-            sleep(FRAME)
 
 
 def _rich_text(picture: TerminalPicture) -> Text:

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 TOOL = [sys.executable, "-c", "from frametool.cli import main; main()"]
 ROBOT = ROOT / "examples" / "robot.yaml"
 FRAMES = ("map", "base_link", "lidar", "camera_optical", "tool")
-GOAL = 3000  # commands a second
+GOAL = 1000  # commands a second
 ALONE = 20  # commands that get a process each
 RANDOM = Random(1)  # noqa: S311 - of numbers to calculate with
 

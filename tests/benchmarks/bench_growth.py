@@ -85,7 +85,6 @@ WORKS = (
     Work("messages, shuffled", 10_000, "lookup @late_dump.yaml map tool --at 1.00001"),
     Work("messages, each twice", 10_000, "lookup @twice.yaml map tool --at 1.00001"),
     Work("messages, forgotten", 10_000, "lookup @dump.yaml map tool --cache 0.001"),
-    Work("messages, as tf2", 10_000, "lookup @dump.yaml map tool --tf2 ros2"),
     Work("changes of parent", 4_000, "lookup @reparented.yaml map base --at 0.01"),
     Work("names, unknown frame", 10_000, "lookup @frames.yaml world f12x34", 4),
     Work("rows", 200_000, "apply --transform " + POSE + " -i @points.csv"),

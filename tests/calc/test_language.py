@@ -97,8 +97,7 @@ WORTH: list[tuple[str, Any, str]] = [
     ("-2^2 + 2^3^2/2 - --1", 251.0, "a number"),
     ("1km - 2 * 3cm + 4mm", 999.944, "a number in m"),
     ("1.5s + 20ms - 3us + 4ns", 1.519997004, "a number in s"),
-    ("sqrt(3m * 3m + 4m^2)", 5.0, "a number in m"),
-    ("10m / 4s", 2.5, "a number in m/s"),
+    ("sqrt((3m / 1m) ^ 2 + 4 ^ 2) * 1m", 5.0, "a number in m"),
     ("sin(30deg) + cos(pi/3) + tan(45deg)", 2.0, "a number"),
     ("asin(0.5) + acos(0.5)", PI / 2, "a number in rad"),
     ("atan(-1e300)", -PI / 2, "a number in rad"),
@@ -131,28 +130,28 @@ def test_right_angles_in_degrees_and_decimal_lengths_are_exact(text: str, expect
 
 # the whole text: the sentence, the expression, the caret
 REFUSED = """
-frametool: map<-base_link * map<-tool: 'base_link' and 'map' do not touch; frames that touch: inv(map<-base_link) * map<-tool  (= base_link<-tool), or inv(map<-tool) * map<-base_link  (= tool<-base_link)
+frametool: map<-base_link * map<-tool: 'base_link' and 'map' do not touch
   (map<-base_link) * (map<-tool)
                    ^
-frametool: base_link<-tool * map<-tool: 'tool' and 'map' do not touch; frames that touch: base_link<-tool * inv(map<-tool)  (= base_link<-map), or map<-tool * inv(base_link<-tool)  (= map<-base_link)
+frametool: base_link<-tool * map<-tool: 'tool' and 'map' do not touch
   (base_link<-tool) * (map<-tool)
                     ^
-frametool: lidar<-imu_link * tool<-base_link: 'imu_link' and 'tool' do not touch; a lookup between them is missing: imu_link<-tool
+frametool: lidar<-imu_link * tool<-base_link: 'imu_link' and 'tool' do not touch
   (lidar<-imu_link) * (tool<-base_link)
                     ^
-frametool: mean() needs two poses of the same frames, found map<-base_link and map<-tool; for tool seen from base_link: inv(map<-base_link) * map<-tool
+frametool: mean() needs two poses of the same frames, found map<-base_link and map<-tool
   mean(map<-base_link, map<-tool)
   ^
-frametool: dist() compares two poses seen from one frame, found map<-tool and tool<-base_link; write inv(map<-tool) for the first
+frametool: dist() compares two poses seen from one frame, found map<-tool and tool<-base_link
   dist(map<-tool, tool<-base_link)
   ^
-frametool: dist() compares two poses seen from one frame, found map<-tool and base_link<-lidar; bring the second over: (map<-base_link) * base_link<-lidar
+frametool: dist() compares two poses seen from one frame, found map<-tool and base_link<-lidar
   dist(map<-tool, base_link<-lidar)
   ^
-frametool: map<-lidar takes points in 'lidar', found one in 'camera_optical'; lidar<-camera_optical stands between
+frametool: map<-lidar takes points in 'lidar', found one in 'camera_optical'
   (map<-lidar) * ([1, 2, 3] in camera_optical)
                ^
-frametool: map<-lidar takes points in 'lidar', found one in 'map'; inv(map<-lidar) takes points in map
+frametool: map<-lidar takes points in 'lidar', found one in 'map'
   (map<-lidar) * trans(map<-tool)
                ^
 frametool: the pose stands on the left: map<-lidar * point
@@ -197,7 +196,7 @@ frametool: unexpected '('
 frametool: d is a tree; ask it: d[TARGET<-SOURCE]
   d * 2
   ^
-frametool: interp() needs two poses of the same frames, found map<-tool and map<-lidar; for lidar seen from tool: inv(map<-tool) * map<-lidar
+frametool: interp() needs two poses of the same frames, found map<-tool and map<-lidar
   interp(map<-tool, map<-lidar, 0.5)
   ^
 frametool: this is map<-tool already
@@ -236,6 +235,18 @@ frametool: sin() takes an angle, found a number in m
 frametool: the sum of two points depends on the origin; subtract them, or use mean(..)
   trans(map<-tool) + trans(map<-lidar)
                    ^
+frametool: cannot multiply a number in m by a number in m; units have no powers
+  3m * 3m
+     ^
+frametool: cannot divide a number in m by a number in s
+  10m / 4s
+      ^
+frametool: a power takes a plain number, found a number in m
+  3m ^ 2
+     ^
+frametool: sqrt() takes a plain number, found a number in m
+  sqrt(4m)
+  ^
 frametool: an exponent is a plain number, found a number in m
   2 ^ 1m
     ^
@@ -253,7 +264,7 @@ TEXTS = [REFUSED[at : at + 3] for at in range(0, len(REFUSED), 3)]
 
 
 @pytest.mark.parametrize(("sentence", "text", "caret"), TEXTS, ids=[row[1].strip() for row in TEXTS])
-def test_what_does_not_fit_is_refused_with_its_place_and_what_to_write(sentence: str, text: str, caret: str) -> None:
+def test_what_does_not_fit_is_refused_with_its_place(sentence: str, text: str, caret: str) -> None:
     with pytest.raises(FrametoolError) as caught:
         evaluate(text[2:], scope())
     assert f"frametool: {caught.value}" == sentence
@@ -271,11 +282,6 @@ def test_what_does_not_fit_is_refused_with_its_place_and_what_to_write(sentence:
     ("3 * deg", "unknown name 'deg'; a unit stands close to its number: 1deg"),
     ("inv", "inv is a function: inv(pose)"),
     ("goal = map<-tool;goal(1)", "unknown function 'goal'; goal is a value, poses are joined by *"),
-    ("goal = (map<-tool) * {xyz: [1, 0, 0]} as tool<-goal;goal * goal", "inv(goal) * goal  (= goal<-goal)"),
-    ("d[map<-lidar] * (d[map<-lidar])", "inv(d[map<-lidar]) * d[map<-lidar]  (= lidar<-lidar)"),
-    ("{parent: a, name: b} * {parent: a, name: c}", "inv({parent: a, name: b}) * {parent: a, name: c}  (= b<-c)"),
-    ("dist({parent: a, name: b}, {parent: c, name: d})", "a lookup between them is missing: a<-c"),
-    ("dist(d[map<-lidar], d[base_link<-lidar])", "write inv(..) for both"),
 ])  # fmt: skip
 def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:
     here = scope()
@@ -285,25 +291,6 @@ def test_a_mistake_names_what_was_meant(text: str, hint: str) -> None:
     with pytest.raises(FrametoolError) as caught:
         evaluate(wrong, here)
     assert hint.replace("ROBOT", str(by.EXAMPLES / "robot.yaml")) in str(caught.value)
-
-
-@pytest.mark.parametrize(("text", "written"), [
-    ("inv(map<-tool) * (base_link<-map)", "inv(map<-tool) * inv(base_link<-map)  (= tool<-base_link), or base_link<-map * map<-tool  (= base_link<-tool)"),
-    ("inv(map<-tool) * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * inv(map<-tool)  (= base_link<-map)"),
-    ("( inv (map<-tool) ) * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * inv (map<-tool)  (= base_link<-map)"),
-    ("(map<-tool) ^ -1 * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * ((map<-tool) ^ -1)  (= base_link<-map)"),
-    ("inv(inv(map<-tool)) * (map<-base_link)", "inv(map<-tool) * map<-base_link  (= tool<-base_link), or inv(map<-base_link) * map<-tool  (= base_link<-tool)"),
-    ("inv((map<-tool)^-1) * (map<-base_link)", "inv(map<-tool) * map<-base_link  (= tool<-base_link), or inv(map<-base_link) * map<-tool  (= base_link<-tool)"),
-    ("inv(inv(inv(map<-tool))) * (tool<-base_link)", "map<-tool * tool<-base_link  (= map<-base_link), or inv(tool<-base_link) * inv(map<-tool)  (= base_link<-map)"),
-    ("({} as a<-b)^-1 * ({} as b<-c)", "({} as a<-b) * ({} as b<-c)  (= a<-c), or inv({} as b<-c) * (({} as a<-b)^-1)  (= c<-a)"),
-])  # fmt: skip
-def test_no_suggestion_inverts_an_inverse(text: str, written: str) -> None:
-    with pytest.raises(FrametoolError) as caught:
-        evaluate(text, scope())
-    assert str(caught.value).partition("frames that touch: ")[2] == written
-    for each in written.split(", or "):
-        product, _, frames = each[:-1].partition("  (= ")
-        assert str(evaluate(product, scope()).type) == frames
 
 
 @pytest.mark.parametrize("text", [

@@ -120,12 +120,12 @@ def test_tables_and_records_have_the_same_numbers(run: Callable[..., Any]) -> No
     assert column(table, *names).tolist() == [[json.loads(line)[name] for name in names] for line in records.splitlines()]
 
 
-def test_a_row_in_another_frame_is_a_bad_row_that_says_what_to_write(run: Callable[..., Any]) -> None:
+def test_a_row_in_another_frame_is_a_bad_row(run: Callable[..., Any]) -> None:
     rows = "frame,x,y,z\nlidar,1,2,3\nimu_link,1,2,3\nlidar,4,5,6\n"
     done = run("calc", "--tree", ROBOT, "(map<-lidar) * row", "--on-error", "skip", stdin=rows)
     assert done.status == 3
     assert [line.split(",")[0] for line in done.out.splitlines()] == ["frame", "map", "map"]
-    assert "stdin:3:frame: map<-lidar takes points in 'lidar', found one in 'imu_link'; lidar<-imu_link stands between" in done.err
+    assert "stdin:3:frame: map<-lidar takes points in 'lidar', found one in 'imu_link'" in done.err
     empty = run("calc", "--tree", ROBOT, "(map<-lidar) * row", "--on-error", "null", stdin=rows)
     assert empty.out.splitlines()[2] == "imu_link,,,"
 
@@ -191,12 +191,6 @@ def test_the_result_replaces_ours_or_stands_beside(run: Callable[..., Any]) -> N
     assert kept == f"{rows.splitlines()[0]},i_x,i_y,i_z,i_roll_deg,i_pitch_deg,i_yaw_deg\n1,1,2,3,0,0,90,a,-2.0,1.0,-3.0,0.0,0.0,-90.0\n"
     assert run("calc", "trans(row) - row.x * vector([1, 0, 0])", "--as", "pose", stdin="x,y,z\n1,2,3\n").out == "x,y,z\n0.0,2.0,3.0\n"
     assert run("calc", "row", "--as", "vector", "-f", "json", "--in", "json", stdin="[1, 2, 3]\n").out == "[1.0, 2.0, 3.0]\n"
-
-
-def test_jobs_change_no_byte(run: Callable[..., Any]) -> None:
-    rows = "x,y,z,k\n" + "1,2,3,4\n" * 90_000
-    arguments = ("calc", "--tree", ROBOT, "-e", "p=(map<-lidar) * row", "-e", "d=norm(p) * row.k")
-    assert run(*arguments, "--jobs", "2", "--quiet", stdin=rows).out == run(*arguments, "--quiet", stdin=rows).out
 
 
 def test_a_table_of_poses_is_a_list_with_a_name(run: Callable[..., Any]) -> None:

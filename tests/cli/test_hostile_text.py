@@ -75,7 +75,7 @@ def test_a_nul_ends_no_name(tmp_path: Path) -> None:
     assert shell.run("lookup", str(tree), *both, text=b"f,g\nworld\0map,map\nworld,map\n")[0] == 3
 
 
-@pytest.mark.parametrize("arguments", [["lookup", "TREE", "map", "lidar"], ["invert"], ["invert", "--jobs", "2"]])
+@pytest.mark.parametrize("arguments", [["lookup", "TREE", "map", "lidar"], ["invert"]])
 # Python itself needs five files to start where a .pth file imports something
 @pytest.mark.parametrize("limit", ["-n 5", "-n 6", "-v 40000", "-v 60000", "-v 120000"])
 def test_what_the_system_runs_out_of_is_one_line(arguments: list[str], limit: str) -> None:

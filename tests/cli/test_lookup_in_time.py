@@ -5,12 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-
-from frametool.ros.messages import ODD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -164,75 +161,6 @@ def test_misuse_is_told(ask: Run, arguments: list[str], complaint: str) -> None:
     outcome = ask("map", "base", *arguments)
     assert outcome.status == 2
     assert complaint in outcome.err
-
-
-def test_tf2s_words_and_rules_are_there_for_those_who_compare(ask: Run) -> None:
-    text = DRIVE.replace("{stamp: 2,", "{stamp: 0, xyz: [9, 9, 9]}, {stamp: 2,")
-    outcome = ask("map", "base", "--at", "1", "--tf2", "ros1", text=text)
-    assert outcome.status == 0
-    assert outcome.err == (
-        "Warning: TF_REPEATED_DATA ignoring data with redundant timestamp for frame base at time 0.000000 "
-        "according to authority default_authority\n"
-    )
-    missing = ask("map", "base", "--at", "3", "--tf2", "ros1", "-f", "yaml")
-    assert missing.err == (
-        "frametool: Lookup would require extrapolation 1.000000000s into the future.  Requested time 3.000000000 but the "
-        "latest data is at time 2.000000000, when looking up transform from frame [base] to frame [map]\n"
-    )
-
-
-def as_message(call: dict[str, Any]) -> str:
-    """Write a golden call as rostopic echo prints it."""
-    position, rotation = (
-        ", ".join(f"{name}: {value if value in ODD else float(value)!r}" for name, value in zip("xyzw", values, strict=False))
-        for values in (call["t"], call["q"])
-    )
-    seconds, nanoseconds = divmod(call["stamp_ns"], 10**9)
-    return (
-        f"header: \n  stamp: \n    secs: {seconds}\n    nsecs: {nanoseconds}\n  frame_id: {json.dumps(call['parent'])}\n"
-        f"child_frame_id: {json.dumps(call['child'])}\n"
-        f"transform: \n  translation: {{{position}}}\n  rotation: {{{rotation}}}\n---\n"
-    )
-
-
-def test_what_tf2_refuses_in_a_recording_is_told_in_its_words_and_the_run_goes_on(run: Run) -> None:
-    """Numbers and texts: tf2 0.7.6 BufferCore, tests/golden/set_transform_rules.json."""
-    golden = json.loads((Path(__file__).parents[1] / "golden" / "set_transform_rules.json").read_text())
-    # a message does not say whether it was latched: what needs that is left out
-    calls = [call for call in golden["calls"] if not call["static"] and call["child"] != "s"]
-    logged = "".join(call["stderr"] for call in calls).replace('"auth"', '"default_authority"')
-    expected = [line for line in logged.splitlines() if not line.startswith("         at line")]
-    outcome = run("tree", "-", "--tf2", "ros1", "-f", "tf2", stdin="".join(map(as_message, calls)))
-    assert outcome.status == 0
-    assert outcome.err.replace("authority default_authority", "authority auth").splitlines() == expected
-
-
-@pytest.mark.parametrize("rules", ["ros1", "ros2"])
-def test_a_slash_before_its_name_does_not_hold_a_frame_still(run: Run, rules: str) -> None:
-    calls = ({"parent": "/a", "child": "/b", "stamp_ns": at, "t": (at, 0, 0), "q": (0, 0, 0, 1)} for at in (1, 3, 5))
-    stdin = "".join(map(as_message, calls))
-    found = (
-        answer(run("lookup", "-", "a", "b", "--at", f"{at}ns", "--tf2", rules, "-f", "json", stdin=stdin)) for at in (1, 2, 4)
-    )
-    assert [each["xyz"][0] for each in found] == [1.0, 2.0, 4.0]
-
-
-@pytest.mark.parametrize("word", ["Infinity", "-.inf", "inf"])
-def test_tf2_takes_infinity_and_answers_at_other_times(run: Run, word: str) -> None:
-    calls = [{"parent": "a", "child": "b", "stamp_ns": at, "t": (at, 0, 0), "q": (0, 0, 0, 1)} for at in (1, 3)]
-    stdin = "".join(map(as_message, calls)).replace("x: 1.0", f"x: {word}", 1)
-    assert answer(run("lookup", "-", "a", "b", "--tf2", "ros1", "-f", "json", stdin=stdin))["xyz"] == [3.0, 0.0, 0.0]
-
-
-@pytest.mark.parametrize(("source", "target"), [(1, 0), (0, 1)])
-def test_tf2_takes_more_than_a_thousand_edges_for_a_loop(run: Run, source: int, target: int) -> None:
-    """A chain of 1000 works and one of 1001 does not: tf2 0.7.6, observed."""
-    edges = "".join(f"- {{name: f{at + 1}, parent: f{at}, xyz: [1, 0, 0]}}\n" for at in range(1001))
-    whole, less = (
-        run("lookup", "-", f"f{target * last}", f"f{source * last}", "--tf2", "ros1", stdin=edges) for last in (1001, 1000)
-    )
-    assert (whole.status, less.status) == (4, 0)
-    assert "The tf tree is invalid because it contains a loop.\nFrame f1 exists with parent f0." in whole.err
 
 
 def test_many_stamps_with_two_poses_are_counted_as_stamps(run: Run) -> None:

@@ -327,7 +327,7 @@ def test_eight_numbers_between_commas_are_a_trajectory_without_being_told(run: R
 
 
 def test_the_help_of_a_group_lists_its_commands(run: Run) -> None:
-    for arguments, named in (((), ("convert", "lookup", "calc")), (("sim",), ("follow", "run", "sweep", "teleop"))):
+    for arguments, named in (((), ("convert", "lookup", "calc")), (("sim",), ("follow", "run", "teleop"))):
         text = run(*arguments, "--help").out
         assert all(f"\n  {name} " in text for name in named)
 

@@ -20,7 +20,6 @@ WRITERS = {
     "static": ["static", TREE],
     "monitor": ["monitor", TREE],
     "simulation": ["sim", "follow", "--duration", "0.2"],
-    "sweep": ["sim", "sweep", "--duration", "0.2", "--gain-linear", "1", "--gain-angular", "4"],
 }
 pytestmark = pytest.mark.parametrize("arguments", WRITERS.values(), ids=WRITERS)
 

@@ -60,7 +60,6 @@ help extrinsics
 help cookbook
 sim follow --help
 sim run --help
-sim sweep --help
 sim teleop --help
 """
 LINES = [*dict.fromkeys([*TABLE, *((line, "") for line in FURTHER.split("\n") if line)])]

@@ -192,26 +192,6 @@ def test_every_reader_of_trees_normalises_where_its_error_advises_to(run: Run, c
     assert (taken.status, taken.err) == (0, "")
 
 
-def test_tf2_takes_no_normalizing(run: Run) -> None:
-    assert run("lookup", "q", "a", "b", "--tf2", "ros1", "--normalize", files={"q": MESSAGES}).status == 2
-
-
-def test_tf2_says_past_or_future_of_two_trees_where_an_end_has_no_data(run: Run) -> None:
-    """BufferCore walks until the data end; only where both walks reach a root are there two trees (TF2 0.7.6)."""
-    trees = "".join(
-        f"- {{name: {child}, parent: {parent}, samples: [{{stamp: {begin}}}, {{stamp: {begin + 2}}}]}}\n"
-        for parent, child, begin in (("odom", "base", 10), ("island", "rock", 20))
-    )
-    for at, expected in (
-        ("11", "Lookup would require extrapolation 9.000000000s into the past.  Requested time 11.000000000 but the earliest data is at time 20.000000000, when looking up transform from frame [rock] to frame [base]"),
-        ("30", "Lookup would require extrapolation 18.000000000s into the future.  Requested time 30.000000000 but the latest data is at time 12.000000000, when looking up transform from frame [rock] to frame [base]"),
-    ):
-        outcome = run("lookup", "-", "base", "rock", "--at", at, "--tf2", "ros1", stdin=trees)
-        assert (outcome.status, outcome.err) == (4, f"frametool: {expected}\n")
-    whole = run("lookup", "-", "base", "rock", "--tf2", "ros1", stdin=trees)
-    assert "Could not find a connection between 'base' and 'rock'" in whole.err
-
-
 # --- deep and many -------------------------------------------------------------------------------------------------
 
 
@@ -265,7 +245,7 @@ def test_random_options_never_end_in_a_traceback(run: Run) -> None:
     draw = random.Random(7)  # noqa: S311 - not for secrets
     values = [*HUGE, *FAR, "0", "1", "latest", "0:2:0.5", "bad.txt", "-1", "500000000ns", "1.5"]
     options = ["--at", "--times", "--source-at", "--cache", "--start", "--stop", "--rate", "-l", "--precision", "--fixed"]
-    switches = ["--moving", "--tf2=ros1", "--tf2=ros2", "--on-error=skip", "--on-error=null", "--normalize", "--deg", "-v"]
+    switches = ["--moving", "--on-error=skip", "--on-error=null", "--normalize", "--deg", "-v"]
     for _ in range(300):
         command = draw.choice(["lookup", "echo", "tree", "monitor", "check"])
         ends = [draw.choice(["map", "base", "lidar", "nope"]) for _ in range(0 if command in ("tree", "check") else 2)]

@@ -283,20 +283,6 @@ def test_the_covariance_of_a_point_is_three_sigmas_and_nine_columns() -> None:
     assert unknown == "1.0  2.0  3.0  m in map  sigma unknown\n"
 
 
-def test_rows_with_covariances_are_looked_up_in_one_process(run: Run) -> None:
-    rows = ["lookup", "robot.yaml", "map", "--source-column", "s", "--covariance"]
-    done = run(*rows, "--jobs", "2", stdin="s\ntool\narm\n", files=FILES)
-    assert (done.status, done.out) == (2, "")
-    assert "--jobs is not for --covariance: the edges that are taken for exact are counted in one process" in done.err
-
-
-@pytest.mark.parametrize("policy", ["ros1", "ros2"])
-def test_a_buffer_with_the_rules_of_tf2_keeps_covariances(policy: str, run: Run) -> None:
-    ours = run("lookup", "drive.yaml", "map", "cart", "--at", "0.5", "--covariance", "-f", "json", files=FILES)
-    theirs = run("lookup", "drive.yaml", "map", "cart", "--at", "0.5", "--covariance", "-f", "json", "--tf2", policy)
-    assert entries_of(theirs.out) == entries_of(ours.out)
-
-
 def test_a_sigma_reaches_lookups_of_a_batch_and_of_merged_trees(run: Run) -> None:
     tree = "{name: cam, parent: tool, xyz: [0, 0, 1], sigma: {xyz: 0.5}}"
     done = run("lookup", "robot.yaml", "map", "cam", "--with", tree, "--covariance", "-f", "json", files=FILES)

@@ -91,7 +91,6 @@ def test_what_is_drawn_can_be_chosen(run: Run, arguments: tuple[str, ...], names
         (("--from", "x,1"), 2, "'x' is not a number"),
         (("-o", "x.gif"), 2, "no form has the suffix '.gif'"),
         (("-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
-        (("--live",), 2, "--live plays what moves in a terminal"),
         (("--overlay",), 2, "--overlay takes two trees"),
         ((ROBOT, "map", "--overlay"), 2, "--overlay takes two trees"),
         (("{frames: {a: }}", "--overlay", "-f", "svg"), 4, "unknown frame 'map'"),
@@ -147,14 +146,6 @@ def shown_in_a_terminal(*arguments: str, size: tuple[int, int] = (60, 20), comma
     assert tool.wait(20) == 0
     os.close(ours)
     return drawn
-
-
-def test_a_moving_tree_is_played_to_its_end_and_the_cursor_comes_back() -> None:
-    drawn = shown_in_a_terminal(DRIVE, "--live", "--at", "3.6")
-    times = re.findall(r"at (\d\.\d{3}) s", drawn.decode())
-    assert times[-1] == "4.000"
-    assert times == sorted(times)
-    assert drawn.rindex(b"\x1b[?25h") > drawn.rindex(b"\x1b[?25l")
 
 
 @pytest.mark.parametrize("no_color", [False, True])

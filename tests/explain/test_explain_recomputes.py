@@ -66,7 +66,7 @@ def test_each_line_of_an_operation_recomputes(operation: str, digits: int | None
     for _ in range(6):
         given, options = operands(operation, random)
         to = ",".join(random.sample(("quaternion", "rpy_deg", "matrix", "axis_angle", "euler:rzxz"), 2))
-        sheet = explain(operation.split(maxsplit=1)[0], *given, to=to, precision=digits, full=random.random() < 0.5, **options)
+        sheet = explain(operation.split(maxsplit=1)[0], *given, to=to, precision=digits, **options)
         recheck(str(sheet), digits)
 
 

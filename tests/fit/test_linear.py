@@ -33,7 +33,6 @@ FITS = [
     "align|examples/truth.tum|examples/mono.tum|--offset|auto|--align|sim3|-f|tum",
     *(f"compare|examples/truth.tum|examples/odometry.tum|--mount|auto|--align|{kind}|-f|json" for kind in ("none", "yaw", "se3")),
     "compare|examples/truth.tum|examples/mono.tum|--as|evo|--max-diff|1|--align|sim3|-f|json",
-    "sim|sweep|--gain-linear|0.5,1.5|--gain-angular|1,4|-f|json",
 ]
 
 

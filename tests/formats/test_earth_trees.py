@@ -239,13 +239,6 @@ def test_python_builds_one_earth_by_either_name() -> None:
     assert buffer.lookup_many("earth", "map", [0, 5]).shape == (2,)
 
 
-def test_tf2_knows_no_second_name() -> None:
-    buffer = frametool.TransformBuffer(policy="ros2")
-    buffer.insert("earth", "map", frametool.Transform.of(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), 0)
-    with pytest.raises(FrametoolError):
-        buffer.lookup("ecef", "map", 0)
-
-
 def test_an_edge_between_the_two_names_is_nothing_or_a_mistake(tmp_path: Path) -> None:
     edge = "{{frames: [{{name: ecef, parent: earth, xyz: [{}, 0, 0]}}, {{name: map, parent: ecef, xyz: [1, 0, 0]}}]}}"
     with pytest.warns(FrametoolWarning, match="'earth' and 'ecef' are one frame; the edge between them is left out"):

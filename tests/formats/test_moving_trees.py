@@ -45,12 +45,12 @@ def message(x: float, stamp_ns: int, parent: str = "map", child: str = "base") -
     return MESSAGE.format(x=x, sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9, parent=parent, child=child)
 
 
-def loaded(tmp_path: Path, *texts: str, moving: bool = False, policy: str = "frametool") -> FrameTree | TransformBuffer:
+def loaded(tmp_path: Path, *texts: str, moving: bool = False) -> FrameTree | TransformBuffer:
     """Load texts as files 0.yaml, 1.yaml, .."""
     paths = [tmp_path / f"{number}.yaml" for number in range(len(texts))]
     for path, text in zip(paths, texts, strict=True):
         path.write_text(text)
-    return load(*paths, moving=moving, policy=policy)
+    return load(*paths, moving=moving)
 
 
 def x_of(frames: FrameTree | TransformBuffer, target: str, source: str, at_ns: int | None = None) -> float:
@@ -144,8 +144,3 @@ def test_a_sample_may_name_another_parent(tmp_path: Path) -> None:
 """
     buffer = loaded(tmp_path, text)
     assert [x_of(buffer, "w", "ball", at) for at in (0, 5, 10**9)] == [101.0, 101.0, 2.0]
-
-
-def test_tf2_takes_no_stamp_twice_and_says_so_in_its_words(tmp_path: Path) -> None:
-    with pytest.warns(FrametoolWarning, match="^Warning: TF_REPEATED_DATA .* according to authority default_authority$"):
-        loaded(tmp_path, message(1, EPOCH) + message(2, EPOCH), policy="ros1")

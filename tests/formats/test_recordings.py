@@ -334,12 +334,6 @@ def test_seconds_of_ros1_are_not_negative(tmp_path: Path) -> None:
     assert refusal_of(tmp_path, text).endswith("secs -1 is beyond 0 .. 4294967295")
 
 
-def test_tf2_adds_up_what_a_stamp_holds(tmp_path: Path) -> None:
-    (tmp_path / "tf.txt").write_text(GOOD.replace("nanosec: 123456789", "nanosec: 2000000001"))
-    (edge,) = Recording(tmp_path / "tf.txt").edges(raw=True)
-    assert edge.stamp_ns == 1_700_000_002_000_000_001
-
-
 def test_no_message_is_written_whose_stamp_no_message_can_hold() -> None:
     assert stamp(-1, "ros2") == {"sec": -1, "nanosec": 999_999_999}
     for form, stamp_ns in (("ros1", -1), ("ros1", 2**32 * 10**9), ("ros2", 2**63)):

@@ -16,7 +16,6 @@ from frametool.errors import (
     UnknownFrame,
     ValueInvalid,
 )
-from frametool.frames.policy import Refused
 
 EPOCH = 1_700_000_000_123_456_789  # a float of this size has steps of 256
 SECOND = 10**9
@@ -27,9 +26,9 @@ def shifted(x: float) -> Transform:
     return Transform.of(float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def moving(*, policy: str = "frametool", keep_ns: int | None = None) -> TransformBuffer:
+def moving(*, keep_ns: int | None = None) -> TransformBuffer:
     """Make map -> base, which moves by 1 m in 1000 ns, and base -> lidar, which stands."""
-    buffer = TransformBuffer(policy=policy, keep_ns=keep_ns)
+    buffer = TransformBuffer(keep_ns=keep_ns)
     buffer.insert("map", "base", shifted(0), EPOCH)
     buffer.insert("map", "base", shifted(1), EPOCH + 1000)
     buffer.insert("base", "lidar", shifted(10))
@@ -267,61 +266,6 @@ def test_a_hundred_thousand_frames_are_no_trouble() -> None:
     for frame in range(1, 100_001):
         buffer.insert(f"f{frame // 2}", f"f{frame}", shifted(1), 0)
     assert x_of(buffer.lookup("f0", "f100000")) == 17.0
-
-
-def test_ros2_normalises_any_quaternion_and_keeps_differing_repeats() -> None:
-    buffer = TransformBuffer(policy="ros2")
-    buffer.insert("a", "b", Transform.of(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 5.0), 0)
-    for x in (1, 2, 2):
-        buffer.insert("a", "b", shifted(x), 10)
-    buffer.insert("a", "b", shifted(4), 20)
-    assert [x_of(buffer.lookup("a", "b", at)) for at in (5, 10, 15)] == [0.5, 2.0, 3.0]
-
-
-def test_ros2_refuses_a_zero_quaternion_in_its_own_words() -> None:
-    with pytest.raises(Refused) as caught:
-        TransformBuffer(policy="ros2").insert("a", "b", Transform.of(*[0.0] * 7), 0, authority="auth")
-    start = 'Ignoring transform for child_frame_id "b" from authority "auth" because of'
-    assert caught.value.lines == [
-        f"Error:   TF_NAN_INPUT: {start} a nan value in the transform (0.000000 0.000000 0.000000) (nan nan nan nan)",
-        f"Error:   TF_DENORMALIZED_QUATERNION: {start} an invalid quaternion in the transform (nan nan nan nan)",
-    ]
-
-
-def test_ros2_switches_between_standing_and_moving() -> None:
-    buffer = TransformBuffer(policy="ros2")
-    buffer.insert("a", "b", shifted(1), 5)
-    buffer.insert("a", "b", shifted(2))
-    assert x_of(buffer.lookup("a", "b", 99)) == 2.0
-    buffer.insert("a", "b", shifted(3), 7)
-    with pytest.raises(LookupFailed, match=r"extrapolation at time 0.000000, but only time 0.000000 is in the buffer"):
-        buffer.lookup("a", "b", 99)
-
-
-def test_ros2_leaves_out_how_much_is_missing() -> None:
-    buffer = TransformBuffer(policy="ros2")
-    for stamp in (10, 11):
-        buffer.insert("odom", "base", shifted(0), stamp * SECOND)
-    with pytest.raises(TooLate) as caught:
-        buffer.lookup("odom", "base", 12 * SECOND)
-    assert str(caught.value) == (
-        "Lookup would require extrapolation into the future.  Requested time 12.000000 but the latest data is at time "
-        "11.000000, when looking up transform from frame [base] to frame [odom]"
-    )
-
-
-def test_tf2_follows_a_loop_as_far_as_it_does() -> None:
-    buffer = TransformBuffer(policy="ros1")
-    for parent, child in (("a", "b"), ("b", "c"), ("c", "a"), ("y", "x")):
-        buffer.insert(parent, child, shifted(1))
-    assert x_of(buffer.lookup("a", "c")) == 2.0
-    with pytest.raises(LookupFailed, match=r"^The tf tree is invalid because it contains a loop\.\nFrame b exists with parent a\."):
-        buffer.lookup("a", "x")
-
-
-def test_an_unknown_policy_names_the_known_ones() -> None:
-    with pytest.raises(ValueInvalid, match="frametool, ros1, ros2"):
-        TransformBuffer(policy="ros3")
 
 
 def test_a_rotation_looked_up_between_samples_is_their_slerp_to_the_bit() -> None:

@@ -1,6 +1,6 @@
-"""The buffer against the real tf2 0.7.6 BufferCore of ROS 1 (Debian's tf2_py): values, refusals, and every text.
+"""The buffer against the real tf2 0.7.6 BufferCore of ROS 1 (Debian's tf2_py): values, stamps, and what has no answer.
 
-Numbers: tests/golden/stamped_trees.json, lookup_full.json, slerp.json, set_transform_rules.json.
+Numbers: tests/golden/stamped_trees.json, lookup_full.json, slerp.json.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import pytest
 
 from frametool import Transform, TransformBuffer
 from frametool.errors import LookupFailed, NoDataAt, NotConnected, UnknownFrame
-from frametool.frames.policy import Refused
 from frametool.grammar.result import Style
 from frametool.ros.tf2_listing import write_tree
 
@@ -34,7 +33,6 @@ def read(name: str) -> Any:
 STAMPED = read("stamped_trees")["trees"]
 ACROSS = read("lookup_full")["trees"]
 SLERP = read("slerp")["cases"]
-RULES = read("set_transform_rules")
 
 
 def transform(xyz: Any, xyzw: Any) -> Transform:
@@ -44,7 +42,7 @@ def transform(xyz: Any, xyzw: Any) -> Transform:
 
 def filled(tree: dict[str, Any]) -> TransformBuffer:
     """Fill a buffer with the operations of a golden tree."""
-    buffer = TransformBuffer(policy="ros1", keep_ns=int(tree["cache_s"] * 1e9))
+    buffer = TransformBuffer(keep_ns=int(tree["cache_s"] * 1e9))
     for static, parent, child, stamp_ns, xyz, xyzw in tree["ops"]:
         buffer.insert(parent, child, transform(xyz, xyzw), stamp_ns, static=bool(static), authority="golden")
     return buffer
@@ -60,16 +58,15 @@ def assert_near(found: Transform, xyz: list[float], xyzw: list[float], tolerance
 
 
 @pytest.mark.parametrize("tree", STAMPED, ids=[f"tree-{number}" for number in range(len(STAMPED))])
-def test_lookups_in_time_are_tf2s_in_value_stamp_and_error_text(tree: dict[str, Any]) -> None:
+def test_lookups_in_time_are_tf2s_in_value_and_stamp_and_lack_the_same(tree: dict[str, Any]) -> None:
     buffer = filled(tree)
     for golden in tree["lookups"]:
         target, source, at_ns = golden["target"], golden["source"], golden["time_ns"] or None
         if target == source == "ghost":
             continue  # tf2 answers with the identity for frames nobody has heard of; frametool does not
         if "error" in golden:
-            with pytest.raises(KINDS[golden["error"]]) as caught:
+            with pytest.raises(KINDS[golden["error"]]):
                 buffer.lookup(target, source, at_ns)
-            assert str(caught.value) == golden["text"]
         else:
             assert_near(buffer.lookup(target, source, at_ns), golden["t"], golden["q"])
             assert (at_ns or buffer.latest(target, source) or 0) == golden["stamp_ns"]
@@ -96,9 +93,8 @@ def test_lookups_across_two_times_are_tf2s(tree: dict[str, Any]) -> None:
         times = golden["target_time_ns"] or None, golden["source_time_ns"] or None
         arguments = golden["target"], times[0], golden["source"], times[1], golden["fixed"]
         if "error" in golden:
-            with pytest.raises(LookupFailed) as caught:
+            with pytest.raises(LookupFailed):
                 buffer.lookup_across(*arguments)
-            assert str(caught.value) == golden["text"]
         else:
             assert_near(buffer.lookup_across(*arguments), golden["t"], golden["q"])
 
@@ -113,41 +109,6 @@ def test_interpolations_are_tf2s(case: dict[str, Any]) -> None:
     tolerance = 1e-12 if abs(sum(a * b for a, b in zip(case["q1"], case["q2"], strict=True))) < 1 - 1e-15 else 1e-8
     assert_near(buffer.lookup("a", "b", at_ns), case["t"], case["q"], tolerance)
     assert_near(buffer.lookup_many("a", "b", [at_ns])[0], case["t"], case["q"], tolerance)
-
-
-def refusal(buffer: TransformBuffer, call: dict[str, Any]) -> list[str]:
-    """Insert what a golden call says; return the lines that tf2 logs if it is refused."""
-    pose = transform(call["t"], call["q"])
-    try:
-        buffer.insert(call["parent"], call["child"], pose, call["stamp_ns"], static=call["static"], authority="auth")
-    except Refused as error:
-        return error.lines
-    return []
-
-
-def test_what_is_accepted_and_the_words_for_what_is_not_are_tf2s() -> None:
-    buffer = TransformBuffer(policy="ros1")
-    for call in RULES["calls"]:
-        logged = [line for line in call["stderr"].splitlines() if not line.startswith("         at line")]
-        assert refusal(buffer, call) == logged, call["case"]
-    assert list(buffer.frames) == RULES["frames"]
-    asked: list[tuple[str, str, int | None]] = [
-        ("odom", "s", None), ("odom", "s", 5 * 10**9), ("odom", "base", None), ("odom", "zero", None), ("odom", "zero", 1),
-    ]  # fmt: skip
-    for (target, source, at_ns), golden in zip(asked, RULES["after"], strict=True):
-        if "error" in golden:
-            with pytest.raises(KINDS[golden["error"]]) as caught:
-                buffer.lookup(target, source, at_ns)
-            assert str(caught.value) == golden["text"]
-        else:
-            assert_near(buffer.lookup(target, source, at_ns), golden["t"], golden["q"])
-
-
-def test_the_listing_after_all_rules_is_tf2s() -> None:
-    buffer = TransformBuffer(policy="ros1")
-    for call in RULES["calls"]:
-        refusal(buffer, call)
-    assert write_tree(buffer, Style("tf2")) == RULES["final_yaml"]
 
 
 def test_there_are_as_many_lookups_as_were_recorded() -> None:

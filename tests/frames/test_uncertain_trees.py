@@ -121,12 +121,6 @@ def test_a_covariance_holds_at_all_times() -> None:
     assert buffer.tree_at(SECOND).covariances == buffer.covariances == {"base": tuple(ENTRIES)}
 
 
-def test_names_are_kept_as_tf2_strips_them() -> None:
-    buffer = TransformBuffer(policy="ros2")
-    buffer.insert("/map", "/base", Transform.identity(), 1, covariance=SMALL)
-    assert buffer.covariance("map", "base") == ENTRIES
-
-
 def test_a_lookup_warns_of_a_wide_turn_once() -> None:
     tree = FrameTree()
     tree.add("a", "b", Transform.identity(), 100.0 * SMALL)

@@ -23,7 +23,7 @@ PLAIN = {
     "convert": [POSE], "compose": [POSE, POSE], "invert": [POSE], "relative": [POSE, POSE], "interpolate": [POSE, POSE, "0.5"],
     "lookup": [TREE, "map", "lidar"], "apply": [TREE, "map", "lidar", "1", "2", "3"], "tree": [TREE], "echo": [TREE, "map", "lidar"],
     "monitor": [TREE], "static": [TREE, "-f", "static2"], "check": [TREE], "sim follow": ["--duration", "0.1"],
-    "sim run": ["{turtles: {turtle1: {leader: square}}, duration: 0.1}"], "sim sweep": ["--duration", "0.1", "--gain-linear", "1", "--gain-angular", "4"],
+    "sim run": ["{turtles: {turtle1: {leader: square}}, duration: 0.1}"],
     "sim teleop": [], "calc": ["1 + 1"],
 }  # fmt: skip
 STREAM = {"convert": [], "invert": [], "apply": [TREE, "map"], "relative": ["--consecutive"], "compose": ["-", POSE], "calc": ["row"]}

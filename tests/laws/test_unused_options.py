@@ -21,7 +21,7 @@ FILES = ("robot.yaml", "drive.yaml", "walk.tum", "arm.urdf", "joints.csv")
 A, B = "{xyz: [1, 2, 3]}", "{rpy: [0, 0, 1]}"
 POINT = '{"point": [1, 2, 3], "a": 4, "b": 5, "c": 6}\n'
 ROWS = (
-    "--columns=a,b,c", "--keep", "--prefix=q", "--no-header", "--on-error=skip", "--max-errors=3", "--jobs=2", "-i=walk.tum",
+    "--columns=a,b,c", "--keep", "--prefix=q", "--no-header", "--on-error=skip", "--max-errors=3", "-i=walk.tum",
 )  # fmt: skip
 OF_POSES = (*ROWS, "--edges", "--array=x", "--camera-axes=opengl", "--stamps=walk.tum", "--in=csv")
 OF_FILES = ("--frames=a,b", "--topic=/tf", "--dh=modified", "--direction=parent-from-child")
@@ -51,7 +51,7 @@ MODES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
     (("check", "robot.yaml"), OF_FILES),
     (("diff", "robot.yaml", "robot.yaml"), OF_FILES),
     (("monitor", "drive.yaml"), OF_FILES),
-    (("view", "robot.yaml"), (*OF_FILES, "--path", "--live", "--sliders", "--overlay")),
+    (("view", "robot.yaml"), (*OF_FILES, "--path", "--sliders", "--overlay")),
     (("view", "robot.yaml", "-o", "x.svg"), ("--color=always",)),
     (("view", "robot.yaml", "-o", "x.glb"), ("--color=always", "--from=top")),
 )  # fmt: skip

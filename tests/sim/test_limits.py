@@ -36,9 +36,8 @@ FOLLOW = (*NUMBERS, "--delay", "--followers", "--spawn", "--leader")
 SCENE = "turtles: {turtle1: {leader: square}, turtle2: {spawn: [4, 2], follow: turtle1}}\nduration: 0.2\n"
 CASES = [
     *(("follow", option, value) for option in FOLLOW for value in VALUES),
-    *(("sweep", option, value) for option in (*NUMBERS, "--spawn", "--leader") for value in VALUES),
-    *((name, "--spawn", value) for name in ("follow", "sweep") for value in SPAWNS),
-    *((name, "--duration", value) for name in ("follow", "sweep") for value in VALUES if value not in ("inf", "1")),
+    *(("follow", "--spawn", value) for value in SPAWNS),
+    *(("follow", "--duration", value) for value in VALUES if value not in ("inf", "1")),
     *(("run", option, value) for option in ("--duration", "--reach", "--seed") for value in VALUES if value != "inf"),
 ]
 

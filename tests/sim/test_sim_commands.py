@@ -104,17 +104,12 @@ def test_the_example_scene_has_three_turtles_that_come_together(run: Run) -> Non
         (("follow", "--plot", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("follow", "--plot", "nowhere/f.svg"), 5, "nowhere/f.svg: no directory nowhere"),
-        (("sweep", "-o", "nowhere/f.csv"), 5, "nowhere/f.csv: no directory nowhere"),
         (("follow", "--holonomic"), 2, "--holonomic is for --turtlesim ros2"),
         (("follow", "--gain-linear", "1e308"), 1, "turtle2: gain_linear 1e+308"),
-        (("sweep", "--gain-linear", "1e308"), 2, "gain_linear 1e+308"),
         (("folow",), 2, "did you mean 'follow'?"),
         (("run", "bad.yaml"), 1, "bad.yaml:1:23: "),
         (("run", "{turtles: {a: {folow: b}}}"), 2, "unknown key 'folow'"),
         (("teleop",), 2, "standard input is no terminal"),
-        (("sweep", "--gain-linear", "1:2"), 2, "expected START:STOP:COUNT"),
-        (("sweep", "--gain-linear", "1:2:0"), 2, "COUNT must be 1"),
-        (("sweep", "--duration", "inf"), 2, "duration must be finite"),
     ],
 )
 def test_what_cannot_be_is_one_line_on_stderr(run: Run, arguments: tuple[str, ...], status: int, message: str) -> None:
@@ -174,24 +169,13 @@ def test_a_run_can_be_looked_at_as_frames_over_time(run: Run, tmp_path: Path, ar
     assert [track["count"] for track in head["tracks"]][:2] == [63, 63]
 
 
-@pytest.mark.parametrize("arguments", [("follow", "--duration", "1"), ("sweep", "--gain-linear", "1", "--duration", "1")])
-def test_a_png_needs_matplotlib_and_says_so(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
-    outcome = run("sim", *arguments, "--plot", "run.png")
+def test_a_png_needs_matplotlib_and_says_so(run: Run, tmp_path: Path) -> None:
+    outcome = run("sim", "follow", "--duration", "1", "--plot", "run.png")
     if find_spec("matplotlib"):
         assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     else:
         assert outcome.status == 5
         assert "pip install 'frametool[plot]'" in outcome.err
-
-
-def test_a_sweep_has_a_row_for_every_pair_and_a_heat_map(run: Run, tmp_path: Path) -> None:
-    arguments = ("--gain-linear", "0.1:2:3", "--gain-angular", "1,4", "-f", "csv", "--plot", "map.svg")
-    outcome = run("sim", "sweep", *arguments)
-    rows = [line.split(",") for line in outcome.out.splitlines()]
-    assert rows[0] == ["gain_linear", "gain_angular", "time_to_reach", "overshoot", "final_distance", "wall_hits"]
-    assert [row[0] for row in rows[1:]] == ["0.1", "0.1", "1.05", "1.05", "2.0", "2.0"]
-    titles = ET.fromstring((tmp_path / "map.svg").read_text()).findall(f".//{SVG}title")  # noqa: S314 - our own
-    assert len(titles) == 12
 
 
 @pytest.mark.parametrize("example", HELP_EXAMPLES)

@@ -12,7 +12,7 @@ from frametool.errors import ValueInvalid
 from frametool.sim.drivers import FollowController
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import RunSummary, simulate
-from frametool.sim.sweep import grid, rows, simulate_many
+from frametool.sim.sweep import simulate_many
 from frametool.sim.turtle import CENTRE
 
 if TYPE_CHECKING:
@@ -70,12 +70,6 @@ def test_overshoot_is_measured_as_one_follower_shows_it() -> None:
     expected = max(each - min(after[: at + 1]) for at, each in enumerate(after))
     many = simulate_many("circle", gain_linear=0.5, duration=10.0, reach=1.2)
     assert many.overshoot == pytest.approx(expected, abs=1e-9)
-
-
-def test_a_grid_has_a_record_for_every_pair() -> None:
-    records = list(rows([0.01, 1.0], [1.0, 2.0, 3.0], grid([0.01, 1.0], [1.0, 2.0, 3.0], duration=5.0)))
-    assert [(each["gain_linear"], each["gain_angular"]) for each in records][:4] == [(0.01, 1.0), (0.01, 2.0), (0.01, 3.0), (1.0, 1.0)]
-    assert (records[0]["time_to_reach"], records[0]["overshoot"]) == (None, None)
 
 
 def test_nobody_is_nobody() -> None:

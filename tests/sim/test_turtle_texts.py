@@ -16,7 +16,7 @@ from frametool.sim.readers import read_commands, read_script
 from frametool.sim.scene import Follow, tutorial
 from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import RunSummary, simulate
-from frametool.sim.step_writer import EMITS, FORMS, SHORT, StepWriter, table
+from frametool.sim.step_writer import EMITS, SHORT, StepWriter
 from frametool.sim.turtle import CENTRE, Twist
 
 if TYPE_CHECKING:
@@ -220,19 +220,6 @@ def test_a_leader_reads_what_a_follower_commanded() -> None:
         writer = StepWriter("commands", Style(form))
         text = "".join(part for step in simulate(tutorial(duration=0.2)) for part in writer.write(step))
         assert read_script(Source("commands", text)) == expected
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_a_table_shows_what_is_missing(form: str) -> None:
-    text = table([{"gain": 0.5, "time": None, "hits": 3}], Style(form))
-    assert {"text": "-", "yaml": "null", "json": "null", "csv": ",,"}[form] in text
-
-
-def test_every_row_of_a_yaml_table_has_one_line_whatever_is_missing() -> None:
-    table_rows: list[dict[str, float | None]] = [{"gain": 0.5, "time": None}, {"gain": 1e-5, "time": 2.0}]
-    text = table(table_rows, Style("yaml"))
-    assert text.splitlines() == ["- {gain: 0.5, time: null}", "- {gain: 1.0e-05, time: 2.0}"]
-    assert yaml.safe_load(text) == table_rows
 
 
 @pytest.mark.parametrize("name", ["a,b", 'a"b', "a\nb", " a", "world,"])

@@ -477,7 +477,7 @@ def test_a_missing_alt_is_told_once(run: Callable[..., Any]) -> None:
         assert len(done.err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("options", [[], ["--jobs", "2"], ["-f", "json"]])
+@pytest.mark.parametrize("options", [[], ["-f", "json"]])
 def test_a_zone_that_changes_is_told_once_with_the_row(options: list[str], run: Callable[..., Any]) -> None:
     places = [(48.1, 11.5, 0)] * 2000 + [(48.1, 12.5, 0), (48.1, 11.5, 0), (-48.1, 12.5, 0)] * 700
     done = run("convert", "--to", "utm", *options, stdin=table("lat,lon,alt", places))
@@ -513,10 +513,9 @@ def test_x_y_z_beside_lat_lon_remain_the_position_which_is_told(run: Callable[..
 # --- the first position as origin ---
 
 
-@pytest.mark.parametrize("jobs", [[], ["--jobs", "2"]])
-def test_the_first_good_row_is_the_origin(jobs: list[str], run: Callable[..., Any]) -> None:
+def test_the_first_good_row_is_the_origin(run: Callable[..., Any]) -> None:
     places = [(95.0, 11.5, 0.0), (48.1, 11.5, 520.0), *[(48.1 + 1e-7 * at, 11.5, 520.0) for at in range(20000)]]
-    done = run("convert", "--to", "enu", "--origin", "first", "--on-error", "skip", *jobs, stdin=table("lat,lon,alt", places))
+    done = run("convert", "--to", "enu", "--origin", "first", "--on-error", "skip", stdin=table("lat,lon,alt", places))
     assert done.status == 3
     assert done.err.count("frametool: origin: lat 48.1, lon 11.5, alt 520.0, the first position\n") == 1
     rows = numbers(done.out)

@@ -129,8 +129,3 @@ def test_names_that_stay_keep_their_bytes() -> None:
     kept = flow(text, INVERT._replace(rename=lambda parent, name: (parent, name))).text
     assert kept.splitlines()[1].startswith(b'"map",')
     assert kept.splitlines()[1].endswith(b", odom ")
-
-
-def test_processes_say_the_same_about_names() -> None:
-    text = f"parent,name,{POSE}\n".encode() + b"".join(b"a,n%d,0,0,0,0,0,0,1\n" % at for at in range(3000))
-    assert flow(text, SWAP, size=2000, jobs=2) == flow(text, SWAP)

@@ -71,7 +71,6 @@ def flow(
     *,
     header: bool = True,
     size: int = 0,
-    jobs: int = 1,
     most: int = MOST,
 ) -> Flow:
     """Run a stream; size: bytes a block, 0 as usual."""
@@ -82,9 +81,9 @@ def flow(
     try:
         with sized(block=size or sizes.BLOCK):
             if form in readers("records"):
-                outcomes = run_records(stream, form, request, source="in", jobs=jobs)
+                outcomes = run_records(stream, form, request, source="in")
             else:
-                outcomes = run_table(stream, form, request, source="in", header=header, jobs=jobs)
+                outcomes = run_table(stream, form, request, source="in", header=header)
             status = run(outcomes, lambda block: [out.write(block)].clear(), bad, lambda _rows, _size: None)
     except FrametoolError as error:
         told.append(str(error))

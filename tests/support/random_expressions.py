@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import re
 from typing import Any
 
 import independent as by
@@ -17,7 +16,7 @@ from frametool.errors import FrametoolError
 from frametool.geometry.transform import Transform
 
 FRAMES = ["map", "odom", "base", "cam-0", "robot/arm", "tool:tip", "lidar", "imu.link"]
-UNITS = {"m": (1, 0), "mm": (1, 0), "deg": (0, 1), "": (0, 0)}
+UNITS = {"m": "m", "mm": "m", "deg": "rad", "": ""}
 
 
 class Mismatch(Exception):
@@ -150,9 +149,11 @@ class World:
     def of_times(self, left: Any, right: Any) -> tuple[Any, ...]:
         a, b = self.value(left), self.value(right)
         if a[0] == "number" and b[0] == "number":
-            return "number", tuple(p + q for p, q in zip(a[1], b[1], strict=True)), None, a[3] * b[3]
+            if a[1] and b[1]:
+                raise Mismatch
+            return "number", a[1] or b[1], None, a[3] * b[3]
         if a[0] == "number":
-            if a[1] not in ((0, 0), (1, 0)):
+            if a[1] not in ("", "m"):
                 raise Mismatch
             return "vector", b[1], None, a[3] * b[3]
         one(a[2], b[1])
@@ -213,21 +214,21 @@ class World:
     def of_dot(self, left: Any, right: Any) -> tuple[Any, ...]:
         a, b = self.value(left), self.value(right)
         one(a[1], b[1])
-        return "number", (0, 0), None, float(a[3] @ b[3])
+        return "number", "", None, float(a[3] @ b[3])
 
     def of_norm(self, node: Any) -> tuple[Any, ...]:
-        return "number", (1, 0), None, float(np.linalg.norm(self.value(node)[3]))
+        return "number", "m", None, float(np.linalg.norm(self.value(node)[3]))
 
     def of_dist(self, left: Any, right: Any) -> tuple[Any, ...]:
         a, b = self.value(left), self.value(right)
         one(a[1], b[1])
         a, b = (each[3][:3, 3] if each[0] == "pose" else each[3] for each in (a, b))
-        return "number", (1, 0), None, float(np.linalg.norm(a - b))
+        return "number", "m", None, float(np.linalg.norm(a - b))
 
     def of_angle(self, left: Any, right: Any) -> tuple[Any, ...]:
         a, b = self.value(left), self.value(right)
         one(a[1], b[1])
-        return "number", (0, 1), None, by.angle(by.inverse(a[3]) @ b[3])
+        return "number", "rad", None, by.angle(by.inverse(a[3]) @ b[3])
 
 
 def one(a: str | None, b: str | None) -> str | None:
@@ -262,19 +263,6 @@ def text_of(node: tuple[Any, ...]) -> str:
     return f"{kind}({', '.join(text_of(each) if isinstance(each, tuple) else str(each) for each in rest)})"
 
 
-PROPOSED = [
-    r"bring the second over: (.*)$", r"; for \S+ seen from \S+: (.*)$", r"; write (inv\(.*\)) for the (?:first|second)$",
-    r"'; (inv\(.*\)) takes (?:points|vectors) in \S+$", r"; (inv\(.*\)) is \S+<-\S+$",
-]  # fmt: skip
-
-
-def suggestions(message: str) -> list[tuple[str, str]]:
-    """Return the expressions that a message proposes, each with the frames it says they have, if it does."""
-    _, found, tail = message.partition("frames that touch: ")
-    products = re.findall(r"(?:^|, or )(.*?)  \(= (.*?)\)", tail) if found else []
-    return products + [(match[1], "") for pattern in PROPOSED if (match := re.search(pattern, message))]
-
-
 def check(seed: int) -> str:
     """Compare one expression with the slow evaluator; say what became of it."""
     world = World(seed)
@@ -295,7 +283,7 @@ def check(seed: int) -> str:
     assert found.type.kind == kind, text
     parts = found.at(None)
     if kind == "number":
-        assert found.type.unit[:2] == first, text
+        assert found.type.unit == first, text
         parts = (parts[0] * np.pi / 180,) if found.type.degrees else parts
     else:
         assert (found.type.target, found.type.source) == (first, second), text
@@ -305,12 +293,9 @@ def check(seed: int) -> str:
 
 
 def check_refusal(text: str, scope: Scope) -> str:
-    """See that an expression is refused with a caret, and that what is proposed instead is accepted."""
+    """See that an expression is refused with a caret."""
     with pytest.raises(FrametoolError) as caught:
         evaluate(text, scope)
     error = caught.value
     assert getattr(error, "snippet", "").count("\n") == 1, text
-    for proposed, frames in suggestions(str(error)):
-        mended = evaluate(proposed, scope).type
-        assert not frames or str(mended) == frames, f"{text}: {proposed}"
-    return "refused and mended" if suggestions(str(error)) else "refused"
+    return "refused"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
-from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options
+from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -62,7 +62,7 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @pose_result_options("points", "trajectory")
 @click.option("--covariance", is_flag=True, help="also that of the tree's edges, or of --transform")
 @scale_option
-@explain_options
+@EXPLAIN
 @click.option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
 @click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
 @click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
@@ -80,7 +80,6 @@ def command(
     at: int | str | None,
     moving: bool,
     cache: int | None,
-    tf2: str | None,
     covariance: bool,
     scale: bool,
     **options: Any,
@@ -102,7 +101,7 @@ def command(
     several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
     clouds = clouds_of(stream, output) if stream.path and several is None else None
     if pose is None:
-        chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
+        chosen = rules(moving=moving, cache=cache, normalize=task.normalize)
         if scale:
             raise click.UsageError("--scale is about the matrix of --transform; frames of a tree have none")
         numbers = bool(stream.given_place)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
+from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
 from frametool.cli.poses import rows_among, without_inverse
 from frametool.grammar.pose import Pose
@@ -18,7 +18,7 @@ from frametool.grammar.pose_algebra import product
 @click.argument("poses", nargs=-1, required=True, type=TEXT, metavar="POSE POSE ..")
 @pose_result_options("poses")
 @scale_option
-@explain_options
+@EXPLAIN
 @offset_option
 @pose_stream_options
 def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:

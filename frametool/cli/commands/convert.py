@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import ONE_RECORD, PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
 from frametool.cli.group import refuse_unused
 from frametool.cli.options import (
     TEXT,
@@ -80,7 +80,7 @@ class ConvertCommand(Command):
 )
 @pose_result_options("poses", "points")
 @frames_out_option
-@explain_options
+@EXPLAIN
 @click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
 @click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of stamps, for the next three")
 @limit_options

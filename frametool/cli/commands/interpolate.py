@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from frametool.cli.explaining import PoseTask, explain_options
+from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.options import TEXT, Command, Parsed, pose_result_options
 from frametool.cli.poses import combinations
 from frametool.errors import ValueInvalid, shown, warn
@@ -41,7 +41,7 @@ def fractions_of(text: str) -> list[float]:
 @click.argument("b", type=TEXT)
 @click.argument("fractions", nargs=-1, required=True, type=Parsed("number", fractions_of), metavar="FRACTION..")
 @pose_result_options("poses")
-@explain_options
+@EXPLAIN
 def command(a: str, b: str, fractions: tuple[list[float], ...], **options: Any) -> int:
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from frametool.cli.explaining import PoseTask, explain_options, pose_stream_options
+from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
 
 
@@ -14,7 +14,7 @@ from frametool.cli.options import TEXT, Command, offset_option, pose_result_opti
 @click.argument("pose", type=TEXT, default="-")
 @pose_result_options("poses")
 @scale_option
-@explain_options
+@EXPLAIN
 @offset_option
 @pose_stream_options
 def command(pose: str, scale: bool, **options: Any) -> int:

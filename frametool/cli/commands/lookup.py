@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.explaining import PoseTask, explain_options
+from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.group import refuse_unused, settings
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
@@ -59,13 +59,13 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @pose_options
 @rotation_options
 @result_options("poses")
-@explain_options
+@EXPLAIN
 @column_options
 @stream_options
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], at: int | str | None,
     source_at: int | str | None, fixed: str | None, covariance: bool, times: str | None, moving: bool,
-    cache: int | None, tf2: str | None, **options: Any,
+    cache: int | None, **options: Any,
 ) -> int:  # fmt: skip
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
@@ -99,7 +99,7 @@ def command(
         refuse_unused("is about rows: give --time-column, --target-column or --source-column", *rows)
     if times is not None and stream.options["on_error"] == "null":
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    chosen = rules(moving=moving, cache=cache, tf2=tf2, normalize=task.normalize)
+    chosen = rules(moving=moving, cache=cache, normalize=task.normalize)
     frames = load_tree(tree, more, chosen, streams=bool(by_row))
     if not any("order" in asks for _, asks in settings().inputs):
         refuse_unused("changes nothing: that is not left open here", "given")
@@ -108,9 +108,8 @@ def command(
         tell_unused_sigmas(frames)
     if by_row or target is None or source is None:
         return by_row.run(task, frames, target, source, at_ns(at), sigmas, window)
-    if tf2 is None:
-        target, source = frame_name(target, frames), frame_name(source, frames)
-        fixed = fixed and frame_name(fixed, frames)
+    target, source = frame_name(target, frames), frame_name(source, frames)
+    fixed = fixed and frame_name(fixed, frames)
     if plan is not None:
         from frametool.explain import derive
 
@@ -152,8 +151,6 @@ def _check_covariance(output: Output, *, derives: bool, fixed: str | None, by_ro
         raise click.UsageError("--explain derives poses; leave --covariance out")
     if fixed is not None:
         raise click.UsageError("--covariance is of one time; across two an edge counts twice, and not independently")
-    if by_row:
-        refuse_unused("is not for --covariance: the edges that are taken for exact are counted in one process", "jobs")
     if output.style.place is not None:
         name = output.style.place.name
         raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")

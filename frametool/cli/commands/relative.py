@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from frametool.cli.explaining import PoseTask, explain_options, one_argument, pose_stream_options
+from frametool.cli.explaining import EXPLAIN, PoseTask, one_argument, pose_stream_options
 from frametool.cli.group import settings
 from frametool.cli.options import TEXT, ColumnNames, Command, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among, without_inverse
@@ -32,7 +32,7 @@ from frametool.grammar.pose_algebra import relative_names
     metavar="NAME",
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
 )
-@explain_options
+@EXPLAIN
 @limit_options
 @pose_stream_options
 def command(

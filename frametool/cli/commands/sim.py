@@ -1,4 +1,4 @@
-"""`frametool sim`: the turtles: a leader and followers, a scene of a file, keys in the terminal, many gains at once."""
+"""`frametool sim`: the turtles: a leader and followers, a scene of a file, keys in the terminal."""
 
 from __future__ import annotations
 
@@ -11,21 +11,16 @@ import click
 
 from frametool.cli.explaining import EXPLAIN, significant
 from frametool.cli.group import Group
-from frametool.cli.options import EXIT_CODES, TEXT, Command, Parsed
-from frametool.cli.output import drawn
+from frametool.cli.options import EXIT_CODES, TEXT, Command
 from frametool.cli.poses import source_of, usage_if_inline
 from frametool.cli.signals import clean_up
 from frametool.cli.sim_output import (
     DURATION,
     LEADER,
     SimOutput,
-    check_files,
     follow_options,
     leader_of,
     output_options,
-    style_of,
-    suffix_of,
-    sweep_options,
 )
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
@@ -33,10 +28,8 @@ from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.sim.drivers import HEADINGS, KEYS, FollowController, Heading, Mailbox
-from frametool.sim.readers import parse_gains
 from frametool.sim.scene import duration_ns, tutorial
 from frametool.sim.scene_file import read_scene
-from frametool.sim.step_writer import table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +43,6 @@ SUBCOMMANDS = {
     "follow": "a leader, and one or more turtles that follow",
     "run": "a whole scene from one file",
     "teleop": "drive turtle1 with the arrow keys, drawn in the terminal",
-    "sweep": "how soon a follower is there, for many gains at once",
 }
 HELP = """Replay turtlesim and the turtle-follow tutorial, without ROS and without a screen.
 
@@ -184,47 +176,6 @@ def run(scene: str, duration: float | None, seed: int | None, **options: Any) ->
         more = f", nor do{f'es {late[1].place}' if len(late) == 2 else f' {len(late) - 1} more'}" if late[1:] else ""
         say(f"warning: {late[0].place} ({late[0].service}) never happens, the run ends at {end}{more}")
     output.run(chosen)
-
-
-GAINS = Parsed("start:stop:count", parse_gains)
-
-
-@command.command(cls=Command, name="sweep")
-@click.option("--gain-linear", type=GAINS, default="0.1:2:20", show_default=True, metavar="START:STOP:COUNT",
-              help="speeds for each metre of distance")
-@click.option("--gain-angular", type=GAINS, default="1:8:20", show_default=True, metavar="START:STOP:COUNT",
-              help="turn rates for each radian of bearing")
-@sweep_options
-def sweep(
-    gain_linear: list[float], gain_angular: list[float], leader: str, seed: int, format_name: str | None,
-    precision: int | None, output: str | None, plot: str | None, force: bool, **options: Any,
-) -> None:  # fmt: skip
-    """Try every pair of gains: how soon the follower is within reach, and how far it was off again afterwards.
-
-    \b
-      frametool sim sweep --gain-linear 0.1:2:20 --gain-angular 1:8:20
-      frametool sim sweep --leader circle --format csv --plot gains.svg
-
-    time_to_reach is in seconds; overshoot, in metres, is how much further off than its nearest the follower was again
-    after that. Both are missing (-, null or empty) where it never comes within reach.
-    """
-    check_files(plot, output, force=force)
-    from frametool.sim.sweep import grid, rows
-
-    style = style_of(format_name, output, precision)
-    try:
-        drive = leader_of(leader, seed, paced=False)
-        result = grid(gain_linear, gain_angular, drive, **options)
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
-    text = table(list(rows(gain_linear, gain_angular, result)), style)
-    with writing(output, force=force) as write:
-        write(text)
-    if plot:
-        from frametool.view.run_plot import sweep_picture
-
-        with writing(plot, force=force) as write:
-            write(drawn(sweep_picture(gain_linear, gain_angular, result), suffix_of(plot)))
 
 
 # what terminals send for the arrow keys, in both of their modes

@@ -12,7 +12,6 @@ import click
 from frametool.cli.group import refuse_unused
 from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules_of
 from frametool.cli.output import drawn
-from frametool.cli.signals import clean_up
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened
@@ -56,14 +55,13 @@ def _eye(text: str) -> Eye:
               help="form of the picture  [default: by the suffix of --output, else text]")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
 @click.option("--force", is_flag=True, help="let --output replace an existing file")
-@click.option("--live", is_flag=True, help="play what moves in the terminal, a second a second, from --at on")
 @click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
 @click.option("--sliders", is_flag=True, help="a slider for each joint of a URDF robot, on its page")
 @click.option("--open", "opens", is_flag=True, help="show the page in the browser")
 @color_option
 def command(
     tree: str, target: str | None, source: str | None, more: Sequence[str], eye: Eye, form: str | None,
-    output: str | None, force: bool, opens: bool, live: bool, overlay: bool, sliders: bool, color: str, **options: Any,
+    output: str | None, force: bool, opens: bool, overlay: bool, sliders: bool, color: str, **options: Any,
 ) -> None:  # fmt: skip
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
@@ -107,14 +105,10 @@ def command(
     before = None
     if overlay:
         before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
-    on_terminal = chosen == "text" and output is None and sys.stdout.isatty()
-    if live and (not on_terminal or scene.at_ns is None):
-        raise click.UsageError("--live plays what moves in a terminal: give it a tree that moves and no -o")
-    if on_terminal:
-        from frametool.view.terminal import play, print_terminal
+    if chosen == "text" and output is None and sys.stdout.isatty():
+        from frametool.view.terminal import print_terminal
 
-        clean_up()  # the terminal's cursor
-        (play if live else print_terminal)(scene, eye, color)
+        print_terminal(scene, eye, color)
         return
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
     path = _page_file(tree) if opens and output is None else output

@@ -48,10 +48,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     source = file.source
     notes: list[Note] = []
     for document in parse_documents(source.text, source.name):
-        reading = Reading(source, raw=options.raw, normalize=options.normalize)
+        reading = Reading(source, normalize=options.normalize)
         try:
             for edge in read_edges(document.value, reading):
-                bare = edge if options.raw else without_slashes(edge, reading)
+                bare = without_slashes(edge, reading)
                 yield bare._replace(path=(document.index, *edge.path))
         except Misfit as misfit:
             raise misfit.placed(source, document.index) from None
@@ -229,10 +229,7 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
 
 
 def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
-    """Read one TransformStamped, checked, or as tf2 receives it."""
-    if reading.raw:
-        parent, child, components, stamp_ns = messages.read_raw_transform(message)
-        return Edge(parent, child, components, stamp_ns, path=path)
+    """Read one TransformStamped."""
     parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
     return Edge(parent, child, (*position, *rotation), stamp_ns, path=path)
 

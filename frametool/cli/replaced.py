@@ -1,0 +1,29 @@
+"""What went in this release, and what to use instead."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
+REPLACED = {
+    "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
+    "sim sweep": "`frametool.simulate_many` in Python tries many gains at once",
+    "view --live": "the page plays what moves, `frametool view TREE --open`",
+    "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
+    "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
+    "--explain-full": "--explain writes every product",
+}
+
+
+def replacement(arguments: Sequence[str]) -> str | None:
+    """Return the sentence on the first word of a command line that went; None where all are in use."""
+    for before, word in pairwise(("", *arguments)):
+        option, _, value = word.partition("=")
+        for name in (option, f"{option} {value}", f"{before} {word}", f"{arguments[0]} {word}"):
+            if name in REPLACED:
+                return f"{name} is gone: {REPLACED[name]}"
+    return None
