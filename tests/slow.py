@@ -1,60 +1,70 @@
-"""Keep the list of slow cases: `python tests/slow.py [WORDS OF PYTEST ..]` runs all and writes `tests/slow.txt` anew.
+"""Keep the list of slow tests: `python tests/slow.py [WORDS OF PYTEST ..]` runs all and writes `tests/slow.txt` anew.
 
-A case that takes more processor time than LIMIT, its processes included, is slow; one that was slow stays so until it
-takes less than half of that, so that two runs on a busy machine give the same list.  Prints what came and what went.
-With words (files, say) the cases of the rest keep their place.
+A test is slow if its cases take more processor time than MEAN on average, their processes included, or if it is one case
+that takes more than ONE.  Of a slow test the first case runs by default, or none if that takes more than ONE.  What was
+slow stays so until it takes less than half of that, so that two runs on a busy machine give the same list.  Prints what
+came and what went.  With words (files, say) the others keep their place.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from collections import defaultdict
 from pathlib import Path
+from statistics import mean
 from typing import TYPE_CHECKING
 
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping
+    from collections.abc import Generator, Mapping, Sequence
 
-SLOW = Path(__file__).with_name("slow.txt")
-sys.path.insert(0, str(SLOW.parents[1]))  # as `python -m pytest` has it: the package is that of this folder
-LIMIT = 0.2  # seconds; with 1 s the rest would take more than the 150 s that it may take in all
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "support")]  # as `python -m pytest` has it: the package is that of this folder
+import selection  # noqa: E402 - found on the path above
+
+MEAN, ONE = 0.025, 0.25  # seconds; chosen so that all that runs by default takes less than 150 s of processor time
 
 
 class Durations:
-    """A plugin that notes the processor time of each case."""
+    """A plugin that notes the processor time of each case of each test."""
 
     def __init__(self) -> None:
         """Begin with none."""
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[str, list[float]] = defaultdict(list)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
         """Time a case from its set-up to its end."""
         before = sum(os.times()[:4])
         result = yield
-        self.seconds[item.nodeid] = sum(os.times()[:4]) - before
+        self.seconds[selection.test_of(item)].append(sum(os.times()[:4]) - before)
         return result
 
 
-def slow_now(before: set[str], seconds: Mapping[str, float]) -> set[str]:
-    """Return the slow cases of a run, and those of before that did not run."""
-    ran = {name for name, took in seconds.items() if took > (LIMIT / 2 if name in before else LIMIT)}
-    return ran | (before - set(seconds))
+def slow_now(before: Mapping[str, str], seconds: Mapping[str, Sequence[float]]) -> dict[str, str]:
+    """Return the slow tests of a run with how many cases of each run by default, and those of before that did not run."""
+    found = {name: word for name, word in before.items() if name not in seconds}
+    for name, took in seconds.items():
+        share = 0.5 if name in before else 1.0
+        if mean(took) > share * (MEAN if len(took) > 1 else ONE):
+            found[name] = "one" if len(took) > 1 and took[0] <= ONE else "none"
+    return found
 
 
 def main(words: list[str]) -> None:
     """Run the cases, write the list and print what changed."""
     durations = Durations()
     pytest.main(["-m", "not large and not fuzz and not engines", *words], plugins=[durations])
-    before = set(SLOW.read_text(encoding="utf-8").splitlines()) if SLOW.exists() else set()
-    after = slow_now(before if words else before & set(durations.seconds), durations.seconds)
-    SLOW.write_text("".join(f"{name}\n" for name in sorted(after)), encoding="utf-8")
-    for sign, names in (("+", after - before), ("-", before - after)):
+    before = selection.slow_tests() if selection.SLOW.exists() else {}
+    known = before if words else {name: word for name, word in before.items() if name in durations.seconds}
+    after = slow_now(known, durations.seconds)
+    selection.SLOW.write_text("".join(f"{word} {name}\n" for name, word in sorted(after.items())), encoding="utf-8")
+    for sign, names in (("+", set(after) - set(before)), ("-", set(before) - set(after))):
         for name in sorted(names):
-            print(sign, f"{durations.seconds.get(name, 0.0):.2f}", name)
-    print(len(after), "slow cases of", len(durations.seconds))
+            print(sign, f"{sum(durations.seconds.get(name, [0.0])):.2f} s", name)
+    print(len(after), "slow tests of", len(durations.seconds))
 
 
 if __name__ == "__main__":

@@ -188,6 +188,8 @@ def _one_line(text: str) -> str:
 def _message(error: MarkedYAMLError, line: str, column: int) -> str:
     """Say what is wrong at a column of a line, after the parser's problem and context."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
+    if "maximum nesting depth" in problem:  # of libyaml, which looks some way ahead
+        return too_much(DEEPEST)
     word = line[column - 1 :].split(maxsplit=1)[0] if line[column - 1 :].strip() else ""
     if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and re.search(_ABOUT_TABS, problem):
         return "a tab cannot indent YAML; use blanks"

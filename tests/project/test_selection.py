@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations, product
+from pathlib import Path
 
 import pytest
+import selection
 import slow
 from selection import cover
+
+TESTS = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("sizes", [(3, 4), (2, 2, 2), (2, 8, 36), (5, 4, 2, 2)])
@@ -20,6 +25,13 @@ def test_a_cover_has_each_pair_of_values_and_no_more_cases_than_it_needs(sizes: 
         assert largest * second <= len(chosen) <= 1.5 * largest * second
 
 
-def test_a_case_is_slow_from_the_limit_on_and_stays_so_until_half_of_it() -> None:
-    seconds = {"a": slow.LIMIT * 1.1, "b": slow.LIMIT * 0.6, "c": slow.LIMIT * 0.6, "d": slow.LIMIT * 0.4}
-    assert slow.slow_now({"b", "d", "gone"}, seconds) == {"a", "b", "gone"}
+def test_a_test_is_slow_from_a_limit_on_and_stays_so_until_half_of_it() -> None:
+    fast, slow_cases, rest = [0.1 * slow.MEAN] * 3, [1.1 * slow.MEAN] * 3, [0.6 * slow.MEAN] * 3
+    took = {"a": slow_cases, "b": rest, "c": rest, "d": fast, "e": [1.1 * slow.ONE], "f": [1.1 * slow.ONE, 0.0]}
+    before = {"b": "one", "d": "one", "gone": "none"}
+    assert slow.slow_now(before, took) == {"a": "one", "b": "one", "e": "none", "f": "none", "gone": "none"}
+
+
+def test_a_slow_test_is_one_that_is_there() -> None:
+    names = {f"{path.relative_to(TESTS.parent)}::{name}" for path in TESTS.rglob("test_*.py") for name in re.findall(r"(?m)^def (test_\w+)", path.read_text(encoding="utf-8"))}
+    assert set(selection.slow_tests()) - names == set()

@@ -1,7 +1,7 @@
-"""Choose what runs by default: all but the slow cases, and of a law over a grid those that cover all pairs of values.
+"""Choose what runs by default: one case of a slow test, or none; of a test over a grid the cases that cover all pairs.
 
-What is left out gets the marker `slow`, which CI runs too.  The slow cases stand in `tests/slow.txt`, a line a case, which
-`tests/slow.py` keeps.  The grids are the laws and all that has three axes or more; `--seed` draws another cover.
+What is left out gets the marker `slow`, which CI runs too.  The slow tests stand in `tests/slow.txt`, with how many of
+their cases run, one or none; `tests/slow.py` keeps the list.  A grid has three axes or more; `--seed` draws another cover.
 """
 
 from __future__ import annotations
@@ -32,13 +32,27 @@ def pytest_report_header(config: pytest.Config) -> str:
 @pytest.hookimpl(tryfirst=True)  # the markers stand before `-m` looks for them
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what does not run by default."""
-    slow = set(SLOW.read_text(encoding="utf-8").splitlines())
-    for _, group in groupby(items, lambda item: item.nodeid.partition("[")[0]):
+    slow = slow_tests()
+    for name, group in groupby(items, test_of):
         cases = list(group)
-        covering = cover([axes(each) for each in cases], config.getoption("seed"))
+        if name in slow:
+            chosen = {0} if slow[name] == "one" else set()
+        else:
+            chosen = cover([axes(each) for each in cases], config.getoption("seed"))
         for at, item in enumerate(cases):
-            if at not in covering or item.nodeid in slow:
+            if at not in chosen:
                 item.add_marker("slow")
+
+
+def slow_tests() -> dict[str, str]:
+    """Return the slow tests and how many cases of each run by default: `one` or `none`."""
+    lines = (line.split() for line in SLOW.read_text(encoding="utf-8").splitlines())
+    return {name: count for count, name in lines}
+
+
+def test_of(item: pytest.Item) -> str:
+    """Return the name of the test that a case is of."""
+    return item.nodeid.partition("[")[0].replace(" ", "_")
 
 
 def axes(item: Any) -> tuple[str, ...]:
