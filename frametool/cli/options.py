@@ -17,7 +17,6 @@ from frametool.cli.group import Reused, WithHelp, keep_setting, refuse_unused, s
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
-from frametool.formats.unsupported import UNSUPPORTED
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 from frametool.text.numbers import parse_number
@@ -241,13 +240,16 @@ class WrittenForm(click.Choice[str]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse an unknown one; of one that is not supported, say what to do."""
-        _refuse_unsupported(self, value, param, ctx)
+        if value not in self.choices:
+            _refuse_unsupported(self, value, param, ctx)
         return super().convert(value, param, ctx)
 
 
 def _refuse_unsupported(
     kind: click.ParamType[Any], value: Any, param: click.Parameter | None, ctx: click.Context | None
 ) -> None:
+    from frametool.formats.unsupported import UNSUPPORTED
+
     if value in UNSUPPORTED:
         row = UNSUPPORTED[value]
         kind.fail(f"{value} ({row.summary}) is not supported: {row.remedy}", param, ctx)

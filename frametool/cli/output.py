@@ -30,7 +30,6 @@ from frametool.formats.table import (
     is_trajectory,
     writers,
 )
-from frametool.formats.unsupported import refuse_suffix
 from frametool.geometry.representations import EARTH_FRAMES, notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
@@ -74,6 +73,8 @@ class Output:
         self.path = output
         self.force = force
         if output is not None and format_name is None:
+            from frametool.formats.unsupported import refuse_suffix
+
             refuse_suffix(output)
         self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
         self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
