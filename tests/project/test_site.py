@@ -80,7 +80,7 @@ def expected() -> Iterator[str]:
     yield from (f"examples/{name.replace('.', '-')}.md" for name in names() if not name.endswith(".md"))
     yield from (each.path for each in questions())
     yield from {f"cookbook/{markup.slug(each.chapter)}.md" for each in questions()}
-    yield from (f"formats/{name}.md" for name in ("read", "only-written", "known-and-not-read"))
+    yield from (f"formats/{name}.md" for name in ("read", "only-written"))
     yield from (f"{kind}/index.md" for kind in KINDS)
     yield from (page for file, (page, *_) in texts.TEXTS.items() if (ROOT / file).is_file())
     yield from ("index.md", "llms.txt", "conf.py", "static/site.css", "scorer.js")
