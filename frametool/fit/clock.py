@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.alignment import Unaligned, centre, fitted
-from frametool.fit.linear import dot, length, total
+from frametool.fit.least_squares import length
 from frametool.fit.pairs import GAP, between, interval
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     size = 1 << (2 * len(grid) - 1).bit_length()
     masks = [((grid >= at[0]) & (grid <= at[-1])).astype(float) for at, _ in (a, b)]
     courses = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
-    courses = [course - mask * (total(course) / total(mask)) for course, mask in zip(courses, masks, strict=True)]
+    courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
 
     def correlated(x: Array, y: Array) -> Array:
         found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
@@ -124,13 +124,13 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
             fit = fitted(kind, plain._replace(xyz=here), own, up)
         except Unaligned:
             return seconds
-        left, unsteady = dot(fit.moved(own).xyz - here, velocity), velocity - centre(velocity)
-        squared = max(total(dot(unsteady, unsteady)), TINY)  # a constant velocity is a shift of the fit
-        change = min(max(total(left) / squared, -step), step)
+        left, unsteady = ((fit.moved(own).xyz - here) * velocity).sum(-1), velocity - centre(velocity)
+        squared = max(float((unsteady**2).sum()), TINY)  # a constant velocity is a shift of the fit
+        change = min(max(float(left.sum()) / squared, -step), step)
         found += change
         if abs(change) < REFINED_S:
             break
-    centred = left - total(left) / len(left)
-    alike = total(centred[1:] * centred[:-1]) / max(total(centred**2), TINY)
-    doubt = sqrt(total(left**2) * (1 + alike) / max(1 - alike, TINY)) / squared
+    centred = left - left.mean()
+    alike = float(centred[1:] @ centred[:-1]) / max(float(centred @ centred), TINY)
+    doubt = sqrt(float(left @ left) * (1 + alike) / max(1 - alike, TINY)) / squared
     return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds

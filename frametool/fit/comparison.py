@@ -12,7 +12,6 @@ from frametool.errors import ValueInvalid, shown
 from frametool.fit import pairs as pairing
 from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, fitted, principal_axes
 from frametool.fit.clock import LIMIT_S, clock_offset
-from frametool.fit.linear import dot, total
 from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
 from frametool.fit.mounting import lever_arm
 from frametool.frames.stamps import format_stamp
@@ -328,7 +327,7 @@ def _by_alignment(pairs: Pairs, first: Pairs, up: Array) -> dict[str, float | No
     for kind in ALIGNMENTS:
         try:
             gap = fitted(kind, first.ref, first.est, up).moved(positions).xyz - pairs.ref.xyz
-            found[kind] = sqrt(total(dot(gap, gap)) / len(gap))
+            found[kind] = sqrt((gap**2).sum() / len(gap))
         except Unaligned:
             found[kind] = None
     return found
@@ -340,7 +339,7 @@ def _tell_of_bodies(ref: Trajectory, moved: Trajectory, hints: list[str]) -> Non
         return
     turns = ref.rotation.inverse() @ moved.rotation
     shared = turns.mean()
-    spread = sqrt(total(turns.distance(shared) ** 2) / len(turns))
+    spread = sqrt((turns.distance(shared) ** 2).mean())
     if (angle := float(shared.angle())) > max(APART, STEADY * spread):
         rpy = ", ".join(f"{number:.4g}" for number in np.degrees(shared.inverse().as_rpy()))
         hints.append(f"the bodies are {np.degrees(angle):.1f} deg apart; --mount '{{rpy_deg: [{rpy}]}}'")

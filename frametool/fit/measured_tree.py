@@ -11,7 +11,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.bodies import bodies_of, require_connected
 from frametool.fit.graph import bridges
-from frametool.fit.linear import NotSettled, dot, inverse, total
+from frametool.fit.least_squares import NotSettled, inverse
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
 from frametool.fit.uncertainty import Uncertainty
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array
     from frametool.stream.measurements import Measurement
 
+ROOT = PoseArrays(np.eye(3), np.zeros(3))
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance has
 
 
@@ -79,7 +80,7 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
         _poses([bodies.pose[name] for name in children]),
         _poses([m.transform for m in measurements]),
         np.array([m.covariance is not None for m in measurements]),
-        (information + information.swapaxes(1, 2)) / 2,
+        information,
     )
 
 
@@ -129,7 +130,7 @@ class TreeSolution:
         self.sigma_factor = found.noise.factor
         self.dof = max(3 * (int(self.used.sum()) - problem.unknown), 0)
         self.rms_distance, self.rms_angle = (
-            math.sqrt(total(dot(part, part)[self.used]) / self.used.sum())
+            math.sqrt((part[self.used] ** 2).sum() / self.used.sum())
             for part in (self.residuals[:, :3], self.residuals[:, 3:])
         )
         kept = np.flatnonzero(self.used).tolist()
@@ -167,7 +168,7 @@ class TreeSolution:
 
     def marginal(self, frame: str) -> Array | None:
         """Return the covariance (6, 6) of the pose of a frame in the root; None where it is not known."""
-        return self._uncertainty.in_root(*self._at(frame))
+        return self._uncertainty.between((0, ROOT), self._at(frame))
 
     def _known(self, frame: str) -> str:
         if frame not in self.poses:

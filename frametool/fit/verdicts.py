@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, first_of, printable
 from frametool.fit.graph import bridges
-from frametool.fit.linear import applied, dot, inverse
+from frametool.fit.least_squares import inverse
 from frametool.fit.measurements import best_blunder
 from frametool.fit.robust import KEPT
 from frametool.fit.tree_solver import Noise
@@ -97,7 +97,7 @@ class _Case:
                 words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
             unsure = self._beside_doubt(row, self.least_information[row])
-            if not blamed and dot(self.errors[row], applied(unsure, self.errors[row])) <= 6 * KEPT**2:
+            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
                 noise.append(row)
             if not rivals:
                 doubted = self._beside_doubt(row, self.information[row])
