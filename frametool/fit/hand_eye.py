@@ -96,7 +96,8 @@ def solve_hand_eye(
     robust = robust and count >= FEWEST_ROBUST
     _require_two_axes(_turns(hand), 0.0, holder, names[2])
     start, medians = _start(samples, robust=robust)
-    _require_this_way(medians, _start(other, robust=robust)[1], names, eye_to_hand=eye_to_hand)
+    others = _start(other, robust=robust)[1]
+    _require_this_way(medians, others, names, eye_to_hand=eye_to_hand)
 
     def likeliest(model: _Model, weights: Array) -> _Model:
         if (kept := weights > 0.0).sum() < FEWEST:
@@ -138,7 +139,9 @@ def solve_hand_eye(
         float(rms[0]),
         float(rms[1]),
         turns.rms,
-        _warnings(turns, count, holder) + _scale_warnings(samples.at(found.kept), model.x),
+        _warnings(turns, count, holder)
+        + _scale_warnings(samples.at(found.kept), model.x)
+        + _way_warnings(medians, others, count, eye_to_hand=eye_to_hand),
     )
 
 
@@ -351,6 +354,14 @@ def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str,
             f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
             f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
         )
+
+
+def _way_warnings(medians: Array, others: Array, count: int, *, eye_to_hand: bool) -> list[str]:
+    """Warn where few samples fit the other setting about as well; three always do."""
+    if count >= FEWEST_CERTAIN or others.prod() > BETTER**2 * medians.prod():
+        return []
+    more = "a fourth sample" if count == FEWEST else "more samples"
+    return [f"{count} samples fit about as well {'without' if eye_to_hand else 'with'} --eye-to-hand: take {more}"]
 
 
 def _unfitting(off: Array) -> ValueInvalid:

@@ -16,28 +16,43 @@ if TYPE_CHECKING:
 class NotSettled(ValueInvalid):
     """Report equations that have no solution."""
 
+    def __init__(self) -> None:
+        """Say so."""
+        super().__init__("the numbers do not settle what is asked for: too few, too alike or too far apart")
+
 
 def solve_normal(matrix: Array, right: Array) -> Array:
     """Return inv(matrix) right, (n, k), of a symmetric positive definite matrix; its rows may differ in units.
 
-    Raises NotSettled where it is not positive definite.
+    Raises NotSettled where there is no solution.
     """
-    units = np.sqrt(np.maximum(np.diagonal(matrix), 0.0))
-    units[units == 0.0] = np.nan  # fails below, as every NaN
-    scaled = matrix / units / units[:, None]
+    scaled, units = _scaled(matrix)
     try:
-        np.linalg.cholesky(scaled)
-        found: Array = np.linalg.solve(scaled, right / units[:, None]) / units[:, None]
+        found: Array = np.linalg.solve(scaled, right / units) / units
     except np.linalg.LinAlgError:
-        found = np.full(1, np.nan)
+        raise NotSettled from None
     if not np.isfinite(found).all():
-        raise NotSettled("the numbers do not settle what is asked for: too few, too alike or too far apart")
+        raise NotSettled
     return found
+
+
+def _scaled(matrix: Array) -> tuple[Array, Array]:
+    """Return a matrix whose diagonal is 1, and the units of its rows, (n, 1); raises NotSettled without a diagonal."""
+    diagonal = np.diagonal(matrix)[:, None]
+    if not (diagonal > 0.0).all():
+        raise NotSettled
+    units = np.sqrt(diagonal)
+    return matrix / units / units.T, units
 
 
 def inverse(matrix: Array) -> Array:
     """Return the inverse of a symmetric positive definite matrix, symmetric; raises NotSettled where there is none."""
-    found = solve_normal(matrix, np.eye(len(matrix)))
+    scaled, units = _scaled(matrix)
+    try:
+        np.linalg.cholesky(scaled)
+        found = np.linalg.inv(scaled) / units / units.T
+    except np.linalg.LinAlgError:
+        raise NotSettled from None
     return (found + found.T) / 2.0
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.stream.measurements import Measurement
 
 ROOT = PoseArrays(np.eye(3), np.zeros(3))
+FEW_LOOPS = 6  # fewer leave the sigmas rough where rotations can close them
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance has
 
 
@@ -95,6 +96,15 @@ def _poses(transforms: list[Transform]) -> PoseArrays:
     return PoseArrays.of(Transform.of(*(np.array(part, float) for part in parts)))
 
 
+def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
+    """Return a warning where too few loops separate the sigma of metres from that of radians."""
+    loops = int(found.kept.sum()) - problem.unknown
+    if not (found.estimated and loops < FEW_LOOPS and problem.has_few_loops(found.kept)):
+        return []
+    verb = "loop does" if loops == 1 else "loops do"
+    return [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]
+
+
 class TreeSolution:
     """A tree of measured frames, and what the measurements say about it.
 
@@ -105,6 +115,7 @@ class TreeSolution:
     the given sigmas are; they are believed all the same
     dof: degrees of freedom of either half; rms_distance, rms_angle: of those used
     tree: all of that as a tree with covariances, where `frametool.solve` made it
+    hints: what a person should know of the sigmas
     rows: how many measurements of each frame are used; frame_checked: whether its pose in the root rests on loops only
     """
 
@@ -128,6 +139,7 @@ class TreeSolution:
         self.u: Array = problem.u(self.residuals, found.noise)
         self.sigma = noise and (noise.place, noise.turn)
         self.sigma_factor = found.noise.factor
+        self.hints = _noise_hints(problem, found)
         self.dof = max(3 * (int(self.used.sum()) - problem.unknown), 0)
         self.rms_distance, self.rms_angle = (
             math.sqrt((part[self.used] ** 2).sum() / self.used.sum())

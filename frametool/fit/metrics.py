@@ -122,6 +122,11 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
     return chain[:-1], chain[1:]
 
 
+def is_lost(along: Array, delta: float) -> bool:
+    """Return True if a delta is so short beside the path that adding it changes nothing."""
+    return bool(along[-1] + delta * (1 - ROUNDING) == along[-1])
+
+
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
     """Return for each i the j whose way from there is the nearest to delta, within a share of it."""
     wanted = along + delta

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.graph import SpanningTree, bridges, spanning_tree
-from frametool.fit.least_squares import applied, length, solve_normal
+from frametool.fit.least_squares import applied, inverse, length, solve_normal
 from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.robust import KEPT, LEAST, MEDIAN_OF_SIX, first_weights, median_sigma, rms_sigma
 
@@ -30,6 +30,7 @@ MOST_DAMPED = 1e12
 REST = 1e-12  # of the extent, radians, and of a sigma: a smaller step is the last
 STEADY = 1e-4  # of a weight: the first weights are at rest
 FIRST_ROUNDS, ROUNDS = 50, 20
+BORROWED = 0.3  # degrees of freedom of metres that radians count for, and the other way round, where loops are few
 LEAST_SHARE = 0.04  # of the rows in loops that the unknowns leave over
 
 
@@ -39,6 +40,13 @@ class Noise(NamedTuple):
     place: float = 0.01
     turn: float = math.radians(1.0)
     factor: float = 1.0
+
+    def at_least(self, other: Noise) -> Noise:
+        """Return sigmas that are nowhere below those of another."""
+        return self._replace(place=max(self.place, other.place), turn=max(self.turn, other.turn))
+
+
+LOWEST = Noise(0.001, math.radians(0.1))  # medians where loops are few: most rows of a tree are off by nothing
 
 
 class TreeRows(NamedTuple):
@@ -97,6 +105,7 @@ class TreeProblem:
         self.rows, self.count, self.size = rows, count, len(rows.parent)
         self.unknown = count - 1
         self.pairs = list(zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
+        self.arm = max(float(np.median(length(rows.measured.translations))), LEAST) if self.size else 1.0
         self._moves = (rows.parent != rows.child)[:, None, None]  # a row within a body moves nothing
 
     def ends(self, bodies: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
@@ -208,7 +217,7 @@ class TreeProblem:
         for _ in range(STEPS):
             information = self.information(noise) * kept[:, None, None]
             bodies, size, damping = self.improved(bodies, information, damping)
-            before, noise = noise, self.estimated(self.errors(bodies), kept, estimate=estimate)
+            before, noise = noise, self.estimated(bodies, kept, noise, estimate=estimate)
             changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
             if size <= REST and max(changes) <= REST:
                 break
@@ -216,11 +225,16 @@ class TreeProblem:
 
     # noise, and which rows to keep
 
-    def estimated(self, errors: Array, kept: Any, *, estimate: bool) -> Noise:
-        """Return the noise of the kept rows: sums of squares over the degrees of freedom that are their share."""
+    def has_few_loops(self, kept: Any) -> bool:
+        """Return True if steps of the rotations can close all loops, so that metres alone do not show their sigma."""
+        return bool(kept.sum() <= 2 * self.unknown)
+
+    def estimated(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool) -> Noise:
+        """Return the noise of the kept rows: sums of squares over their degrees of freedom."""
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:
             return Noise()
+        errors = self.errors(bodies)
         free, given = kept & ~self.rows.given, kept & self.rows.given
         factor = 1.0
         if given.any():
@@ -228,9 +242,28 @@ class TreeProblem:
             factor = max(1.0, math.sqrt(chi2 / (2 * dof * given.sum() / kept.sum())))
         if not estimate:
             return Noise(factor=factor)
-        squares = (float((part[free] ** 2).sum()) for part in _halves(errors))
-        place, turn = (rms_sigma(each, dof * free.sum() / kept.sum()) for each in squares)
+        squares = [float((part[free] ** 2).sum()) for part in _halves(errors)]
+        dofs = [dof * free.sum() / kept.sum()] * 2
+        if self.has_few_loops(kept):
+            dofs = [BORROWED + each for each in self.redundancies(bodies, kept, noise)]
+            squares[0] += BORROWED * (noise.turn * self.arm) ** 2
+            squares[1] += BORROWED * (noise.place / self.arm) ** 2
+        place, turn = map(rms_sigma, squares, dofs)
         return Noise(place, turn, factor)
+
+    def redundancies(self, bodies: PoseArrays, kept: Any, noise: Noise) -> list[float]:
+        """Return the degrees of freedom of metres and of radians of rows without sigmas.
+
+        With these the sigmas rest where the restricted likelihood (REML) is greatest; source: Foerstner 1979.
+        """
+        information = self.information(noise) * kept[:, None, None]
+        covariance = inverse(self.normal_equations(bodies, information)[0])
+        information *= ~self.rows.given[:, None, None]
+        count, found = 3.0 * (kept & ~self.rows.given).sum(), []
+        for half in np.kron(np.eye(2), np.ones(3)):
+            own = self.normal_equations(bodies, information * np.outer(half, half))[0]
+            found.append(count - float((covariance * own).sum()))
+        return found
 
     def medians(self, errors: Array, looped: Any) -> Noise:
         """Return the noise by the medians of the rows in loops."""
@@ -244,7 +277,7 @@ class TreeProblem:
         if free.any():
             place, turn = (median_sigma(_odd(length(part[free])), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
-        return noise
+        return noise.at_least(LOWEST) if self.has_few_loops(looped) else noise
 
     def weighed_down(self, bodies: PoseArrays, looped: Any) -> tuple[PoseArrays, Noise]:
         """Return the fit with first weights and the noise by medians, both at rest."""

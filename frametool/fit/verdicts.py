@@ -79,9 +79,7 @@ class _Case:
         self.poses = self.parents.inverse @ self.children
         self.errors = self.poses.errors(problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
-        noise = found.noise
-        if len(kept) <= 2 * problem.unknown:  # turns can take up all that places are off: their sigma may come out tiny
-            noise = Noise(max(noise.place, Noise().place), max(noise.turn, Noise().turn), noise.factor)
+        noise = found.noise.at_least(Noise()) if problem.has_few_loops(found.kept) else found.noise
         self.least_information = problem.information(noise, noise.factor)
         self.uncertainty = Uncertainty(problem, found)
 
