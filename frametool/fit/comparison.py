@@ -170,7 +170,7 @@ def compare(
     moved = fit.moved(pairs.est)
     ate = absolute_errors(pairs.ref, moved, up)
     if settings.mount is None and not settings.evo:
-        _tell_of_bodies(pairs.ref, moved, settings, hints)
+        _warn_of_bodies(pairs.ref, moved, settings, hints)
     by_alignment = _by_alignment(pairs, first, up)
     if settings.align in ("se3", "sim3") and _is_nearly_line(first.ref.xyz, by_alignment["sim3"]):
         hints.append("positions lie nearly on a line: the turn about it rests on noise")
@@ -263,7 +263,7 @@ def _paired(
     if pairs.shared:
         hints.append(f"{pairs.shared} poses have more than one partner")
     if settings.offset is None:
-        _tell_of_clock(ref, est, names[1], hints)
+        _warn_of_clock(ref, est, names[1], hints)
     return pairs, offset_ns, score
 
 
@@ -272,8 +272,8 @@ def _span(each: Trajectory, name: str) -> str:
     return f"{name} {first} .. {last} s"
 
 
-def _tell_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
-    """Tell of an offset that is larger than half an interval and clear, where looking for it costs little."""
+def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
+    """Warn of an offset that is larger than half an interval and clear, where looking for it costs little."""
     intervals = [pairing.interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
@@ -372,7 +372,7 @@ def _is_nearly_line(xyz: Array, noise: float | None) -> bool:
     return noise is not None and second < min(NEAR_A_LINE * noise, SLENDER * long)
 
 
-def _tell_of_bodies(ref: Trajectory, moved: Trajectory, settings: Settings, hints: list[str]) -> None:
+def _warn_of_bodies(ref: Trajectory, moved: Trajectory, settings: Settings, hints: list[str]) -> None:
     """Warn of a rotation between the two bodies, or of worlds that nothing aligned, that is the same all the way."""
     if ref.rotation is None or moved.rotation is None:
         return
@@ -393,11 +393,6 @@ def _shared(rotations: Rotation) -> Rotation | None:
     """Return the mean of rotations if it is clear and about the same for all."""
     mean = rotations.mean()
     return mean if float(mean.angle()) > max(APART, STEADY * _spread(rotations)) else None
-
-
-def _spread(rotations: Rotation) -> float:
-    """Return the rms angle of rotations from their mean."""
-    return sqrt((rotations.distance(rotations.mean()) ** 2).mean())
 
 
 def _relative(

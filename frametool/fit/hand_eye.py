@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from itertools import chain
 from math import degrees, fsum, log, radians, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -139,9 +139,9 @@ def solve_hand_eye(
         float(rms[0]),
         float(rms[1]),
         turns.rms,
-        _warnings(turns, count, holder)
-        + _scale_warnings(samples.at(found.kept), model.x)
-        + _way_warnings(medians, others, count, eye_to_hand=eye_to_hand),
+        _way_warnings(medians, others, count, eye_to_hand=eye_to_hand)
+        + _warnings(turns, count, holder)
+        + _scale_warnings(samples.at(found.kept), model.x),
     )
 
 
@@ -286,7 +286,7 @@ def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseA
 
 
 def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
-    """Say of a factor on the target's places that would fit much better which: (R_A - I) t_X - s R_X t_B = -t_A."""
+    """Return a warning where a factor on the target's translations would fit much better: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
     lever, turned = (a.rotations - np.eye(3)).reshape(-1, 3), applied(x.rotations, b.translations).reshape(-1)
     place, plain = _least_squares(lever, turned - a.translations.reshape(-1))
@@ -298,7 +298,7 @@ def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
     """Return the least-squares solution, and how long what it leaves is."""
-    found = np.linalg.lstsq(slopes, wanted, rcond=ROUNDING)[0]  # what no row settles is 0
+    found: Any = np.linalg.lstsq(slopes, wanted, rcond=ROUNDING)[0]  # what no row settles is 0
     return found, float(length(slopes @ found - wanted))
 
 

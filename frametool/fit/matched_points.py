@@ -155,7 +155,7 @@ class _Pairs(NamedTuple):
         return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
 
     def is_line(self) -> bool:
-        """Say whether target or source lie on a line, or in one place."""
+        """Return True if target or source lie on a line, or in one place."""
         for xyz in self[:2]:
             first, second, _ = principal_axes(xyz)
             if second <= max(THIN * first, STILL * np.abs(xyz).max()):
@@ -173,7 +173,7 @@ class _Pairs(NamedTuple):
             raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
 
     def scale_hints(self, typical: float, names: tuple[str, str], *, robust: bool) -> list[str]:
-        """Say of a scale that would fit much better how much greater one set is."""
+        """Return a warning where a scale would fit much better."""
         fit, scaled = self.start(with_scale=True, robust=robust)
         if BETTER * scaled > typical or fit.scale <= 0.0:
             return []
@@ -182,7 +182,7 @@ class _Pairs(NamedTuple):
         return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
 
     def line_hints(self, sigma: float, covariance: Array) -> list[str]:
-        """Say of points that lie nearly on a line that the turn about it is uncertain."""
+        """Return a warning where points lie nearly on a line: the rotation about it is uncertain."""
         first, second, _ = principal_axes(self.target)
         if not second < KEPT * sigma < first:
             return []

@@ -99,7 +99,7 @@ def _poses(transforms: list[Transform]) -> PoseArrays:
 def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
     """Return a warning where too few loops separate the sigma of metres from that of radians."""
     loops = int(found.kept.sum()) - problem.unknown
-    if not (found.estimated and loops < FEW_LOOPS and problem.has_few_loops(found.kept)):
+    if not (found.estimated and found.few_loops and loops < FEW_LOOPS):
         return []
     verb = "loop does" if loops == 1 else "loops do"
     return [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]

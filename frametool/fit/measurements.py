@@ -121,4 +121,6 @@ def loops(
 
 
 def _sigmas(errors: Array, information: Array) -> Array:
-    return np.sqrt(np.maximum((errors * applied(information, errors)).sum(-1), 0.0) / 6)
+    squares = (errors * applied(information, errors)).sum(-1)
+    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+    return found

@@ -66,12 +66,17 @@ class TreeRows(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """Bodies that fit the kept rows best; estimated: whether these rows tell their own noise."""
+    """Bodies that fit the kept rows best.
+
+    estimated: whether these rows tell their own noise
+    few_loops: whether rotations can close all loops, so that metres alone do not show their sigma
+    """
 
     bodies: PoseArrays
     kept: Any
     noise: Noise
     estimated: bool
+    few_loops: bool
 
 
 def identities(count: int) -> PoseArrays:
@@ -126,7 +131,8 @@ class TreeProblem:
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return how many sigmas each row is off: the root mean square of its six numbers."""
         squares = (errors * applied(self.information(noise, noise.factor), errors)).sum(-1)
-        return np.sqrt(np.maximum(squares, 0.0) / 6)
+        found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+        return found
 
     def tree(self, rows: Iterable[int]) -> SpanningTree:
         """Return the spanning tree of the first rows that close no loop."""
@@ -186,13 +192,14 @@ class TreeProblem:
             (rows.child, of_body(by_child, bodies.at(rows.child), child)),
         ]
         weighed = applied(information, errors)
-        normal, gradient = np.zeros((count, 6, count, 6)), np.zeros((count, 6))
+        normal, gradient = np.zeros((count, count, 6, 6)), np.zeros((count, 6))
         for body, by in sides:
             np.add.at(gradient, body, applied(by.swapaxes(1, 2), weighed))
             for other, by_other in sides:
-                np.add.at(normal, (body, slice(None), other), by.swapaxes(1, 2) @ information @ by_other)
+                np.add.at(normal, (body, other), by.swapaxes(1, 2) @ information @ by_other)
         size = 6 * self.unknown
-        return normal[1:, :, 1:].reshape(size, size), gradient[1:].reshape(size), float((errors * weighed).sum())
+        matrix = normal[1:, 1:].swapaxes(1, 2).reshape(size, size)
+        return matrix, gradient[1:].reshape(size), float((errors * weighed).sum())
 
     def improved(self, bodies: PoseArrays, information: Array, damping: float) -> tuple[PoseArrays, float, float]:
         """Take one step, damped until it helps; returns the bodies, the size of the step and the damping."""
@@ -211,13 +218,15 @@ class TreeProblem:
             damping = max(damping * 10, 1e-6)
         return bodies, 0.0, 0.0
 
-    def settled(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool) -> tuple[PoseArrays, Noise]:
+    def settled(
+        self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
+    ) -> tuple[PoseArrays, Noise]:
         """Return the least squares of the kept rows, and their noise, both at rest."""
         damping = 0.0
         for _ in range(STEPS):
             information = self.information(noise) * kept[:, None, None]
             bodies, size, damping = self.improved(bodies, information, damping)
-            before, noise = noise, self.estimated(bodies, kept, noise, estimate=estimate)
+            before, noise = noise, self.estimated(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
             changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
             if size <= REST and max(changes) <= REST:
                 break
@@ -225,11 +234,9 @@ class TreeProblem:
 
     # noise, and which rows to keep
 
-    def has_few_loops(self, kept: Any) -> bool:
-        """Return True if steps of the rotations can close all loops, so that metres alone do not show their sigma."""
-        return bool(kept.sum() <= 2 * self.unknown)
-
-    def estimated(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool) -> Noise:
+    def estimated(
+        self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
+    ) -> Noise:
         """Return the noise of the kept rows: sums of squares over their degrees of freedom."""
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:
@@ -244,7 +251,7 @@ class TreeProblem:
             return Noise(factor=factor)
         squares = [float((part[free] ** 2).sum()) for part in _halves(errors)]
         dofs = [dof * free.sum() / kept.sum()] * 2
-        if self.has_few_loops(kept):
+        if few_loops:
             dofs = [BORROWED + each for each in self.redundancies(bodies, kept, noise)]
             squares[0] += BORROWED * (noise.turn * self.arm) ** 2
             squares[1] += BORROWED * (noise.place / self.arm) ** 2
@@ -277,7 +284,7 @@ class TreeProblem:
         if free.any():
             place, turn = (median_sigma(_odd(length(part[free])), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
-        return noise.at_least(LOWEST) if self.has_few_loops(looped) else noise
+        return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
     def weighed_down(self, bodies: PoseArrays, looped: Any) -> tuple[PoseArrays, Noise]:
         """Return the fit with first weights and the noise by medians, both at rest."""
@@ -308,7 +315,7 @@ class TreeProblem:
         """Fit the kept rows and test all of them again, until the set stays."""
         for _ in range(ROUNDS):
             found = self.refitted(bodies, kept, noise)
-            kept, (bodies, _, noise, _) = self.u(self.errors(found.bodies), found.noise) <= KEPT, found
+            kept, bodies, noise = self.u(self.errors(found.bodies), found.noise) <= KEPT, found.bodies, found.noise
             if not robust or (kept == found.kept).all():
                 break
         return found
@@ -322,8 +329,9 @@ class TreeProblem:
             kept, bodies = kept | reached, self.placed([tree]).at(0)
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
         estimate = bool((kept & ~alone & ~self.rows.given).any()) and kept.sum() > self.unknown
-        bodies, noise = self.settled(bodies, kept, noise, estimate=estimate)
-        return Fitted(bodies, kept, noise, estimate)
+        few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
+        bodies, noise = self.settled(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
+        return Fitted(bodies, kept, noise, estimate, few_loops)
 
 
 def _halves(errors: Array) -> tuple[Array, Array]:

@@ -30,17 +30,14 @@ class Uncertainty:
 
     def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
         """Return the covariance of source in target, each a body and the pose of a frame of it."""
-        bodies, frames = zip(target, source, strict=True)
-        if bodies[0] == bodies[1]:
+        if target[0] == source[0]:
             return np.zeros((6, 6))
-        if self._known.of(bodies[0]) != self._known.of(bodies[1]):
+        if self._known.of(target[0]) != self._known.of(source[0]):
             return None
-        slopes = [
-            of_body(by, self._found.bodies.at(body), frame)
-            for body, frame, by in zip(bodies, frames, jacobians(*frames, np.zeros(3)), strict=True)
-        ]
-        joint = self._of_bodies[np.ix_(bodies, range(6), bodies, range(6))].reshape(12, 12)
-        found: Array = np.hstack(slopes) @ joint @ np.hstack(slopes).T
+        by_ends = zip((target, source), jacobians(target[1], source[1], np.zeros(3)), strict=True)
+        slopes = np.hstack([of_body(by, self._found.bodies.at(body), frame) for (body, frame), by in by_ends])
+        ends = [target[0], source[0]]
+        found: Array = slopes @ self._of_bodies[ends][:, :, ends].reshape(12, 12) @ slopes.T
         return (found + found.T) / 2.0
 
     @cached_property

@@ -79,7 +79,7 @@ class _Case:
         self.poses = self.parents.inverse @ self.children
         self.errors = self.poses.errors(problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
-        noise = found.noise.at_least(Noise()) if problem.has_few_loops(found.kept) else found.noise
+        noise = found.noise.at_least(Noise()) if found.few_loops else found.noise
         self.least_information = problem.information(noise, noise.factor)
         self.uncertainty = Uncertainty(problem, found)
 
@@ -128,7 +128,7 @@ class _Case:
         return parent.inverse @ child
 
     def open_loop(self, row: int, rivals: list[int]) -> str:
-        """Say which rows form a loop, and how far it is open, on one line."""
+        """Return which rows form a loop, and how far it is open, on one line."""
         error = self.errors[row]
         open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
         places = [place_of(self.measurements, each) for each in sorted([row, *rivals])]
