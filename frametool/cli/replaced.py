@@ -16,6 +16,7 @@ REPLACED = {
     "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
     "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
     "--explain-full": "--explain writes every product",
+    "--array": 'NPZ is not read; one NPY for each array, `numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"])`',
 }
 
 

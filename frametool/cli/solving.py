@@ -53,6 +53,8 @@ def solved_tree(
             robust=robust,
             progress=lambda share: bar.advance(0, round(SHARES * share) - bar.size),
         )
+    for each in found.hints:
+        warn(each)
     if found.sigma_factor > UNSURE:
         warn(f"the given sigmas are {found.sigma_factor:.2g} times too small for what the used rows are off")
     return _tree_solution(found, {(parent, child): entry for parent, child, *entry in fixed})

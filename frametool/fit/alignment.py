@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.linear import dot, summed, total, turn_between
+from frametool.fit.least_squares import align_vectors
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -74,32 +74,31 @@ def _require_plane(kind: str, xyz: Array, name: str) -> None:
 
 
 def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool) -> Fit:
-    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991, its rotation as Horn 1987 finds it."""
+    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991."""
     mass = np.ones(len(ref)) if weights is None else weights
     ref_mean, est_mean = centre(ref, mass), centre(est, mass)
     r, e = ref - ref_mean, est - est_mean
     e = e - centre(e, mass)  # what rounding left of the mean
-    rotation = turn_between(e, mass[:, None] * r)
-    scale = total(mass * dot(rotation.apply(e), r)) / total(mass * dot(e, e)) if with_scale else 1.0
+    rotation = align_vectors(e, mass[:, None] * r)
+    scale = float((mass[:, None] * rotation.apply(e) * r).sum() / (mass[:, None] * e**2).sum()) if with_scale else 1.0
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
 
 
 def centre(xyz: Array, mass: Array | None = None) -> Array:
     """Return the weighted mean of positions."""
-    if mass is None:
-        return summed(xyz) / len(xyz)
-    return summed(mass[:, None] * xyz) / total(mass)
+    found: Array = xyz.mean(0) if mass is None else mass @ xyz / mass.sum()
+    return found
 
 
 def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str]) -> Fit:
     """Minimise the same over turns about `up` alone."""
     ref_mean, est_mean = centre(ref), centre(est)
     r, e = ref - ref_mean, est - est_mean
-    across = [each - np.outer(dot(each, up), up) for each in (r, e)]
+    across = [each - np.outer(each @ up, up) for each in (r, e)]
     for name, each, whole in zip(names, across, (ref, est), strict=True):
-        if np.sqrt(total(dot(each, each)) / len(each)) < STILL * (1 + np.abs(whole).max()):
+        if np.sqrt((each**2).sum() / len(each)) < STILL * (1 + np.abs(whole).max()):
             raise Unaligned(f"{name} has no motion across up: yaw is free; --align origin or none")
-    sine, cosine = total(dot(np.cross(across[1], across[0]), up)), total(dot(across[1], across[0]))
+    sine, cosine = (np.cross(across[1], across[0]) @ up).sum(), (across[1] * across[0]).sum()
     rotation = Rotation.from_axis_angle(up, atan2(sine, cosine))
     return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
 

@@ -137,6 +137,8 @@ def solve(
     fixed = [(track, tree.covariances.get(track.child)) for tree in trees for track in tree.tracks()]
     edges = [(track.parent, track.child, track.components) for track, _ in fixed]
     found = solve_tree(_measurements(measurements), root=root, fixed=edges, robust=robust)
+    for sentence in found.hints:
+        warn(sentence)
     kept = {track.child: (Transform.of(*track.components), covariance) for track, covariance in fixed}
     tree = FrameTree("the result")
     for name in found.frames:

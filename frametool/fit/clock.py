@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.alignment import Unaligned, centre, fitted
-from frametool.fit.linear import dot, length, total
+from frametool.fit.least_squares import length
 from frametool.fit.pairs import GAP, between, interval
 
 if TYPE_CHECKING:
@@ -22,23 +22,35 @@ LEAST = 3  # poses: two speeds make the least course
 NEARBY = 1.2  # of a step: what the best of all lags and its neighbours may miss
 DOUBT = 0.25  # of a step: the standard error that least squares may have
 TINY = 1e-12
+AS_GOOD = 0.99  # of the best score: another lag may be the true one
 DIGITS = 9  # of a score, and of seconds: stamps are whole nanoseconds
 
 
 class ClockOffset(NamedTuple):
-    """The offset in seconds, and how well speeds agree there: 1 is perfectly."""
+    """The offset in seconds, how well speeds agree there (1 is perfectly), and another that is about as good."""
 
     seconds: float
     score: float
+    rival: float | None = None
+
+    def shifted(self, change: float, shift_ns: int) -> ClockOffset:
+        """Return it refined by a change, on clocks that had been shifted."""
+        rival = None if self.rival is None else self.rival + shift_ns / 1e9
+        return ClockOffset(self.seconds + change + shift_ns / 1e9, self.score, rival)
 
 
-def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "sim3") -> ClockOffset:
+def clock_offset(
+    ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "sim3", by_turning: bool = False
+) -> ClockOffset:
     """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares.
 
+    by_turning: by angular speeds alone if both turn, as those do not depend on where a body is measured
     Where the two spans do not meet, their first stamps are put together and every lag is tried.
     """
     if min(ref.size, est.size) < LEAST:
         return ClockOffset(0.0, -1.0)
+    unit = np.ldexp(1.0, np.frexp(max(np.abs(ref.xyz).max(), np.abs(est.xyz).max()))[1])  # so that no square overflows
+    ref, est = (each._replace(xyz=each.xyz / unit) for each in (ref, est))
     first = int(ref.stamps_ns[0])
     shift = 0
     if est.stamps_ns[0] > ref.stamps_ns[-1] or est.stamps_ns[-1] < ref.stamps_ns[0]:
@@ -49,12 +61,13 @@ def clock_offset(ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, 
     for turning in (True, False):
         speeds = [_speeds(each, at, turning=turning) for each, at in zip((ref, est), times, strict=True)]
         courses = [each for each in speeds if each is not None]
-        if len(courses) > 1:
-            best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
-    seconds = best.seconds
-    if best.score > 0:
-        seconds = _refined(ref, est, shift, seconds, step, kind)
-    return ClockOffset(seconds + shift / 1e9, best.score)
+        if len(courses) < len(speeds):
+            continue
+        best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
+        if by_turning and turning and best.score > 0:
+            return best.shifted(_refined_speeds(courses[0], courses[1], best.seconds, step) - best.seconds, shift)
+    change = _refined(ref, est, shift, best.seconds, step, kind) - best.seconds if best.score > 0 else 0.0
+    return best.shifted(change, shift)
 
 
 def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
@@ -80,7 +93,7 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     size = 1 << (2 * len(grid) - 1).bit_length()
     masks = [((grid >= at[0]) & (grid <= at[-1])).astype(float) for at, _ in (a, b)]
     courses = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
-    courses = [course - mask * (total(course) / total(mask)) for course, mask in zip(courses, masks, strict=True)]
+    courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
 
     def correlated(x: Array, y: Array) -> Array:
         found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
@@ -95,13 +108,39 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     lags[size // 2 :] -= size
     shortest = min(at[-1] - at[0] for at, _ in (a, b))
     tried = (np.abs(lags * step) <= limit_s) & (count * step >= shortest / 2)
-    score = np.where(tried, covariance / np.sqrt(spread[0] * spread[1]), -1.0)
+    score = np.where(tried, covariance / np.sqrt(spread[0]) / np.sqrt(spread[1]), -1.0)
     score = np.round(score, DIGITS)  # further digits are those of the FFT, which adds as the processor likes
     at = int(np.argmax(score))
     before, here, after = score[at - 1], score[at], score[(at + 1) % size]
     bend = before - 2 * here + after
     part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
-    return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here))
+    other = _rival(np.fft.fftshift(score), (at + size // 2) % size)
+    rival = None if other is None else round(float((other - size // 2) * step), DIGITS)
+    return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here), rival)
+
+
+def _rival(score: Array, best: int) -> int | None:
+    """Return the index of another peak that is as good to a per cent, None where the best stands alone."""
+    near = score >= AS_GOOD * score[best]
+    valleys = np.flatnonzero(~near)
+    at = np.searchsorted(valleys, best)
+    near[valleys[at - 1] if at else 0 : valleys[at] if at < len(valleys) else len(near)] = False  # the same peak
+    return int(np.argmax(np.where(near, score, -np.inf))) if near.any() and score[best] > 0 else None
+
+
+def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
+    """Refine a lag until the speeds a agree best with the speeds b (Gauss-Newton on one number)."""
+    found = seconds
+    for _ in range(STEPS):
+        at = b[0] + found
+        inside = (at >= a[0][0] + step) & (at <= a[0][-1] - step)
+        sooner, here, later = (np.interp(at[inside] + lag, *a) for lag in (-step, 0.0, step))
+        slope = (later - sooner) / (2.0 * step)
+        change = float(slope @ (b[1][inside] - here)) / max(float(slope @ slope), TINY)
+        found += min(max(change, -step), step)
+        if abs(change) < REFINED_S:
+            break
+    return found if abs(found - seconds) < NEARBY * step else seconds
 
 
 def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
@@ -124,13 +163,13 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
             fit = fitted(kind, plain._replace(xyz=here), own, up)
         except Unaligned:
             return seconds
-        left, unsteady = dot(fit.moved(own).xyz - here, velocity), velocity - centre(velocity)
-        squared = max(total(dot(unsteady, unsteady)), TINY)  # a constant velocity is a shift of the fit
-        change = min(max(total(left) / squared, -step), step)
+        left, unsteady = ((fit.moved(own).xyz - here) * velocity).sum(-1), velocity - centre(velocity)
+        squared = max(float((unsteady**2).sum()), TINY)  # a constant velocity is a shift of the fit
+        change = min(max(float(left.sum()) / squared, -step), step)
         found += change
         if abs(change) < REFINED_S:
             break
-    centred = left - total(left) / len(left)
-    alike = total(centred[1:] * centred[:-1]) / max(total(centred**2), TINY)
-    doubt = sqrt(total(left**2) * (1 + alike) / max(1 - alike, TINY)) / squared
+    centred = left - left.mean()
+    alike = float(centred[1:] @ centred[:-1]) / max(float(centred @ centred), TINY)
+    doubt = sqrt(float(left @ left) * (1 + alike) / max(1 - alike, TINY)) / squared
     return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds

@@ -12,9 +12,9 @@ from frametool.errors import ValueInvalid, shown
 from frametool.fit import pairs as pairing
 from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, fitted, principal_axes
 from frametool.fit.clock import LIMIT_S, clock_offset
-from frametool.fit.linear import dot, total
-from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
+from frametool.fit.metrics import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
 from frametool.fit.mounting import lever_arm
+from frametool.fit.robust import require_near
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import way
 from frametool.geometry import earth, quaternion
@@ -39,6 +39,7 @@ FEW = 0.5  # of the possible pairs
 APART = radians(2.0)  # a turn between bodies that is told, where it is also
 STEADY = 5.0  # times as large as its spread
 NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
+SLENDER = 0.1  # of the first axis: what is wider is no line
 SEGMENTS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 
 
@@ -156,6 +157,8 @@ def compare(
     """
     hints: list[str] = []
     sizes = (ref.size, est.size)
+    for each, name in zip((ref, est), names, strict=True):
+        require_near(each.xyz, name)
     ref, est = _on_the_ground(ref, est, names, hints)
     if not settings.evo:
         ref, est = (_in_order(each, name, hints) for each, name in zip((ref, est), names, strict=True))
@@ -167,13 +170,14 @@ def compare(
     moved = fit.moved(pairs.est)
     ate = absolute_errors(pairs.ref, moved, up)
     if settings.mount is None and not settings.evo:
-        _tell_of_bodies(pairs.ref, moved, hints)
-    if settings.align in ("se3", "sim3") and principal_axes(first.ref.xyz)[1] < NEAR_A_LINE * statistics(ate.m).rmse:
+        _warn_of_bodies(pairs.ref, moved, settings, hints)
+    by_alignment = _by_alignment(pairs, first, up)
+    if settings.align in ("se3", "sim3") and _is_nearly_line(first.ref.xyz, by_alignment["sim3"]):
         hints.append("positions lie nearly on a line: the turn about it rests on noise")
     walked = pairs.ref if settings.pairs_from == "reference" else moved
     return Comparison(
         names, sizes, 0 if ref.stamps_ns is None else int(np.ptp(ref.stamps_ns)), settings, est, pairs, moved,
-        offset_ns, score, mount, fit, _by_alignment(pairs, first, up), ate,
+        offset_ns, score, mount, fit, by_alignment, ate,
         list(_relative(pairs.ref, moved, walked, settings, hints)),
         segment_errors(pairs.ref, moved, settings.segments, settings.segment_step), hints,
     )  # fmt: skip
@@ -233,10 +237,14 @@ def _paired(
     offset_ns, score = 0, None
     if settings.offset == AUTO:
         kind = "sim3" if settings.align == "sim3" else "se3"
-        found = clock_offset(ref, est, limit_s=settings.offset_limit_s, kind=kind)
+        by_turning = settings.mount == AUTO
+        found = clock_offset(ref, est, limit_s=settings.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:
             raise ValueInvalid(f"no clear clock offset (score {found.score:.2f}); give one: --offset T")
         offset_ns, score = round(found.seconds * 1e9), found.score
+        if found.rival is not None:
+            both = f"{found.seconds:.3f} s and {found.rival:.3f} s"
+            hints.append(f"the motion repeats: clock offsets of {both} fit about as well; --offset auto:LIMIT or T")
     elif settings.offset is not None:
         offset_ns = int(settings.offset)
     shifted = est._replace(stamps_ns=est.stamps_ns + offset_ns)
@@ -255,7 +263,7 @@ def _paired(
     if pairs.shared:
         hints.append(f"{pairs.shared} poses have more than one partner")
     if settings.offset is None:
-        _tell_of_clock(ref, est, names[1], hints)
+        _warn_of_clock(ref, est, names[1], hints)
     return pairs, offset_ns, score
 
 
@@ -264,8 +272,8 @@ def _span(each: Trajectory, name: str) -> str:
     return f"{name} {first} .. {last} s"
 
 
-def _tell_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
-    """Tell of an offset that is larger than half an interval and clear, where looking for it costs little."""
+def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
+    """Warn of an offset that is larger than half an interval and clear, where looking for it costs little."""
     intervals = [pairing.interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
@@ -304,9 +312,19 @@ def _mounted(pairs: Pairs, settings: Settings) -> tuple[Pairs, Transform | None]
     if est.rotation is None:
         raise ValueInvalid("a mount needs rotations of the estimate")
     if isinstance(mount, str):
-        arm = lever_arm(settings.align, pairs.ref, est, np.array(settings.up))
-        mount = Transform(Rotation.identity(), arm)
+        mount = _found_mount(pairs.ref, est, settings)
     return pairs._replace(est=est.with_poses(est.poses @ mount)), mount
+
+
+def _found_mount(ref: Trajectory, est: Trajectory, settings: Settings) -> Transform:
+    """Return REF's body in EST's: the lever arm with the fit, and a rotation that all pairs share."""
+    up = np.array(settings.up)
+    arm = lever_arm(settings.align, ref, est, up)
+    shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
+    placed, rotation = fitted(settings.align, ref, shifted, up).moved(shifted), None
+    if ref.rotation is not None and placed.rotation is not None:
+        rotation = _shared(placed.rotation.inverse() @ ref.rotation)
+    return Transform(Rotation.identity() if rotation is None else rotation, arm)
 
 
 def _first(pairs: Pairs, limit: Delta | None) -> int | None:
@@ -328,22 +346,53 @@ def _by_alignment(pairs: Pairs, first: Pairs, up: Array) -> dict[str, float | No
     for kind in ALIGNMENTS:
         try:
             gap = fitted(kind, first.ref, first.est, up).moved(positions).xyz - pairs.ref.xyz
-            found[kind] = sqrt(total(dot(gap, gap)) / len(gap))
+            found[kind] = sqrt((gap**2).sum() / len(gap))
         except Unaligned:
             found[kind] = None
     return found
 
 
-def _tell_of_bodies(ref: Trajectory, moved: Trajectory, hints: list[str]) -> None:
-    """Tell of a turn between the two bodies that is the same all the way."""
+def _shared_turn(est: Trajectory, ref: Trajectory) -> Rotation | None:
+    """Return the rotation of REF's body in EST's if it is clear and the same all the way."""
+    if ref.rotation is None or est.rotation is None:
+        return None
+    turns = est.rotation.inverse() @ ref.rotation
+    shared = turns.mean()
+    return shared if float(shared.angle()) > max(APART, STEADY * _spread(turns)) else None
+
+
+def _spread(rotations: Rotation) -> float:
+    """Return the rms angle of rotations from their mean."""
+    return sqrt((rotations.distance(rotations.mean()) ** 2).mean())
+
+
+def _is_nearly_line(xyz: Array, noise: float | None) -> bool:
+    """Return True if the second axis of positions is short, and not clear of what even a fit with a scale leaves."""
+    long, second, _ = principal_axes(xyz)
+    return noise is not None and second < min(NEAR_A_LINE * noise, SLENDER * long)
+
+
+def _warn_of_bodies(ref: Trajectory, moved: Trajectory, settings: Settings, hints: list[str]) -> None:
+    """Warn of a rotation between the two bodies, or of worlds that nothing aligned, that is the same all the way."""
     if ref.rotation is None or moved.rotation is None:
         return
-    turns = ref.rotation.inverse() @ moved.rotation
-    shared = turns.mean()
-    spread = sqrt(total(turns.distance(shared) ** 2) / len(turns))
-    if (angle := float(shared.angle())) > max(APART, STEADY * spread):
-        rpy = ", ".join(f"{number:.4g}" for number in np.degrees(shared.inverse().as_rpy()))
-        hints.append(f"the bodies are {np.degrees(angle):.1f} deg apart; --mount '{{rpy_deg: [{rpy}]}}'")
+    of_bodies, of_worlds = moved.rotation.inverse() @ ref.rotation, moved.rotation @ ref.rotation.inverse()
+    is_of_worlds = settings.align == "none" and _spread(of_worlds) < _spread(of_bodies)
+    shared = _shared(of_worlds if is_of_worlds else of_bodies)
+    if shared is None:
+        return
+    apart = f"{np.degrees(float(shared.angle())):.1f} deg apart"
+    rpy = ", ".join(f"{number:.4g}" for number in np.degrees(shared.as_rpy()))
+    hints.append(
+        f"the worlds are {apart}; --align se3" if is_of_worlds
+        else f"the bodies are {apart}; --mount '{{rpy_deg: [{rpy}]}}'"
+    )  # fmt: skip
+
+
+def _shared(rotations: Rotation) -> Rotation | None:
+    """Return the mean of rotations if it is clear and about the same for all."""
+    mean = rotations.mean()
+    return mean if float(mean.angle()) > max(APART, STEADY * _spread(rotations)) else None
 
 
 def _relative(
@@ -354,6 +403,10 @@ def _relative(
         along = delta.along(walked)
         if along is None:
             why = "there are no rotations" if delta.unit == "deg" else "there are no stamps"
+        elif is_lost(along, delta.amount):
+            why = f"the delta is lost in rounding: the path is {along[-1]:g} {delta.unit} long"
+            if settings.deltas:
+                raise ValueInvalid(f"rpe {delta}: {why}")
         else:
             of_all = settings.all_pairs
             ends = all_pairs(along, delta.amount, settings.tolerance) if of_all else chained(along, delta.amount)

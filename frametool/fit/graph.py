@@ -30,7 +30,7 @@ class Groups:
         return body
 
     def join(self, a: int, b: int) -> bool:
-        """Put the group of a into that of b; say whether they were two."""
+        """Put the group of a into that of b; return True if they were two."""
         a, b = self.of(a), self.of(b)
         self._up[a] = b
         return a != b

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from itertools import chain
 from math import degrees, fsum, log, radians, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.linear import applied, crossed, dot, eigen, inverse, product, solved, total, turn_between
+from frametool.fit.least_squares import align_vectors, applied, inverse, length, solve_normal
 from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.rigid_arrays import log as rotvecs_of
 from frametool.fit.robust import KEPT, LEAST, deviations, draws, fitted_sigmas, lengths, require_near, settled
@@ -36,7 +36,7 @@ STEPS, ROUGH_STEPS = 100, 4
 DONE = 1e-12  # of the extent, and radians
 STUCK = 1e9  # damping
 UNDAMPED = 1e-12
-ROUNDING = 1e-15
+ROUNDING = 1e-8
 BETTER = 5.0  # times: what fits so much better is what was meant
 CLEARLY = 2.0  # times, that both metres and radians must be better
 FLAT, FLAT_SHARE = radians(0.5), 0.02  # turns about the second axis: none, also as a part of those about the first
@@ -88,15 +88,16 @@ def solve_hand_eye(
     if (count := len(gripper)) < FEWEST:
         raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
     given, camera = PoseArrays.of(gripper), PoseArrays.of(target)
-    require_near(given.places, "gripper")
-    require_near(camera.places, "target")
+    require_near(given.translations, "gripper")
+    require_near(camera.translations, "target")
     hand = given.inverse if eye_to_hand else given
     samples, other = _Samples(hand, camera), _Samples(hand.inverse, camera)
     holder = names[0] if eye_to_hand else names[1]
     robust = robust and count >= FEWEST_ROBUST
     _require_two_axes(_turns(hand), 0.0, holder, names[2])
     start, medians = _start(samples, robust=robust)
-    _require_this_way(medians, _start(other, robust=robust)[1], names, eye_to_hand=eye_to_hand)
+    others = _start(other, robust=robust)[1]
+    _require_this_way(medians, others, names, eye_to_hand=eye_to_hand)
 
     def likeliest(model: _Model, weights: Array) -> _Model:
         if (kept := weights > 0.0).sum() < FEWEST:
@@ -118,13 +119,12 @@ def solve_hand_eye(
     model = found.model
     s_t, s_r = model.sigmas.tolist()
     count, off = int(found.kept.sum()), lengths(found.residuals[found.kept]).T
-    rms = np.sqrt(dot(off, off) / count)
+    rms = np.sqrt((off**2).mean(1))
     turns = _turns(hand.at(found.kept))
     if turns.rms[0] < KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = inverse(model.hessian)
-    covariance = (covariance + covariance.T) / 2.0
     return HandEye(
         model.x.transform.canonical(),
         model.z.transform.canonical(),
@@ -139,7 +139,9 @@ def solve_hand_eye(
         float(rms[0]),
         float(rms[1]),
         turns.rms,
-        _warnings(turns, count, holder) + _scale_warnings(samples.at(found.kept), model.x),
+        _way_warnings(medians, others, count, eye_to_hand=eye_to_hand)
+        + _warnings(turns, count, holder)
+        + _scale_warnings(samples.at(found.kept), model.x),
     )
 
 
@@ -194,13 +196,13 @@ class _Samples(NamedTuple):
 
     def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
         """Minimise ln S_t + ln S_r by Gauss-Newton steps with sigmas that follow, damped where one does not help."""
-        extent = max(np.abs(poses.places).max() for poses in self)
+        extent = max(np.abs(poses.translations).max() for poses in self)
         units = np.repeat([extent or 1.0, 1.0, extent or 1.0, 1.0], 3)
         now, gradient = self._linear(model, weights)
         damping = UNDAMPED
         for _ in range(steps):
             bent = now.hessian + damping * np.diag(np.diag(now.hessian))
-            step = -solved(bent, gradient[:, None])[:, 0]
+            step = -solve_normal(bent, gradient[:, None])[:, 0]
             moved = now._replace(x=now.x.stepped(step[:6]), z=now.z.stepped(step[6:]))
             tried, its_gradient = self._linear(moved, weights)
             if tried.misfit <= now.misfit + DONE:
@@ -218,36 +220,36 @@ class _Samples(NamedTuple):
         sigmas = fitted_sigmas(errors, weights, 6)
         if model.ratio is not None:
             share = sigmas / model.ratio
-            sigmas = model.ratio * np.sqrt(dot(share, share) / 2.0)
+            sigmas = model.ratio * np.sqrt((share**2).mean())
         weighed = (weights[:, None] / np.repeat(sigmas**2, 3)).reshape(-1, 1)
         slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
-        gradient = crossed(slopes, weighed * errors.reshape(-1, 1))
+        gradient = slopes.T @ (weighed * errors.reshape(-1, 1))
         misfit = 2.0 * fsum(map(log, sigmas.tolist()))
-        return model._replace(sigmas=sigmas, hessian=crossed(slopes, weighed * slopes), misfit=misfit), gradient[:, 0]
+        return model._replace(sigmas=sigmas, hessian=slopes.T @ (weighed * slopes), misfit=misfit), gradient[:, 0]
 
 
 def _errors(loop: _Loop, x: PoseArrays) -> Array:
     off = loop.left @ x @ loop.right
-    return np.concatenate([off.places, rotvecs_of(off.turns)], 1)
+    return np.concatenate([off.translations, rotvecs_of(off.rotations)], 1)
 
 
 def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
     """Return how errors (n, 6) move with steps of X and of Z: (n, 6, 12)."""
-    left, back = loop.left.turns, product(loop.before.turns, model.z.turns.T)
+    left, back = loop.left.rotations, loop.before.rotations @ model.z.rotations.T
     bent = inverse_left_jacobian(turned)
     slopes = np.zeros((len(turned), 6, 12))
     slopes[:, :3, :3] = left
-    slopes[:, :3, 3:6] = -product(left, skew(applied(model.x.turns, loop.right.places)))
-    slopes[:, 3:, 3:6] = product(bent, left)
+    slopes[:, :3, 3:6] = -left @ skew(applied(model.x.rotations, loop.right.translations))
+    slopes[:, 3:, 3:6] = bent @ left
     slopes[:, :3, 6:9] = -back
-    slopes[:, :3, 9:] = product(back, skew(loop.after.places - model.z.places))
-    slopes[:, 3:, 9:] = -product(bent, back)
+    slopes[:, :3, 9:] = back @ skew(loop.after.translations - model.z.translations)
+    slopes[:, 3:, 9:] = -bent @ back
     return slopes
 
 
 def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     """Return the best closed form of all samples and of draws of few, with the medians of its errors."""
-    count = len(samples.gripper.places)
+    count = len(samples.gripper.translations)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
     fives: Iterable[Rows] = draws(DRAWS * robust, min(DRAWN, count - 1), count)
     for few in chain([slice(None)], fives):
@@ -268,26 +270,27 @@ def park_martin(gripper: PoseArrays, camera: PoseArrays) -> PoseArrays:
     of A, and (R_A - I) t_X = R_X t_B - t_A.
     """
     a, b = _motions(gripper, camera)
-    alpha, beta = rotvecs_of(a.turns), rotvecs_of(b.turns)
+    alpha, beta = rotvecs_of(a.rotations), rotvecs_of(b.rotations)
     angle = lengths(alpha)[:, 0]
     if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
         a, b, alpha, beta = a.at(clear), b.at(clear), alpha[clear], beta[clear]
-    turn = turn_between(beta, alpha).as_matrix()
-    place, _ = _least_squares((a.turns - np.eye(3)).reshape(-1, 3), (applied(turn, b.places) - a.places).reshape(-1))
+    turn = align_vectors(beta, alpha).as_matrix()
+    wanted = (applied(turn, b.translations) - a.translations).reshape(-1)
+    place, _ = _least_squares((a.rotations - np.eye(3)).reshape(-1, 3), wanted)
     return PoseArrays(turn, place)
 
 
 def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
-    i, j = _pairs(len(gripper.places))
+    i, j = _pairs(len(gripper.translations))
     return gripper.at(i).inverse @ gripper.at(j), camera.at(i) @ camera.at(j).inverse
 
 
 def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
-    """Say of a factor on the target's places that would fit much better which: (R_A - I) t_X - s R_X t_B = -t_A."""
+    """Return a warning where a factor on the target's translations would fit much better: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
-    lever, turned = (a.turns - np.eye(3)).reshape(-1, 3), applied(x.turns, b.places).reshape(-1)
-    place, plain = _least_squares(lever, turned - a.places.reshape(-1))
-    place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.places.reshape(-1))
+    lever, turned = (a.rotations - np.eye(3)).reshape(-1, 3), applied(x.rotations, b.translations).reshape(-1)
+    place, plain = _least_squares(lever, turned - a.translations.reshape(-1))
+    place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.translations.reshape(-1))
     if place[3] <= 0.0 or plain <= max(BETTER * scaled, LEAST):
         return []
     return [f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"]
@@ -295,11 +298,8 @@ def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
     """Return the least-squares solution, and how long what it leaves is."""
-    squares = crossed(slopes, slopes)
-    squares += ROUNDING * np.diagonal(squares).max() * np.eye(len(squares))  # what nothing tells is 0
-    found = solved(squares, crossed(slopes, wanted[:, None]))[:, 0]
-    left = applied(slopes, found) - wanted
-    return found, sqrt(total(left * left))
+    found: Any = np.linalg.lstsq(slopes, wanted, rcond=ROUNDING)[0]  # what no row settles is 0
+    return found, float(length(slopes @ found - wanted))
 
 
 def _pairs(count: int) -> tuple[Indices, Indices]:
@@ -319,9 +319,9 @@ class _Turns(NamedTuple):
 
 
 def _turns(gripper: PoseArrays) -> _Turns:
-    i, j = _pairs(len(gripper.places))
-    turns = rotvecs_of(product(np.swapaxes(gripper.turns[i], 1, 2), gripper.turns[j]))
-    squares, axes = eigen(crossed(turns, turns) / len(turns))
+    i, j = _pairs(len(gripper.translations))
+    turns = rotvecs_of(np.swapaxes(gripper.rotations[i], 1, 2) @ gripper.rotations[j])
+    squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))
     axis = axes[:, 2] * np.sign(axes[np.abs(axes[:, 2]).argmax(), 2])
     _, second, first = np.sqrt(np.maximum(squares, 0.0)).tolist()
     return _Turns((first, second), " ".join(f"{part:.3f}" for part in np.round(axis, 3) + 0.0))
@@ -354,6 +354,14 @@ def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str,
             f"the samples do not fit ({_off(medians)}); they do ({_off(others)}) {'without' if eye_to_hand else 'with'}"
             f" --eye-to-hand, or with TARGET inverted ({names[3]}<-{names[2]})"
         )
+
+
+def _way_warnings(medians: Array, others: Array, count: int, *, eye_to_hand: bool) -> list[str]:
+    """Warn where few samples fit the other setting about as well; three always do."""
+    if count >= FEWEST_CERTAIN or others.prod() > BETTER**2 * medians.prod():
+        return []
+    more = "a fourth sample" if count == FEWEST else "more samples"
+    return [f"{count} samples fit about as well {'without' if eye_to_hand else 'with'} --eye-to-hand: take {more}"]
 
 
 def _unfitting(off: Array) -> ValueInvalid:

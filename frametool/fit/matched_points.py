@@ -10,7 +10,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.fit.alignment import STILL, THIN, Fit, centre, principal_axes, umeyama
-from frametool.fit.linear import crossed, dot, inverse, length, product, total
+from frametool.fit.least_squares import inverse, length
 from frametool.fit.rigid_arrays import skew
 from frametool.fit.robust import KEPT, draws, require_near, settled
 from frametool.geometry import validation
@@ -113,7 +113,7 @@ def solve_points(
         np.sqrt(mass / 3.0) * length(residuals) / sigma,
         sigma,
         3 * int(kept.sum()) - 6 - scale,
-        sqrt(total(dot(residuals, residuals)[used]) / used.sum()),
+        sqrt((residuals[used] ** 2).sum() / used.sum()),
         hints + pairs.at(kept).line_hints(sigma, covariance),
     )
 
@@ -150,12 +150,12 @@ class _Pairs(NamedTuple):
             if chosen.is_line():
                 continue
             fit = chosen.fitted(with_scale=with_scale)
-            off = dot(*[seen.weighted_residuals(fit)] * 2)
+            off = (seen.weighted_residuals(fit) ** 2).sum(-1)
             best = min(best, (float(np.partition(off, middle)[middle]), fit), key=lambda each: each[0])
         return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
 
     def is_line(self) -> bool:
-        """Say whether target or source lie on a line, or in one place."""
+        """Return True if target or source lie on a line, or in one place."""
         for xyz in self[:2]:
             first, second, _ = principal_axes(xyz)
             if second <= max(THIN * first, STILL * np.abs(xyz).max()):
@@ -173,7 +173,7 @@ class _Pairs(NamedTuple):
             raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
 
     def scale_hints(self, typical: float, names: tuple[str, str], *, robust: bool) -> list[str]:
-        """Say of a scale that would fit much better how much greater one set is."""
+        """Return a warning where a scale would fit much better."""
         fit, scaled = self.start(with_scale=True, robust=robust)
         if BETTER * scaled > typical or fit.scale <= 0.0:
             return []
@@ -182,7 +182,7 @@ class _Pairs(NamedTuple):
         return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
 
     def line_hints(self, sigma: float, covariance: Array) -> list[str]:
-        """Say of points that lie nearly on a line that the turn about it is uncertain."""
+        """Return a warning where points lie nearly on a line: the rotation about it is uncertain."""
         first, second, _ = principal_axes(self.target)
         if not second < KEPT * sigma < first:
             return []
@@ -197,13 +197,13 @@ class _Pairs(NamedTuple):
         middle = centre(self.source, self.mass)
         arms = fit.transform.rotation.apply(self.source - middle)
         slopes = skew(fit.scale * arms).reshape(-1, 3)
-        of_turn = inverse(crossed(slopes, np.repeat(self.mass, 3)[:, None] * slopes))
-        of_scale = with_scale / total(self.mass * dot(arms, arms))
+        of_turn = inverse(slopes.T @ (np.repeat(self.mass, 3)[:, None] * slopes))
+        of_scale = with_scale / (self.mass[:, None] * arms**2).sum()
         lever = fit.transform.rotation.apply(middle)
         levers = np.eye(6)
         levers[:3, 3:] = skew(fit.scale * lever)
-        found = product(product(levers[:, 3:], of_turn), levers[:, 3:].T)
-        found[:3, :3] += np.eye(3) / total(self.mass) + of_scale * np.outer(lever, lever)
+        found = levers[:, 3:] @ of_turn @ levers[:, 3:].T
+        found[:3, :3] += np.eye(3) / self.mass.sum() + of_scale * np.outer(lever, lever)
         return sigma**2 / 2.0 * (found + found.T), sigma * sqrt(of_scale) if with_scale else None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.fit.bodies import bodies_of, require_connected
 from frametool.fit.graph import bridges
-from frametool.fit.linear import NotSettled, dot, inverse, total
+from frametool.fit.least_squares import NotSettled, inverse
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
 from frametool.fit.uncertainty import Uncertainty
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array
     from frametool.stream.measurements import Measurement
 
+ROOT = PoseArrays(np.eye(3), np.zeros(3))
+FEW_LOOPS = 6  # fewer leave the sigmas rough where rotations can close them
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance has
 
 
@@ -79,7 +81,7 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
         _poses([bodies.pose[name] for name in children]),
         _poses([m.transform for m in measurements]),
         np.array([m.covariance is not None for m in measurements]),
-        (information + information.swapaxes(1, 2)) / 2,
+        information,
     )
 
 
@@ -94,6 +96,15 @@ def _poses(transforms: list[Transform]) -> PoseArrays:
     return PoseArrays.of(Transform.of(*(np.array(part, float) for part in parts)))
 
 
+def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
+    """Return a warning where too few loops separate the sigma of metres from that of radians."""
+    loops = int(found.kept.sum()) - problem.unknown
+    if not (found.estimated and found.few_loops and loops < FEW_LOOPS):
+        return []
+    verb = "loop does" if loops == 1 else "loops do"
+    return [f"{loops} {verb} not tell metres from radians: the sigmas are rough; give sigma"]
+
+
 class TreeSolution:
     """A tree of measured frames, and what the measurements say about it.
 
@@ -104,6 +115,7 @@ class TreeSolution:
     the given sigmas are; they are believed all the same
     dof: degrees of freedom of either half; rms_distance, rms_angle: of those used
     tree: all of that as a tree with covariances, where `frametool.solve` made it
+    hints: what a person should know of the sigmas
     rows: how many measurements of each frame are used; frame_checked: whether its pose in the root rests on loops only
     """
 
@@ -127,9 +139,10 @@ class TreeSolution:
         self.u: Array = problem.u(self.residuals, found.noise)
         self.sigma = noise and (noise.place, noise.turn)
         self.sigma_factor = found.noise.factor
+        self.hints = _noise_hints(problem, found)
         self.dof = max(3 * (int(self.used.sum()) - problem.unknown), 0)
         self.rms_distance, self.rms_angle = (
-            math.sqrt(total(dot(part, part)[self.used]) / self.used.sum())
+            math.sqrt((part[self.used] ** 2).sum() / self.used.sum())
             for part in (self.residuals[:, :3], self.residuals[:, 3:])
         )
         kept = np.flatnonzero(self.used).tolist()
@@ -167,7 +180,7 @@ class TreeSolution:
 
     def marginal(self, frame: str) -> Array | None:
         """Return the covariance (6, 6) of the pose of a frame in the root; None where it is not known."""
-        return self._uncertainty.in_root(*self._at(frame))
+        return self._uncertainty.between((0, ROOT), self._at(frame))
 
     def _known(self, frame: str) -> str:
         if frame not in self.poses:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import NotConnected, printable
-from frametool.fit.linear import applied, dot, length
+from frametool.fit.least_squares import applied, length
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.robust import KEPT
 from frametool.geometry.conventions import axes_change
@@ -121,4 +121,6 @@ def loops(
 
 
 def _sigmas(errors: Array, information: Array) -> Array:
-    return np.sqrt(np.maximum(dot(errors, applied(information, errors)), 0.0) / 6)
+    squares = (errors * applied(information, errors)).sum(-1)
+    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+    return found

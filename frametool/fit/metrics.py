@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.linear import dot, length, total
+from frametool.fit.least_squares import length
 from frametool.frames.trajectory import way
 
 if TYPE_CHECKING:
@@ -35,10 +35,9 @@ class Statistics(NamedTuple):
 
 def statistics(values: Array) -> Statistics:
     """Sum numbers up."""
-    count, sse = len(values), total(values * values)
-    mean = total(values) / count
+    count, sse, mean = len(values), float((values**2).sum()), float(values.mean())
     return Statistics(
-        sqrt(sse / count), mean, float(np.median(values)), sqrt(total((values - mean) ** 2) / count),
+        sqrt(sse / count), mean, float(np.median(values)), float(values.std()),
         float(values.min()), float(values.max()), sse, float(np.percentile(values, 95)),
     )  # fmt: skip
 
@@ -63,7 +62,7 @@ def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErro
     across = np.cross(above, along)
     turned = ref.rotation, est.rotation
     rad = None if turned[0] is None or turned[1] is None else turned[0].distance(turned[1])
-    return AbsoluteErrors(length(gap), rad, *(dot(gap, axis) for axis in (along, across, above)))
+    return AbsoluteErrors(length(gap), rad, *((gap * axis).sum(-1) for axis in (along, across, above)))
 
 
 def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
@@ -79,7 +78,7 @@ def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
     else:
         last = moving[(np.searchsorted(moving, np.arange(len(xyz)), "right") - 1).clip(0)]
         along = chord[last] / size[last, None]
-    above = up - dot(along, up)[:, None] * along
+    above = up - (along @ up)[:, None] * along
     size = length(above)
     parallel = size < ROUNDING
     if parallel.any():
@@ -121,6 +120,11 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
         found.append(after)
     chain = np.array(found)
     return chain[:-1], chain[1:]
+
+
+def is_lost(along: Array, delta: float) -> bool:
+    """Return True if a delta is so short beside the path that adding it changes nothing."""
+    return bool(along[-1] + delta * (1 - ROUNDING) == along[-1])
 
 
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid
 from frametool.fit.alignment import centre, fitted
-from frametool.fit.linear import applied, crossed, eigen, product, solved
+from frametool.fit.least_squares import solve_normal
 
 if TYPE_CHECKING:
     from frametool.frames.trajectory import Trajectory
@@ -38,11 +38,10 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
         free = turns.reshape(-1, 3)
         residual = (ref.xyz - placed.xyz).reshape(-1)
         if own is not None:
-            free = free - product(own, solved(crossed(own, own), crossed(own, free)))
-        squares, axes = eigen(crossed(free, free))
+            free = free - own @ solve_normal(own.T @ own, own.T @ free)
+        squares, axes = np.linalg.eigh(free.T @ free)
         seen = squares > (SEEN * fit.scale) ** 2 * len(turns)
-        along = product(axes[:, seen].T, crossed(free, residual[:, None]))[:, 0]
-        step = applied(axes[:, seen], along / squares[seen])
+        step = axes[:, seen] @ (axes[:, seen].T @ (residual @ free) / squares[seen])
         arm = arm + step
         if np.abs(step).max() <= DONE * (1 + np.abs(arm).max()):
             break

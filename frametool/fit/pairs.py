@@ -86,6 +86,7 @@ def nearest(ref: Trajectory, est: Trajectory, max_diff_ns: float) -> Pairs:
     """Pair each pose of the shorter one with that of the nearest stamp of the other, of two the earlier."""
     walks_est = est.size <= ref.size
     walked, other = (est, ref) if walks_est else (ref, est)
+    other = other.at(np.argsort(other.stamps_ns, kind="stable"))
     after = np.searchsorted(other.stamps_ns, walked.stamps_ns).clip(1 if other.size > 1 else 0, other.size - 1)
     before = (after - 1).clip(0)
     from_before = walked.stamps_ns - other.stamps_ns[before]
@@ -103,7 +104,7 @@ def interval(stamps_ns: Array) -> float:
 
 
 def _inside(stamps_ns: Array, span: Array) -> int:
-    return int(np.count_nonzero((span[0] <= stamps_ns) & (stamps_ns <= span[-1])))
+    return int(np.count_nonzero((span.min() <= stamps_ns) & (stamps_ns <= span.max())))
 
 
 def paired_samples(

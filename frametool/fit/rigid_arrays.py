@@ -1,7 +1,7 @@
 """Poses as arrays of matrices, what a fit needs of them: products, errors, small steps and how these act.
 
-turns: (n, 3, 3) rotations; places: (n, 3), metres.  An error or a step is (n, 6): metres and a rotation vector, both
-along the fixed axes of the frame a pose is given in, as the covariances of ROS: place + d[:3], Exp(d[3:]) turn.
+rotations: (n, 3, 3); translations: (n, 3), metres.  An error or a step is (n, 6): metres and a rotation vector, both
+along the fixed axes of the parent frame, as the covariances of ROS: t + d[:3], Exp(d[3:]) R.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.linear import applied, length, product
+from frametool.fit.least_squares import applied, length
 from frametool.geometry import arrays, floats, matrix, quaternion, vectors
 from frametool.geometry.transform import Transform
 
@@ -25,53 +25,53 @@ NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
 class PoseArrays(NamedTuple):
     """Many poses, or one without the first axis."""
 
-    turns: Any
-    places: Any
+    rotations: Any
+    translations: Any
 
     @classmethod
     def of(cls, transform: Transform) -> PoseArrays:
-        """Take transforms."""
+        """Convert transforms."""
         whole = transform.as_matrix()
         return cls(whole[..., :3, :3].copy(), whole[..., :3, 3].copy())
 
     @property
     def transform(self) -> Transform:
         """The same as transforms."""
-        x, y, z = np.moveaxis(self.places, -1, 0)
-        return Transform.of(x, y, z, *as_quaternion(self.turns))
+        x, y, z = np.moveaxis(self.translations, -1, 0)
+        return Transform.of(x, y, z, *as_quaternion(self.rotations))
 
     @property
     def inverse(self) -> PoseArrays:
         """The poses the other way round."""
-        back = np.swapaxes(self.turns, -1, -2)
-        return PoseArrays(back, -applied(back, self.places))
+        back = np.swapaxes(self.rotations, -1, -2)
+        return PoseArrays(back, -applied(back, self.translations))
 
     def __matmul__(self, other: PoseArrays) -> PoseArrays:
         """Compose: a_from_c = a_from_b @ b_from_c."""
-        return PoseArrays(product(self.turns, other.turns), self.apply(other.places))
+        return PoseArrays(self.rotations @ other.rotations, self.apply(other.translations))
 
     def apply(self, points: Array) -> Array:
         """Move points."""
-        moved: Array = applied(self.turns, points) + self.places
+        moved: Array = applied(self.rotations, points) + self.translations
         return moved
 
     def at(self, index: Any) -> PoseArrays:
         """Choose poses as numpy does."""
-        return PoseArrays(self.turns[index], self.places[index])
+        return PoseArrays(self.rotations[index], self.translations[index])
 
     def stepped(self, steps: Array) -> PoseArrays:
-        """Add small steps: place + d[:3], Exp(d[3:]) turn."""
-        return PoseArrays(product(exp(steps[..., 3:]), self.turns), self.places + steps[..., :3])
+        """Add small steps: t + d[:3], Exp(d[3:]) R."""
+        return PoseArrays(exp(steps[..., 3:]) @ self.rotations, self.translations + steps[..., :3])
 
     def errors(self, measured: PoseArrays) -> Array:
-        """Return [place - measured place, Log(turn measured turn')]."""
-        turned = log(product(self.turns, np.swapaxes(measured.turns, -1, -2)))
-        return np.concatenate([self.places - measured.places, turned], -1)
+        """Return [t - measured t, Log(R measured R')]."""
+        turned = log(self.rotations @ np.swapaxes(measured.rotations, -1, -2))
+        return np.concatenate([self.translations - measured.translations, turned], -1)
 
 
-def as_quaternion(turns: Array) -> Quaternion:
+def as_quaternion(rotations: Array) -> Quaternion:
     """Return x, y, z, w >= 0 of rotation matrices."""
-    entries = matrix.nine(turns[..., i, j] for i in range(3) for j in range(3))
+    entries = matrix.nine(rotations[..., i, j] for i in range(3) for j in range(3))
     return quaternion.unit(*matrix.to_quaternion(*entries, arrays), arrays)
 
 
@@ -82,9 +82,9 @@ def exp(rotvecs: Array) -> Array:
     return np.stack(nine, -1).reshape(*rotvecs.shape, 3)
 
 
-def log(turns: Array) -> Array:
+def log(rotations: Array) -> Array:
     """Return the rotation vectors of rotation matrices (.., 3, 3)."""
-    x, y, z, w = as_quaternion(turns)
+    x, y, z, w = as_quaternion(rotations)
     return np.stack(vectors.as_rotvec(x, y, z, w, arrays), -1)
 
 
@@ -106,4 +106,4 @@ def inverse_left_jacobian(rotvecs: Array) -> Array:
     sine, cosine = floats.half_sincos(a, arrays)
     factor = np.where(far, 1.0 / a**2 - cosine / (2.0 * a * sine), 1.0 / 12.0)
     crossed = skew(rotvecs)
-    return np.eye(3) - crossed / 2.0 + factor[..., None, None] * product(crossed, crossed)
+    return np.eye(3) - crossed / 2.0 + factor[..., None, None] * (crossed @ crossed)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.linear import dot, length, summed, total
+from frametool.fit.least_squares import length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -38,9 +38,9 @@ FIRST_ROUNDS = 30
 ROUNDS = 20  # of leaving out and taking back; in the second half nothing more is left out, so that they end
 
 
-def require_near(places: Array, name: str) -> None:
-    """Refuse places whose squares would overflow."""
-    if (farthest := np.abs(places).max(initial=0.0)) > FARTHEST:
+def require_near(translations: Array, name: str) -> None:
+    """Refuse translations whose squares would overflow."""
+    if (farthest := np.abs(translations).max(initial=0.0)) > FARTHEST:
         raise ValueInvalid(f"{name}: a place at {farthest:.3g} m; at most {FARTHEST:.0e} m can be fitted")
 
 
@@ -113,14 +113,14 @@ def lengths(residuals: Array) -> Array:
 def deviations(residuals: Array, sigmas: Array) -> Array:
     """Return u of rows: the root of the mean square of their numbers in sigmas."""
     off = lengths(residuals) / sigmas
-    u: Array = np.sqrt(dot(off, off) / (3.0 * off.shape[1]))
+    u: Array = np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
     return u
 
 
 def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:
     """Return the sigma of each three numbers of weighted rows that share so many unknown ones."""
-    dof = max(3.0 * total(np.asarray(weights, float)) - unknown, 1.0)
-    squares = summed(weights[:, None] * lengths(residuals) ** 2)
+    dof = max(3.0 * float(weights.sum()) - unknown, 1.0)
+    squares = (weights[:, None] * lengths(residuals) ** 2).sum(0)
     return np.array([rms_sigma(each, dof) for each in squares.tolist()])
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.linear import crossed, dot, total
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.robust import LEAST, draws, lengths, require_near, settled
 from frametool.geometry import validation
@@ -81,11 +80,11 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
         *mean(found.kept),
         used,
         counts & ~used,
-        np.sqrt(mass / 6.0) * np.sqrt(dot(lengths(off) ** 2, 1.0 / found.sigmas**2)),
+        np.sqrt(mass / 6.0) * np.sqrt(lengths(off) ** 2 @ found.sigmas**-2.0),
         off,
         (s_t, s_r),
         3 * count - 3,
-        crossed(kept, kept) * (count / total(mass[used]) / (count - 1)) if count > 1 else None,
+        kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None,
     )
 
 
@@ -94,7 +93,7 @@ def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = N
     mass = validation.masses(weights, poses.shape)
     count = int((mass > 0.0).sum())
     off = PoseArrays.of(poses).errors(PoseArrays.of(mean)) * np.sqrt(mass)[:, None]
-    return crossed(off, off) * (count / total(mass) / (count - 1)) if count > 1 else None
+    return off.T @ off * (count / mass.sum() / (count - 1)) if count > 1 else None
 
 
 def _middle(poses: Transform, roots: Array) -> Transform:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.fit.elimination import Elimination
 from frametool.fit.graph import SpanningTree, bridges, spanning_tree
-from frametool.fit.linear import applied, dot, length, product, total
+from frametool.fit.least_squares import applied, inverse, length, solve_normal
 from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
 from frametool.fit.robust import KEPT, LEAST, MEDIAN_OF_SIX, first_weights, median_sigma, rms_sigma
 
@@ -27,9 +26,11 @@ if TYPE_CHECKING:
 TREES = 200
 ROWS_AT_ONCE = 20_000  # of trees that are tried together
 STEPS = 100
+MOST_DAMPED = 1e12
 REST = 1e-12  # of the extent, radians, and of a sigma: a smaller step is the last
 STEADY = 1e-4  # of a weight: the first weights are at rest
 FIRST_ROUNDS, ROUNDS = 50, 20
+BORROWED = 0.3  # degrees of freedom of metres that radians count for, and the other way round, where loops are few
 LEAST_SHARE = 0.04  # of the rows in loops that the unknowns leave over
 
 
@@ -39,6 +40,13 @@ class Noise(NamedTuple):
     place: float = 0.01
     turn: float = math.radians(1.0)
     factor: float = 1.0
+
+    def at_least(self, other: Noise) -> Noise:
+        """Return sigmas that are nowhere below those of another."""
+        return self._replace(place=max(self.place, other.place), turn=max(self.turn, other.turn))
+
+
+LOWEST = Noise(0.001, math.radians(0.1))  # medians where loops are few: most rows of a tree are off by nothing
 
 
 class TreeRows(NamedTuple):
@@ -58,12 +66,17 @@ class TreeRows(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """Bodies that fit the kept rows best; estimated: whether these rows tell their own noise."""
+    """Bodies that fit the kept rows best.
+
+    estimated: whether these rows tell their own noise
+    few_loops: whether rotations can close all loops, so that metres alone do not show their sigma
+    """
 
     bodies: PoseArrays
     kept: Any
     noise: Noise
     estimated: bool
+    few_loops: bool
 
 
 def identities(count: int) -> PoseArrays:
@@ -73,19 +86,19 @@ def identities(count: int) -> PoseArrays:
 
 def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Array, Array]:
     """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
-    back = np.swapaxes(parent.turns, -1, -2)
-    turn = product(inverse_left_jacobian(turned), back)
+    back = np.swapaxes(parent.rotations, -1, -2)
+    turn = inverse_left_jacobian(turned) @ back
     by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
     by_child[..., :3, :3], by_child[..., 3:, 3:] = back, turn
     by_parent[..., :3, :3], by_parent[..., 3:, 3:] = -back, -turn
-    by_parent[..., :3, 3:] = product(back, skew(child.places - parent.places))
+    by_parent[..., :3, 3:] = back @ skew(child.translations - parent.translations)
     return by_parent, by_child
 
 
 def of_body(jacobian: Array, body: PoseArrays, frame: PoseArrays) -> Array:
     """Return the Jacobian by the step of a body from that by the step of a frame in it: the lever arm turns along."""
     moved = jacobian.copy()
-    moved[..., 3:] -= product(jacobian[..., :3], skew(frame.places - body.places))
+    moved[..., 3:] -= jacobian[..., :3] @ skew(frame.translations - body.translations)
     return moved
 
 
@@ -93,16 +106,12 @@ class TreeProblem:
     """Rows between bodies, and the poses that fit them."""
 
     def __init__(self, rows: TreeRows, count: int) -> None:
-        """Order the unknown poses for elimination."""
+        """Take rows between so many bodies."""
         self.rows, self.count, self.size = rows, count, len(rows.parent)
         self.unknown = count - 1
         self.pairs = list(zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
-        joined = [(a - 1, b - 1) for a, b in self.pairs if a and b]
-        self.elimination = Elimination(self.unknown, joined)
-        between = rows.parent != rows.child  # within a body a row moves nothing
-        self._of_parent = np.flatnonzero(between & (rows.parent > 0))
-        self._of_child = np.flatnonzero(between & (rows.child > 0))
-        self._of_both = np.flatnonzero(between & (rows.parent > 0) & (rows.child > 0))
+        self.arm = max(float(np.median(length(rows.measured.translations))), LEAST) if self.size else 1.0
+        self._moves = (rows.parent != rows.child)[:, None, None]  # a row within a body moves nothing
 
     def ends(self, bodies: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
         """Return where the frames are that each row is between."""
@@ -121,8 +130,9 @@ class TreeProblem:
 
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return how many sigmas each row is off: the root mean square of its six numbers."""
-        squares = dot(errors, applied(self.information(noise, noise.factor), errors))
-        return np.sqrt(np.maximum(squares, 0.0) / 6)
+        squares = (errors * applied(self.information(noise, noise.factor), errors)).sum(-1)
+        found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+        return found
 
     def tree(self, rows: Iterable[int]) -> SpanningTree:
         """Return the spanning tree of the first rows that close no loop."""
@@ -144,8 +154,8 @@ class TreeProblem:
             some, orders = [self.tree(order) for order in orders[:at_once]], orders[at_once:]
             placed = self.placed(some)
             for at, tree in enumerate(some):
-                off = np.array([math.log1p(u * u) for u in self.u(self.errors(placed.at(at)), Noise()).tolist()])
-                if (sum_off := total(off)) < least:
+                off = np.log1p(self.u(self.errors(placed.at(at)), Noise()) ** 2)
+                if (sum_off := float(off.sum())) < least:
                     best, least = placed.at(at), sum_off
                 off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
                 closest = np.minimum(closest, off)
@@ -160,10 +170,10 @@ class TreeProblem:
         across = rows.in_parent @ rows.measured @ rows.in_child.inverse
         forth, back = across.at(row), across.inverse.at(row)
         down = rows.child[row] == np.arange(self.count)
-        turns = np.where(down[..., None, None], forth.turns, back.turns)
-        places = np.where(down[..., None], forth.places, back.places)
-        turns[:, 0], places[:, 0] = np.eye(3), 0.0
-        poses = PoseArrays(turns, places)
+        rotations = np.where(down[..., None, None], forth.rotations, back.rotations)
+        translations = np.where(down[..., None], forth.translations, back.translations)
+        rotations[:, 0], translations[:, 0] = np.eye(3), 0.0
+        poses = PoseArrays(rotations, translations)
         each = np.arange(len(trees))[:, None]
         while above.any():
             poses = poses.at((each, above)) @ poses
@@ -173,54 +183,50 @@ class TreeProblem:
     # Gauss-Newton
 
     def normal_equations(self, bodies: PoseArrays, information: Array) -> tuple[Array, Array, float]:
-        """Return J'LJ as blocks, J'Lr (unknown, 6) and r'Lr."""
-        rows, (parent, child) = self.rows, self.ends(bodies)
+        """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
+        rows, (parent, child), count = self.rows, self.ends(bodies), self.count
         errors = (parent.inverse @ child).errors(rows.measured)
-        by_parent, by_child = jacobians(parent, child, errors[:, 3:])
-        by_parent = of_body(by_parent, bodies.at(rows.parent), parent)
-        by_child = of_body(by_child, bodies.at(rows.child), child)
+        by_parent, by_child = (self._moves * by for by in jacobians(parent, child, errors[:, 3:]))
+        sides = [
+            (rows.parent, of_body(by_parent, bodies.at(rows.parent), parent)),
+            (rows.child, of_body(by_child, bodies.at(rows.child), child)),
+        ]
         weighed = applied(information, errors)
-        blocks, gradient = np.zeros((self.elimination.size, 6, 6)), np.zeros((self.unknown, 6))
-        sides = ((self._of_parent, rows.parent, by_parent), (self._of_child, rows.child, by_child))
-        for chosen, body, by in sides:
-            self._add(blocks, body[chosen], body[chosen], by[chosen], information[chosen], by[chosen])
-            np.add.at(gradient, body[chosen] - 1, applied(by[chosen].swapaxes(1, 2), weighed[chosen]))
-        both = self._of_both
-        a, b, by_a, by_b = rows.parent[both], rows.child[both], by_parent[both], by_child[both]
-        self._add(blocks, a, b, by_a, information[both], by_b)
-        self._add(blocks, b, a, by_b, information[both], by_a)
-        return blocks, gradient, total(dot(errors, weighed))
-
-    def _add(self, blocks: Array, a: Indices, b: Indices, by_a: Array, information: Array, by_b: Array) -> None:
-        made = product(product(by_a.swapaxes(1, 2), information), by_b)
-        np.add.at(blocks, self.elimination.slots(a - 1, b - 1), made)
+        normal, gradient = np.zeros((count, count, 6, 6)), np.zeros((count, 6))
+        for body, by in sides:
+            np.add.at(gradient, body, applied(by.swapaxes(1, 2), weighed))
+            for other, by_other in sides:
+                np.add.at(normal, (body, other), by.swapaxes(1, 2) @ information @ by_other)
+        size = 6 * self.unknown
+        matrix = normal[1:, 1:].swapaxes(1, 2).reshape(size, size)
+        return matrix, gradient[1:].reshape(size), float((errors * weighed).sum())
 
     def improved(self, bodies: PoseArrays, information: Array, damping: float) -> tuple[PoseArrays, float, float]:
         """Take one step, damped until it helps; returns the bodies, the size of the step and the damping."""
-        blocks, gradient, before = self.normal_equations(bodies, information)
-        every = np.arange(self.unknown)
-        diagonal = self.elimination.slots(every, every)[:, None], np.arange(6), np.arange(6)
-        extent = max(float(np.abs(bodies.places).max()), LEAST)
-        while damping < 1e12:
-            damped = blocks.copy()
-            damped[diagonal] *= 1.0 + damping
+        normal, gradient, before = self.normal_equations(bodies, information)
+        diagonal = np.diagonal(normal).copy()
+        extent = max(float(np.abs(bodies.translations).max()), LEAST)
+        while damping < MOST_DAMPED:
+            np.fill_diagonal(normal, diagonal * (1.0 + damping))
             step = np.zeros((self.count, 6))
-            step[1:] = -self.elimination.factored(damped).solve(gradient[..., None])[..., 0]
+            step[1:] = -solve_normal(normal, gradient[:, None]).reshape(-1, 6)
             moved, size = bodies.stepped(step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
             errors = self.errors(moved)
-            after = total(dot(errors, applied(information, errors)))
+            after = float((errors * applied(information, errors)).sum())
             if size <= REST or after <= before * (1 + 1e-12):
                 return moved, size, damping / 10 if damping > 1e-9 else 0.0
             damping = max(damping * 10, 1e-6)
         return bodies, 0.0, 0.0
 
-    def settled(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool) -> tuple[PoseArrays, Noise]:
+    def settled(
+        self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
+    ) -> tuple[PoseArrays, Noise]:
         """Return the least squares of the kept rows, and their noise, both at rest."""
         damping = 0.0
         for _ in range(STEPS):
             information = self.information(noise) * kept[:, None, None]
             bodies, size, damping = self.improved(bodies, information, damping)
-            before, noise = noise, self.estimated(self.errors(bodies), kept, estimate=estimate)
+            before, noise = noise, self.estimated(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
             changes = (abs(new / old - 1) for new, old in zip(noise, before, strict=True))
             if size <= REST and max(changes) <= REST:
                 break
@@ -228,21 +234,43 @@ class TreeProblem:
 
     # noise, and which rows to keep
 
-    def estimated(self, errors: Array, kept: Any, *, estimate: bool) -> Noise:
-        """Return the noise of the kept rows: sums of squares over the degrees of freedom that are their share."""
+    def estimated(
+        self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
+    ) -> Noise:
+        """Return the noise of the kept rows: sums of squares over their degrees of freedom."""
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:
             return Noise()
+        errors = self.errors(bodies)
         free, given = kept & ~self.rows.given, kept & self.rows.given
         factor = 1.0
         if given.any():
-            chi2 = 6 * total(self.u(errors, Noise())[given] ** 2)
+            chi2 = 6 * float((self.u(errors, Noise())[given] ** 2).sum())
             factor = max(1.0, math.sqrt(chi2 / (2 * dof * given.sum() / kept.sum())))
         if not estimate:
             return Noise(factor=factor)
-        squares = (total(dot(part, part)[free]) for part in _halves(errors))
-        place, turn = (rms_sigma(each, dof * free.sum() / kept.sum()) for each in squares)
+        squares = [float((part[free] ** 2).sum()) for part in _halves(errors)]
+        dofs = [dof * free.sum() / kept.sum()] * 2
+        if few_loops:
+            dofs = [BORROWED + each for each in self.redundancies(bodies, kept, noise)]
+            squares[0] += BORROWED * (noise.turn * self.arm) ** 2
+            squares[1] += BORROWED * (noise.place / self.arm) ** 2
+        place, turn = map(rms_sigma, squares, dofs)
         return Noise(place, turn, factor)
+
+    def redundancies(self, bodies: PoseArrays, kept: Any, noise: Noise) -> list[float]:
+        """Return the degrees of freedom of metres and of radians of rows without sigmas.
+
+        With these the sigmas rest where the restricted likelihood (REML) is greatest; source: Foerstner 1979.
+        """
+        information = self.information(noise) * kept[:, None, None]
+        covariance = inverse(self.normal_equations(bodies, information)[0])
+        information *= ~self.rows.given[:, None, None]
+        count, found = 3.0 * (kept & ~self.rows.given).sum(), []
+        for half in np.kron(np.eye(2), np.ones(3)):
+            own = self.normal_equations(bodies, information * np.outer(half, half))[0]
+            found.append(count - float((covariance * own).sum()))
+        return found
 
     def medians(self, errors: Array, looped: Any) -> Noise:
         """Return the noise by the medians of the rows in loops."""
@@ -256,7 +284,7 @@ class TreeProblem:
         if free.any():
             place, turn = (median_sigma(_odd(length(part[free])), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
-        return noise
+        return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
     def weighed_down(self, bodies: PoseArrays, looped: Any) -> tuple[PoseArrays, Noise]:
         """Return the fit with first weights and the noise by medians, both at rest."""
@@ -287,7 +315,7 @@ class TreeProblem:
         """Fit the kept rows and test all of them again, until the set stays."""
         for _ in range(ROUNDS):
             found = self.refitted(bodies, kept, noise)
-            kept, (bodies, _, noise, _) = self.u(self.errors(found.bodies), found.noise) <= KEPT, found
+            kept, bodies, noise = self.u(self.errors(found.bodies), found.noise) <= KEPT, found.bodies, found.noise
             if not robust or (kept == found.kept).all():
                 break
         return found
@@ -301,8 +329,9 @@ class TreeProblem:
             kept, bodies = kept | reached, self.placed([tree]).at(0)
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
         estimate = bool((kept & ~alone & ~self.rows.given).any()) and kept.sum() > self.unknown
-        bodies, noise = self.settled(bodies, kept, noise, estimate=estimate)
-        return Fitted(bodies, kept, noise, estimate)
+        few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
+        bodies, noise = self.settled(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
+        return Fitted(bodies, kept, noise, estimate, few_loops)
 
 
 def _halves(errors: Array) -> tuple[Array, Array]:

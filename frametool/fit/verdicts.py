@@ -8,7 +8,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, first_of, printable
 from frametool.fit.graph import bridges
-from frametool.fit.linear import applied, dot, inverse
+from frametool.fit.least_squares import inverse
 from frametool.fit.measurements import best_blunder
 from frametool.fit.robust import KEPT
 from frametool.fit.tree_solver import Noise
@@ -79,9 +79,7 @@ class _Case:
         self.poses = self.parents.inverse @ self.children
         self.errors = self.poses.errors(problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
-        noise = found.noise
-        if len(kept) <= 2 * problem.unknown:  # turns can take up all that places are off: their sigma may come out tiny
-            noise = Noise(max(noise.place, Noise().place), max(noise.turn, Noise().turn), noise.factor)
+        noise = found.noise.at_least(Noise()) if found.few_loops else found.noise
         self.least_information = problem.information(noise, noise.factor)
         self.uncertainty = Uncertainty(problem, found)
 
@@ -97,7 +95,7 @@ class _Case:
                 words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
             unsure = self._beside_doubt(row, self.least_information[row])
-            if not blamed and dot(self.errors[row], applied(unsure, self.errors[row])) <= 6 * KEPT**2:
+            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
                 noise.append(row)
             if not rivals:
                 doubted = self._beside_doubt(row, self.information[row])
@@ -130,7 +128,7 @@ class _Case:
         return parent.inverse @ child
 
     def open_loop(self, row: int, rivals: list[int]) -> str:
-        """Say which rows form a loop, and how far it is open, on one line."""
+        """Return which rows form a loop, and how far it is open, on one line."""
         error = self.errors[row]
         open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
         places = [place_of(self.measurements, each) for each in sorted([row, *rivals])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import atan2, degrees, hypot
 from typing import TYPE_CHECKING, Any
 
 from frametool.text.csv_line import quoted
@@ -39,7 +40,10 @@ def write_comparison(found: dict[str, Any]) -> str:
         side = "behind" if found["offset_s"] > 0 else "ahead"
         lines.append(f"{'clock':<{width}}{abs(found['offset_s']):.6f} s {side}, corrected")
     if settings["mount"]:
-        lines.append(f"{'mount':<{width}}{', '.join(f'{number:.6f}' for number in settings['mount']['xyz'])} m")
+        x, y, z, w = settings["mount"]["quaternion"].values()
+        turn = degrees(2.0 * atan2(hypot(x, y, z), abs(w)))
+        place = ", ".join(f"{number:.6f}" for number in settings["mount"]["xyz"])
+        lines.append(f"{'mount':<{width}}{place} m" + (f", turned by {turn:.3f} deg" if turn else ""))
     each = "  ".join(f"{kind} {_short(value)}" for kind, value in found["ate_by_alignment"].items())
     lines += [f"{'fit ' + settings['align'] + '; ate m':<{width}}{each}"]
     lines.append(" " * LABEL + "".join(f"{title:>{CELL}}" for title in COLUMNS))

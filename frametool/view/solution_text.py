@@ -58,7 +58,7 @@ class SolvedRow(NamedTuple):
 
     @property
     def is_left_out(self) -> bool:
-        """Tell whether it was left out because it does not agree with the rest."""
+        """Return True if it was left out because it does not agree with the rest."""
         return self.counted and not self.used
 
 

@@ -97,3 +97,13 @@ def measured(poses: Transform, pair: tuple[int, int], error: np.ndarray, covaria
 def inverted(measurement: Measurement) -> Measurement:
     """Give a pose the other way round, under the same names."""
     return measurement._replace(components=measurement.transform.inverse().components)
+
+
+def ring(frames: int, more: int, *, seed: int, sigmas: tuple[float, float] = (1e-3, 1e-3)) -> list[Measurement]:
+    """Measure each frame in the one before, the first in the last, and some more pairs; without sigmas."""
+    generator = np.random.default_rng([frames, more, seed])
+    poses = Transform(Rotation.random(frames, seed=generator), generator.normal(size=(frames, 3)))
+    pairs = [(at, (at + 1) % frames) for at in range(frames)]
+    pairs += [tuple(generator.choice(frames, 2, replace=False).tolist()) for _ in range(more)]
+    errors = generator.normal(size=(len(pairs), 6)) * np.repeat(sigmas, 3)
+    return [measured(poses, pair, error, None) for pair, error in zip(pairs, errors, strict=True)]
