@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "support")]  # as `python -m pytest` has it: the package is that of this folder
-import selection  # noqa: E402 - found on the path above
 
 MEAN, ONE = 0.025, 0.25  # seconds; chosen so that all that runs by default takes less than 150 s of processor time
 
@@ -39,7 +38,7 @@ class Durations:
         """Time a case from its set-up to its end."""
         before = sum(os.times()[:4])
         result = yield
-        self.seconds[selection.test_of(item)].append(sum(os.times()[:4]) - before)
+        self.seconds[item.nodeid.partition("[")[0].replace(" ", "_")].append(sum(os.times()[:4]) - before)
         return result
 
 
@@ -57,6 +56,8 @@ def main(words: list[str]) -> None:
     """Run the cases, write the list and print what changed."""
     durations = Durations()
     pytest.main(["-m", "not large and not fuzz and not engines", *words], plugins=[durations])
+    import selection  # pytest has loaded it by now, and rewritten its assertions
+
     before = selection.slow_tests() if selection.SLOW.exists() else {}
     known = before if words else {name: word for name, word in before.items() if name in durations.seconds}
     after = slow_now(known, durations.seconds)
