@@ -286,7 +286,7 @@ def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseA
 
 
 def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
-    """Return a warning where a factor on the target's translations fits much better: (R_A - I) t_X - s R_X t_B = -t_A."""
+    """Return a warning where a factor on the target's translations fits better: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
     lever, turned = (a.rotations - np.eye(3)).reshape(-1, 3), applied(x.rotations, b.translations).reshape(-1)
     place, plain = _least_squares(lever, turned - a.translations.reshape(-1))
