@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "fit", "explain", "calc",
+    "errors", "geometry", "frames", "text", "documents", "grammar", "ros", "recordings", "formats", "lint", "stream", "fit", "explain", "calc",
     "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}

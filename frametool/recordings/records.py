@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump
 from frametool.errors import FormatError, Unanswered, first_of, listing
-from frametool.ros.bags import TYPES, check_count, opened_bag, refuse_foreign
+from frametool.recordings.read import opened_recording
+from frametool.recordings.transforms import TYPES
 from frametool.ros.messages import PATH
 from frametool.ros.pose_lists import POSE_ARRAY, posed_messages
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
 
     from frametool.grammar.edges import Tally
+    from frametool.recordings.read import Channel, Message, RecordingReader
 
 PIECE = 1 << 16  # bytes
 FIX = "sensor_msgs/msg/NavSatFix"
@@ -36,20 +38,19 @@ RECORDS = frozenset((
 ))  # fmt: skip
 
 
-def record_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
-    """Return the topics whose messages are wanted: those chosen, or the only one that holds fixes; [] for none.
+def record_channels(reader: RecordingReader, chosen: Collection[str]) -> list[Channel]:
+    """Return the channels whose messages are wanted: those chosen, or those of the only topic that holds records.
 
-    chosen: with or without a leading `/`
+    chosen: topics with or without a leading `/`
     Raises Unanswered where several hold records and none is chosen.
     """
-    there = {each.topic: each.msgtype for each in reader.connections if each.msgtype in RECORDS}
+    there = [each for each in reader.channels if each.type in RECORDS]
     wanted = {topic.strip("/") for topic in chosen}
-    if wanted:
-        return [topic for topic in there if topic.strip("/") in wanted]
-    if len(there) > 1:
-        named = first_of(sorted(there), 8, gap="|")
-        raise Unanswered(f"several topics hold records; give --topic {named}", source=path)
-    return list(there)
+    topics = sorted({each.topic for each in there})
+    if len(topics) > 1 and not wanted:
+        named = first_of(topics, 8, gap="|")
+        raise Unanswered(f"several topics hold records; give --topic {named}", source=reader.path)
+    return [each for each in there if not wanted or each.topic.strip("/") in wanted]
 
 
 def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedReader | None:
@@ -58,33 +59,30 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
     Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds neither.
     """
     with ExitStack() as opened:
-        reader = opened.enter_context(opened_bag(path, tally))
-        refuse_foreign(reader, chosen, path)
-        topics = record_topics(reader, chosen, path)
-        if topics:
-            return BufferedReader(_Lines(_pieces(_lines(reader, topics, path)), opened.pop_all()))
+        reader = opened.enter_context(opened_recording(path, tally))
+        reader.refuse_foreign(chosen)
+        if channels := record_channels(reader, chosen):
+            return BufferedReader(_Lines(_pieces(_lines(reader, channels)), opened.pop_all()))
         wanted = {topic.strip("/") for topic in chosen}
-        clouds = [each.topic.strip("/") for each in reader.connections if each.msgtype == CLOUD]
+        clouds = [each.topic.strip("/") for each in reader.channels if each.type == CLOUD]
         if any(not wanted or topic in wanted for topic in clouds):
             return None
-        held = {f"{each.topic} ({each.msgtype})" for each in reader.connections}
+        held = {f"{each.topic} ({each.type})" for each in reader.channels}
         known = listing(held, near=next(iter(chosen), "")) or "none"
-        has_frames = any(each.msgtype in TYPES for each in reader.connections)
+        has_frames = any(each.type in TYPES for each in reader.channels)
     named = f" on {listing(chosen)}" if chosen else ""
     remedy = f"; its frames: frametool lookup {path} TARGET SOURCE" if has_frames else ""
     raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
 
 
-def _lines(reader: Any, topics: Sequence[str], path: str) -> Iterator[str]:
-    """Yield each message, or each pose of a list, as a line; there must be as many messages as the bag says."""
-    connections = [each for each in reader.connections if each.topic in topics]
+def _lines(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield each message, or each pose of a list, as a line."""
     number = 0
-    messages = reader.messages(connections=connections)
-    while (found := _next(reader, messages, number + 1, path)) is not None:
+    messages = reader.messages(channels)
+    while (found := _next(reader, messages, number + 1)) is not None:
         number += 1
         for message in posed_messages(*found):
             yield _text(message) + "\n"
-    check_count(reader, connections, number, path)
 
 
 def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
@@ -104,15 +102,16 @@ def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
     yield "".join(held).encode()
 
 
-def _next(reader: Any, messages: Iterator[Any], number: int, path: str) -> tuple[Any, str] | None:
+def _next(reader: RecordingReader, messages: Iterator[Message], number: int) -> tuple[Any, str] | None:
     """Return the next message and its type; None behind the last."""
     try:
         if (found := next(messages, None)) is None:
             return None
-        connection, _, data = found
-        return reader.deserialize(data, connection.msgtype), connection.msgtype
-    except Exception as error:  # noqa: BLE001 - a broken bag makes the library raise anything
-        raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=path) from None
+        return reader.types.read(found.channel, found.data), found.channel.type
+    except FormatError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a broken bag makes the libraries raise anything
+        raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=reader.path) from None
 
 
 def _text(value: Any) -> str:

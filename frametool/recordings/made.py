@@ -1,26 +1,21 @@
-"""Recordings written: MCAP files, ROS 1 bags and bag2 folders, through the rosbags library, the extra `frametool[bag]`.
+"""Messages that are made: transforms, poses, points and fixes as rosbags serialises them, and a tree as a recording.
 
 A message is serialised by the library once for the frames it names; stamps and numbers are then put in their places,
-for one and for a million alike.  Messages are logged at their stamps, or at the one before where a stamp goes back.
+for one and for a million alike.
 """
 
 from __future__ import annotations
 
 import struct
-from contextlib import contextmanager, suppress
 from functools import lru_cache
 from heapq import merge
 from itertools import chain, groupby
 from operator import itemgetter
-from pathlib import Path
-from shutil import rmtree
-from tempfile import gettempdir, mkdtemp
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self, TypeAlias
-from weakref import finalize
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable, shown
+from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import floats, quaternion
 
@@ -33,11 +28,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
-BAG1, BAG2 = "bag1", "bag2"
-NAME = "recording"  # of the file in a bag2 folder, whatever that is called: two runs write the same bytes
-METADATA = "metadata.yaml"
-PIECE = 1 << 20  # bytes
-NO_EXTRA = "recordings are written with an extra; install it: pip install 'frametool[bag]'"
+BAG1 = "bag1"
 SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; those of ROS 2 are int32
 SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
 
@@ -64,118 +55,15 @@ KINDS = {
 }
 
 
-class FirstPiece(bytes):
-    """The first bytes of a file in a folder, with its name."""
-
-    name: str
-
-    def __new__(cls, piece: bytes, name: str) -> Self:
-        """Take a piece and a name."""
-        made = super().__new__(cls, piece)
-        made.name = name
-        return made
-
-
-class RecordingFile:
-    """A recording that is being written, into a file without a name until `pieces` yields what is in it."""
-
-    def __init__(self, form: str, folder: str = "") -> None:
-        """Open it in a folder that has room for it; raises FileProblem without the extra."""
-        try:
-            from rosbags.rosbag1 import Writer as Writer1
-            from rosbags.rosbag2 import StoragePlugin, Writer
-        except ImportError:
-            raise FileProblem(NO_EXTRA) from None
-
-        self.form = form
-        self.log_ns = 0
-        self._folder = folder
-        self._store = typestore(form)
-        with room_in(folder):
-            self._home = Path(mkdtemp(".part", ".frametool.", folder or None))
-            bag = self._home / NAME
-            made = Writer1(bag) if form == BAG1 else Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP)
-            self._writer: Any = made
-            self._writer.open()
-            self._file = (bag if form == BAG1 else bag / f"{NAME}.mcap").open("rb")
-        self._discard = finalize(self, _discarded, self._writer, self._file, self._home)
-        with suppress(OSError):  # Windows does not let go of the name of an open file
-            rmtree(self._home)
-
-    def channel(self, kind: Kind, topic: str = "") -> Any:
-        """Begin a topic, the usual one of its kind unless told, and return what `write` takes."""
-        topic = topic or kind.topic
-        if self.form == BAG1:
-            return self._writer.add_connection(topic, kind.type, typestore=self._store, latching=int(kind.stays))
-        profiles = [latched()] if kind.stays else []
-        return self._writer.add_connection(topic, kind.type, typestore=self._store, offered_qos_profiles=profiles)
-
-    def write(self, channel: Any, stamp_ns: int, message: bytes | memoryview) -> None:
-        """Write one message; what comes late is logged with the one before."""
-        self.log_ns = max(self.log_ns, stamp_ns)
-        try:
-            self._writer.write(channel, self.log_ns, message)
-        except OSError as error:
-            raise _named(error, self._folder) from None
-
-    def pieces(self) -> Iterator[bytes]:
-        """End the recording and yield its bytes; of a folder file after file, each begun by a FirstPiece."""
-        bag = self._home / NAME
-        with room_in(self._folder):
-            bag.mkdir(parents=True, exist_ok=True)
-            self._writer.close()
-            metadata = b"" if self.form == BAG1 else (bag / METADATA).read_bytes()
-        rmtree(self._home, ignore_errors=True)
-        piece = self._file.read(PIECE)
-        if self.form == BAG2:
-            yield FirstPiece(metadata, METADATA)
-            piece = FirstPiece(piece, f"{NAME}.mcap")
-        while piece:
-            yield piece
-            piece = self._file.read(PIECE)
-        self._discard()
-
-
-def _discarded(writer: Any, file: IO[bytes], folder: Path) -> None:
-    """Close what was opened for a recording, and remove what is left of it."""
-    writer.abort()
-    file.close()
-    rmtree(folder, ignore_errors=True)
-
-
-@contextmanager
-def room_in(folder: str) -> Iterator[None]:
-    """Name the folder in which there is no room, or what else the system says of it."""
-    try:
-        yield
-    except FrametoolError:
-        raise
-    except OSError as error:
-        raise _named(error, folder) from None
-
-
-def _named(error: OSError, folder: str) -> FileProblem:
-    return FileProblem(f"{printable(folder or gettempdir())}: {(error.strerror or str(error)).lower()}")
-
-
 @lru_cache
-def typestore(form: str) -> Any:
-    """Return the types of messages that a form of recording is written with."""
+def typestore(*, ros1: bool) -> Any:
+    """Return the usual types of messages."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    store = get_typestore(Stores.ROS1_NOETIC if form == BAG1 else Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     if KINDS["tf"].type not in store.types:  # the library's Noetic has only tf/tfMessage
         store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", KINDS["tf"].type))
     return store
-
-
-def latched() -> Any:
-    """Return what a topic offers that is there for who comes late."""
-    from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
-
-    for_ever = QosTime(9223372036, 854775807)
-    return Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
-               QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
 
 
 def check_stamps(stamps_ns: Ints, form: str) -> None:
@@ -190,6 +78,8 @@ def check_stamps(stamps_ns: Ints, form: str) -> None:
 
 def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     """Yield the bytes of a recording of a tree: what stands in one message, what moves in one for each stamp."""
+    from frametool.recordings.write import RecordingFile
+
     form, asked = style.form, style.recording
     topics = {"tf_static": any(track.standing for track in tree.tracks()), "tf": tree.moves}
     if asked.topic and all(topics.values()):
@@ -261,7 +151,7 @@ def serialised(
 
     Raises ValueInvalid for names that are no text.
     """
-    store = typestore(form)
+    store = typestore(ros1=form == BAG1)
     message = _message(store.types, kind, frames, [divmod(stamp, BILLION) for stamp in stamps_ns], numbers)
     try:
         return bytes((store.serialize_ros1 if form == BAG1 else store.serialize_cdr)(message, kind.type))
