@@ -10,7 +10,6 @@ from bisect import bisect_left
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from io import BufferedReader, BytesIO, FileIO
-from itertools import islice
 from operator import itemgetter
 from pathlib import Path, PurePath
 from struct import Struct
@@ -125,15 +124,19 @@ class McapFile:
             return self.said.message_count if self.said else None
         return sum(each.count or 0 for each in self.channels.values() if each in wanted)
 
-    def blocks(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
         """Yield the messages on some channels, or on all; chunks whose times overlap are merged."""
         time, held = itemgetter(1), list[Message]()
-        for found in self._found(wanted):
-            found.sort(key=time)
-            at = bisect_left(held, found[0].log_ns, key=time)
-            yield held[:at]
-            held = sorted([*held[at:], *found], key=time) if at < len(held) else found
-        yield held
+        try:
+            for found in self._found(wanted):
+                found.sort(key=time)
+                at = bisect_left(held, found[0].log_ns, key=time)
+                yield from held[:at]
+                held = sorted([*held[at:], *found], key=time) if at < len(held) else found
+        except Exception:
+            yield from held
+            raise
+        yield from held
 
     def others(self) -> Iterator[Any]:
         """Yield its attachments and metadata, as records of mcap."""
@@ -276,13 +279,12 @@ class DatabaseFile:
     def expected(self, _wanted: Collection[Channel] | None) -> None:
         """Return None: only the metadata of the folder say how many messages there are."""
 
-    def blocks(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
         """Yield the messages on some channels, or on all."""
         numbers = ",".join(str(number) for number, each in self.channels.items() if wanted is None or each in wanted)
         some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY timestamp, id"  # noqa: S608 - numbers
-        found = self.database.execute(some)
-        while rows := found.fetchmany(BLOCK):
-            yield [Message(self.channels[number], log_ns, data, log_ns) for number, log_ns, data in rows]
+        for number, log_ns, data in self.database.execute(some):
+            yield Message(self.channels[number], log_ns, data, log_ns)
 
 
 class Bag1File:
@@ -314,14 +316,12 @@ class Bag1File:
         counts = (chunk.connection_counts for chunk in self.reader.chunk_infos)
         return sum(count for each in counts for number, count in each.items() if number not in others)
 
-    def blocks(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
         """Yield the messages on some channels, or on all."""
         channels = self.channels
-        found = self.reader.messages([
-            each for number, each in self._connections.items() if wanted is None or channels[number] in wanted
-        ])  # fmt: skip
-        while block := [Message(channels[each.id], log_ns, data, log_ns) for each, log_ns, data in islice(found, BLOCK)]:
-            yield block
+        some = [each for number, each in self._connections.items() if wanted is None or channels[number] in wanted]
+        for each, log_ns, data in self.reader.messages(some):
+            yield Message(channels[each.id], log_ns, data, log_ns)
 
 
 class RecordingReader:
@@ -368,9 +368,8 @@ class RecordingReader:
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
             count = 0
-            for block in file.blocks(wanted):
-                count += len(block)
-                yield from map(_unpacked, block) if self._is_packed else block
+            for count, message in enumerate(file.messages(wanted), 1):  # noqa: B007 - the last counts
+                yield _unpacked(message) if self._is_packed else message
             self._check(count, file.expected(wanted), wanted)
             total += count
         self._check(total, self._expected(wanted), wanted)
@@ -409,9 +408,13 @@ def _unpacked(message: Message) -> Message:
 def read_metadata(text: str, name: str) -> dict[str, Any]:
     """Read metadata, of a folder or as they stand in an MCAP file; every value in them is text.
 
-    Raises FormatError for what is no YAML.
+    Raises ValueError for what is no YAML.
     """
-    found = next((each.value for each in parse_documents(text, name) if type(each.value) is dict), {})
+    try:
+        documents = parse_documents(text, name)
+    except FormatError as error:
+        raise ValueError(str(error)) from None
+    found = next((each.value for each in documents if type(each.value) is dict), {})
     return dict(found.get(INFORMATION, found))
 
 

@@ -36,8 +36,8 @@ class MessageTypes:
             self._learn(channel.type)
         try:
             return (self.store.deserialize_ros1 if self.ros1 else self.store.deserialize_cdr)(data, channel.type)
-        except Exception as error:  # noqa: BLE001 - of broken bytes the library raises anything
-            raise ValueInvalid(f"it cannot be read ({type(error).__name__})") from None
+        except Exception:  # noqa: BLE001 - of broken bytes the library raises anything
+            raise ValueInvalid(f"its bytes are no {channel.type}") from None
 
     def write(self, channel: Channel, message: Any) -> bytes:
         """Return the bytes of a message that was read."""
@@ -59,9 +59,16 @@ class MessageTypes:
             for part in text.split(BETWEEN_IDL)[1:] or [f"\n{text}"]:
                 found |= get_types_from_idl(part.partition("\n")[2])
         known = self.store
-        found = found or typestore(ros1=self.ros1).fielddefs
-        known.register({name: each for name, each in found.items() if name not in known.types})
+        self._register(found)
+        try:
+            known.generate_msgdef(kind)
+        except Exception:  # noqa: BLE001 - of a type that is not there, or has parts that are not
+            self._register(typestore(ros1=self.ros1).fielddefs)
         for digest in digests:
             made = known.generate_msgdef(kind)[1] if self.ros1 else known.hash_rihs01(kind)
             if made != digest:
                 raise ValueError(f"hash of {kind} is {made}, not {digest}")
+
+    def _register(self, types: dict[str, Any]) -> None:
+        """Take types that are not known yet."""
+        self.store.register({name: each for name, each in types.items() if name not in self.store.types})

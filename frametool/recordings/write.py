@@ -97,7 +97,8 @@ class RecordingFile:
 
     def _connection(self, channel: Channel) -> Any:
         said = channel.said
-        latching, (_, _, definition) = int(said["latching"]) if said.get("latching") else None, channel.schema or 3 * (b"",)
+        latching = int(said["latching"]) if said.get("latching") else None
+        _, _, definition = channel.schema or ("", "", b"")
         return self._writer.add_connection(
             channel.topic, channel.type, msgdef=definition.decode(), md5sum=channel.digest or "*",
             callerid=said.get("callerid"), latching=latching,
