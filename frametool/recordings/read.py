@@ -12,10 +12,8 @@ from dataclasses import dataclass, field
 from io import BufferedReader, BytesIO, FileIO
 from operator import itemgetter
 from pathlib import Path, PurePath
-from struct import Struct
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
-from zlib import crc32
 
 from frametool.documents.document import parse_documents
 from frametool.errors import FileProblem, FormatError, FrametoolError, shown
@@ -32,11 +30,10 @@ METADATA, INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
 ITSELF, SERIALIZED = "rosbag2", "serialized_metadata"  # the metadata that rosbag2 puts into an MCAP file, of itself
 QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # what rosbag2 says of a channel of MCAP
 MOST = 1 << 28  # bytes of a chunk: one that promises more is not unpacked
-BLOCK = 1 << 10  # messages
 LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
 NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
-_SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5  # kinds of records
-_RECORD, _HEAD = Struct("<BQ"), Struct("<HIQQ")  # of any record; of a message: channel, sequence, log and publish time
+RECORD_HEAD = 9  # bytes
+BLOCK = 1 << 10  # messages
 
 
 @dataclass(eq=False, slots=True)
@@ -162,52 +159,27 @@ class McapFile:
         numbers = {number for number, each in self.channels.items() if wanted is None or each in wanted}
         for each in sorted(self._chunks, key=lambda each: each.message_start_time):
             if not numbers.isdisjoint(each.message_index_offsets) or not each.message_index_offsets:
-                self.stream.seek(each.chunk_start_offset + _RECORD.size)
+                self.stream.seek(each.chunk_start_offset + RECORD_HEAD)
                 yield Chunk.read(ReadDataStream(self.stream))
 
     def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
-        """Yield the messages of each chunk, and those outside of chunks."""
-        from mcap.records import Channel as ChannelRecord
-        from mcap.records import Chunk, Schema
-        from mcap.records import Message as MessageRecord
-
-        loose: list[Message] = []
-        for each in self._records(wanted):
-            if isinstance(each, MessageRecord):
-                channel = self.channels[each.channel_id]
-                if wanted is None or channel in wanted:
-                    loose.append(Message(channel, each.log_time, each.data, each.publish_time, each.sequence))
-            elif isinstance(each, Schema | ChannelRecord):
-                self._register(each)
-            elif isinstance(each, Chunk) and (found := self._unpacked(_plain(each), wanted)):
-                yield found
-            if len(loose) >= BLOCK:
-                yield loose
-                loose = []
-        if loose:
-            yield loose
-
-    def _unpacked(self, raw: bytes, wanted: Collection[Channel] | None) -> list[Message]:
-        """Return the messages of a chunk; raises ValueError for one that is broken."""
+        """Yield the messages of each chunk, and those outside of chunks, many together."""
         from mcap import records
-        from mcap.data_stream import ReadDataStream
 
         found: list[Message] = []
-        at, channels = 0, self.channels
-        while at < len(raw):
-            kind, size = _RECORD.unpack_from(raw, at)
-            begin, at = at + _RECORD.size, at + _RECORD.size + size
-            if at > len(raw) or (kind == _MESSAGE and size < _HEAD.size):
-                raise ValueError("a record ends behind its chunk")
-            if kind == _MESSAGE:
-                number, sequence, log_ns, publish_ns = _HEAD.unpack_from(raw, begin)
-                channel = channels[number]
-                if wanted is None or channel in wanted:
-                    found.append(Message(channel, log_ns, raw[begin + _HEAD.size : at], publish_ns, sequence))
-            elif kind in (_SCHEMA, _CHANNEL):
-                read = (records.Schema if kind == _SCHEMA else records.Channel).read
-                self._register(read(ReadDataStream(BytesIO(raw[begin:at]))))
-        return found
+        for each in self._records(wanted):
+            for one in _records_of(each) if isinstance(each, records.Chunk) else (each,):
+                if isinstance(one, records.Message):
+                    channel = self.channels[one.channel_id]
+                    if wanted is None or channel in wanted:
+                        found.append(Message(channel, one.log_time, one.data, one.publish_time, one.sequence))
+                elif isinstance(one, records.Schema | records.Channel):
+                    self._register(one)
+            if found and (isinstance(each, records.Chunk) or len(found) > BLOCK):
+                yield found
+                found = []
+        if found:
+            yield found
 
     def _register(self, *records: Any) -> None:
         """Register schemas and channels that are not known yet."""
@@ -224,25 +196,15 @@ class McapFile:
                 self.channels[each.id] = made
 
 
-def _plain(chunk: Any) -> bytes:
-    """Unpack a chunk, as far as it says that it goes; raises ValueError for one that is other than it says."""
+def _records_of(chunk: Any) -> list[Any]:
+    """Return what is in a chunk; raises ValueError for one that is too large, before it is unpacked."""
     import zstandard
-    from lz4 import frame  # type: ignore[import-untyped]
+    from mcap.stream_reader import breakup_chunk
 
-    size, compression = chunk.uncompressed_size, chunk.compression
-    if size > MOST:
-        raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
-    if compression and compression not in ("zstd", "lz4"):
-        raise ValueError(f"compression {compression!r} is not known")
-    if compression:
-        raw = (zstandard if compression == "zstd" else frame).open(BytesIO(chunk.data)).read(size + 1)
-    else:
-        raw = chunk.data
-    if len(raw) != size:
-        raise ValueError(f"a chunk of another size than the {size} bytes that it says")
-    if chunk.uncompressed_crc and crc32(raw) != chunk.uncompressed_crc:
-        raise ValueError("a chunk's checksum is wrong")
-    return bytes(raw)
+    packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
+    if max(chunk.uncompressed_size, packed) > MOST:
+        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes; {MOST} are read")
+    return breakup_chunk(chunk, validate_crc=True)
 
 
 class DatabaseFile:

@@ -6,14 +6,11 @@ Points, poses, fixes, twists, wrenches and the like; transforms make a tree and 
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import fields, is_dataclass
-from functools import lru_cache
 from io import BufferedReader, RawIOBase
+from json import JSONEncoder
 from math import isfinite
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.json import dump
 from frametool.errors import FormatError, Unanswered, first_of, listing
 from frametool.recordings.read import opened_recording
 from frametool.recordings.transforms import TYPES
@@ -23,12 +20,12 @@ from frametool.ros.pose_lists import POSE_ARRAY, posed_messages
 CLOUD = "sensor_msgs/msg/PointCloud2"
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from frametool.grammar.edges import Tally
-    from frametool.recordings.read import Channel, Message, RecordingReader
+    from frametool.recordings.read import Channel, RecordingReader
 
-PIECE = 1 << 16  # bytes
+MANY = 400  # lines
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -62,7 +59,7 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
         reader = opened.enter_context(opened_recording(path, tally))
         reader.refuse_foreign(chosen)
         if channels := record_channels(reader, chosen):
-            return BufferedReader(_Lines(_pieces(_lines(reader, channels)), opened.pop_all()))
+            return BufferedReader(_Lines(_pieces(reader, channels), opened.pop_all()))
         wanted = {topic.strip("/") for topic in chosen}
         clouds = [each.topic.strip("/") for each in reader.channels if each.type == CLOUD]
         if any(not wanted or topic in wanted for topic in clouds):
@@ -75,92 +72,52 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
     raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
 
 
-def _lines(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield each message, or each pose of a list, as a line."""
-    number = 0
-    messages = reader.messages(channels)
-    while (found := _next(reader, messages, number + 1)) is not None:
-        number += 1
-        for message in posed_messages(*found):
-            yield _text(message) + "\n"
-
-
-def _pieces(lines: Iterator[str]) -> Iterator[bytes]:
-    """Join lines to pieces, which are read faster than one line each; an error comes behind the lines before it."""
+def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
+    """Yield each message, or each pose of a list, as a line, many together; an error comes behind the lines before."""
     held: list[str] = []
-    size = 0
+    number = 1
     try:
-        for line in lines:
-            held.append(line)
-            size += len(line)
-            if size >= PIECE:
+        for channel, _, data, *_ in reader.messages(channels):
+            held += map(_line, posed_messages(reader.types.read(channel, data), channel.type))
+            number += 1
+            if len(held) >= MANY:
                 yield "".join(held).encode()
-                held, size = [], 0
-    except FormatError:
+                held.clear()
+    except Exception as error:
         yield "".join(held).encode()
-        raise
+        if isinstance(error, FormatError):
+            raise
+        what = f"message {number}: cannot be read ({type(error).__name__})"
+        raise FormatError(what, source=reader.path) from None
     yield "".join(held).encode()
 
 
-def _next(reader: RecordingReader, messages: Iterator[Message], number: int) -> tuple[Any, str] | None:
-    """Return the next message and its type; None behind the last."""
+def _line(message: Any) -> str:
+    """Return a message as a line of JSON; a number that JSON has not by its name."""
     try:
-        if (found := next(messages, None)) is None:
-            return None
-        return reader.types.read(found.channel, found.data), found.channel.type
-    except FormatError:
-        raise
-    except Exception as error:  # noqa: BLE001 - a broken bag makes the libraries raise anything
-        raise FormatError(f"message {number}: cannot be read ({type(error).__name__})", source=reader.path) from None
+        return f"{_encode(message)}\n"
+    except ValueError:
+        return f"{_encode(_named(message))}\n"
 
 
-def _text(value: Any) -> str:
-    """Return a message, or a part of one, as JSON."""
-    kind = type(value)
-    write = _WRITERS.get(kind) or _WRITERS.setdefault(kind, _writer(value))
-    return write(value)
+def _named(value: Any) -> Any:
+    """Return a message, or a part of one, with the names of numbers that are not finite."""
+    if isinstance(value, float):
+        return value if isfinite(value) else str(value)
+    if isinstance(value, str | int):
+        return value
+    inner = _plain(value) if not isinstance(value, list) else value
+    return [*map(_named, inner)] if isinstance(inner, list) else {name: _named(each) for name, each in inner.items()}
 
 
-def _writer(value: Any) -> Callable[[Any], str]:
-    """Return what writes values of the type of one: messages as one template of all that is in them, for speed."""
-    if is_dataclass(value):
-        template, names = _template(value)
-        if len(names) == 1:
-            return lambda value: template.format(_text(attrgetter(names[0])(value)))
-        members, write = attrgetter(*names), template.format
-        return lambda value: write(*map(_text, members(value)))
+def _plain(value: Any) -> Any:
+    """Return the fields of a message, or the numbers of an array."""
     if hasattr(value, "tolist"):
-        return lambda value: _text(value.tolist())
-    return dump
+        return value.tolist()
+    return {name: each for name, each in vars(value).items() if name[0].islower()}  # others are constants
 
 
-def _template(value: Any) -> tuple[str, list[str]]:
-    """Return how a message is written, and where what is put into that stands: below it, where types are fixed."""
-    parts, names = [], []
-    for name in (each.name for each in fields(value) if _is_data(each.name)):
-        inner = getattr(value, name)
-        below, more = _template(inner) if is_dataclass(inner) and hasattr(value, "__msgtype__") else ("{}", [])
-        parts.append(f'"{name}": {below}')
-        names += [f"{name}.{each}" for each in more] if below != "{}" else [name]
-    return "{{" + ", ".join(parts) + "}}", names
-
-
-def _float(value: float) -> str:
-    """Return a number, or its name where JSON has none for it."""
-    return repr(value) if isfinite(value) else f'"{value}"'
-
-
-_WRITERS: dict[type, Callable[[Any], str]] = {
-    float: _float,
-    int: repr,
-    str: lru_cache(1024)(dump),
-    list: lambda values: "[" + ", ".join(map(_text, values)) + "]",
-}
-
-
-def _is_data(name: str) -> bool:
-    """Tell a field from the library's own marks and from the constants of a message's type."""
-    return not name.isupper() and not name.startswith("__")
+_encode = JSONEncoder(default=_plain, allow_nan=False, ensure_ascii=False).encode
 
 
 class _Lines(RawIOBase):

@@ -173,7 +173,7 @@ class RecordingFile:
                 with suppress(Exception):  # what cannot be read stays as it is
                     qos = dump_qos_v9(parse_qos(qos or []))
             about = {"name": each.topic, "type": each.type, "serialization_format": each.encoding, QOS: qos}
-            about["type_description_hash"] = each.digest or type_hash(each)
+            about["type_description_hash"] = each.digest
             row = topics.setdefault((*map(str, about.values()),), {"topic_metadata": about, "message_count": 0})
             row["message_count"] += count
         count = sum(self.counts.values())
@@ -235,16 +235,3 @@ def latched(*, by_numbers: bool) -> str:
     made = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
                QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
     return str(dump_qos_v8([made])) if by_numbers else dump(dump_qos_v9([made]))
-
-
-def type_hash(channel: Channel) -> str:
-    """Return the hash by which ROS 2 knows a type; "" for a definition that cannot be read."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    name, encoding, definition = channel.schema or ("", "", b"")
-    store = get_typestore(Stores.EMPTY)
-    try:
-        store.register(get_types_from_msg(definition.decode(), name) if encoding == "ros2msg" else {})
-        return str(store.hash_rihs01(name))
-    except Exception:  # noqa: BLE001 - of a definition that is broken the library raises anything
-        return ""
