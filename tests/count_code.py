@@ -20,12 +20,12 @@ LATER = (
     "cli/commands/solve.py", "cli/solving.py", "stream/measurements.py", "stream/samples.py", "view/solution_text.py",
     "formats/trees/named.py", "formats/trees/kalibr.py", "formats/rows/bin_cloud.py", "cli/commands/examples.py",
     "geometry/place.py", "grammar/place.py", "stream/earth_columns.py", "stream/earth_records.py", "cli/earth.py",
-    "ros/bag_records.py", "cli/comparing.py", "cli/commands/compare.py", "cli/commands/align.py",
-    "cli/commands/resample.py", "ros/recordings.py", "stream/recording_writer.py", "stream/block_writer.py",
-    "cli/recording.py", "cli/folder_sink.py", "cli/commands/record.py", "stream/record_run.py", "ros/bag1_chunks.py",
-    "ros/bag2_folder.py", "ros/bag_reader.py", "ros/bag_storages.py", "ros/message_chunks.py", "ros/latched.py", "ros/mcap_chunks.py",
-    "ros/message_bytes.py", "ros/moved_messages.py", "ros/record_changes.py", "ros/record_copy.py",
-    "ros/recorded_edges.py",
+    "cli/comparing.py", "cli/commands/compare.py", "cli/commands/align.py",
+    "cli/commands/resample.py", "stream/recording_writer.py", "stream/block_writer.py",
+    "cli/recording.py", "cli/folder_sink.py", "cli/commands/record.py", "stream/record_run.py",
+
+
+
 )  # fmt: skip
 PACKAGE = Path(__file__).resolve().parent.parent / "frametool"
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -1,4 +1,4 @@
-"""Messages that are made: transforms, poses, points and fixes as rosbags serialises them, and a tree as a recording.
+"""Messages that are made: transforms, poses, points and fixes, as rosbags serialises them.
 
 A message is serialised by the library once for the frames it names; stamps and numbers are then put in their places,
 for one and for a million alike.
@@ -8,24 +8,16 @@ from __future__ import annotations
 
 import struct
 from functools import lru_cache
-from heapq import merge
-from itertools import chain, groupby
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import floats, quaternion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
-    from frametool.frames.lookups import Frames
-    from frametool.frames.track import Track
-    from frametool.geometry.types import Components
-    from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
 BAG1 = "bag1"
@@ -74,47 +66,6 @@ def check_stamps(stamps_ns: Ints, form: str) -> None:
     if len(bad):
         stamp = format_stamp(int(bad[0]))
         raise ValueInvalid(f"stamp {stamp} has no place in {form}, whose seconds are {first} .. {last}")
-
-
-def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
-    """Yield the bytes of a recording of a tree: what stands in one message, what moves in one for each stamp."""
-    from frametool.recordings.write import RecordingFile
-
-    form, asked = style.form, style.recording
-    topics = {"tf_static": any(track.standing for track in tree.tracks()), "tf": tree.moves}
-    if asked.topic and all(topics.values()):
-        raise ValueInvalid(f"the tree stands and moves, on two topics; {asked.topic} names one")
-    if not any(topics.values()):
-        raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
-    file = RecordingFile(form, asked.folder)
-    moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.standing), key=itemgetter(0))
-    messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))
-    first = next(messages, None)
-    if topics["tf_static"]:
-        still = [row for track in tree.tracks() if track.standing for row in _samples(track, style)]
-        data = serialised(KINDS["tf_static"], form, *_columns(still))
-        file.write(file.channel(KINDS["tf_static"], asked.topic), 0 if first is None else first[0], data)
-    if first is not None:
-        channel = file.channel(KINDS["tf"], asked.topic)
-        for stamp, rows in chain([first], messages):
-            check_stamps(np.array([stamp]), form)
-            file.write(channel, stamp, serialised(KINDS["tf"], form, *_columns(rows)))
-    yield from file.pieces()
-
-
-Sample: TypeAlias = "tuple[int, tuple[str, str], Components]"
-
-
-def _samples(track: Track, style: Style) -> Iterator[Sample]:
-    """Yield the samples of a frame as stamp, (parent, child) and pose; what stands has the stamp 0."""
-    for stamp_ns, parent, (tx, ty, tz, x, y, z, w) in track.walk():
-        turn = (x, y, z, w) if style.keep_sign else quaternion.from_quaternion(x, y, z, w, floats)
-        yield stamp_ns or 0, (parent, track.child), tuple(part + 0.0 for part in (tx, ty, tz, *turn))
-
-
-def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
-    """Return frames, stamps and poses of samples."""
-    return zip(*((frames, stamp, pose) for stamp, frames, pose in samples), strict=True)
 
 
 class MessageTemplate:

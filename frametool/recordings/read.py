@@ -44,7 +44,7 @@ class Channel:
     encoding: of its messages: `cdr`, `ros1`, or what else there is
     schema: name, encoding and text of the definition of its type, as in MCAP; None where there is none
     said: what else is said of it: quality of service in ROS 2, callerid and latching in ROS 1
-    digest: the hash of the type; count: how many messages there are said to be
+    digest: the hash of the type
     """
 
     topic: str
@@ -53,7 +53,6 @@ class Channel:
     schema: tuple[str, str, bytes] | None = None
     said: dict[str, str] = field(default_factory=dict)
     digest: str = ""
-    count: int | None = None
 
     @property
     def key(self) -> tuple[Any, ...]:
@@ -112,14 +111,13 @@ class McapFile:
         else:
             for _ in self._found(None):
                 pass
-        for number, channel in self.channels.items():
-            channel.count = said.channel_message_counts.get(number, 0) if said else None
 
     def expected(self, wanted: Collection[Channel] | None) -> int | None:
         """Return how many messages there are said to be on some channels, or on all; None where nothing is said."""
         if wanted is None or self.said is None:
             return self.said.message_count if self.said else None
-        return sum(each.count or 0 for each in self.channels.values() if each in wanted)
+        counts = self.said.channel_message_counts
+        return sum(counts.get(number, 0) for number, each in self.channels.items() if each in wanted)
 
     def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
         """Yield the messages on some channels, or on all; chunks whose times overlap are merged."""
@@ -201,9 +199,11 @@ def _records_of(chunk: Any) -> list[Any]:
     import zstandard
     from mcap.stream_reader import breakup_chunk
 
-    packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else 0
-    if max(chunk.uncompressed_size, packed) > MOST:
-        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes; {MOST} are read")
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd" and size <= MOST:
+        size = max(size, zstandard.frame_content_size(chunk.data))
+    if size > MOST:
+        raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
     return breakup_chunk(chunk, validate_crc=True)
 
 

@@ -6,6 +6,7 @@ Points, poses, fixes, twists, wrenches and the like; transforms make a tree and 
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import cache
 from io import BufferedReader, RawIOBase
 from json import JSONEncoder
 from math import isfinite
@@ -112,12 +113,22 @@ def _named(value: Any) -> Any:
 
 def _plain(value: Any) -> Any:
     """Return the fields of a message, or the numbers of an array."""
-    if hasattr(value, "tolist"):
+    inner = getattr(value, "__dict__", None)
+    if inner is None:
         return value.tolist()
-    return {name: each for name, each in vars(value).items() if name[0].islower()}  # others are constants
+    kind: Any = type(value)
+    for name in _marks(kind):
+        inner.pop(name, None)
+    return inner
 
 
-_encode = JSONEncoder(default=_plain, allow_nan=False, ensure_ascii=False).encode
+@cache
+def _marks(kind: Any) -> list[str]:
+    """Return the fields of a type that are no data: the library's own, and constants."""
+    return [name for name in kind.__dataclass_fields__ if not name[0].islower()]
+
+
+_encode = JSONEncoder(default=_plain, allow_nan=False, ensure_ascii=False, check_circular=False).encode
 
 
 class _Lines(RawIOBase):

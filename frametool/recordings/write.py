@@ -7,20 +7,30 @@ from __future__ import annotations
 
 import re
 from contextlib import contextmanager, suppress
+from heapq import merge
+from itertools import chain, groupby
+from operator import itemgetter
 from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
-from typing import IO, TYPE_CHECKING, Any, Self
+from typing import IO, TYPE_CHECKING, Any, Self, TypeAlias
 from weakref import finalize
 
+import numpy as np
+
 from frametool.documents.yaml_writer import dump
-from frametool.errors import FileProblem, FrametoolError, printable
-from frametool.recordings.made import typestore
+from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable
+from frametool.geometry import floats, quaternion
+from frametool.recordings.made import KINDS, check_stamps, serialised, typestore
 from frametool.recordings.read import BAG1, BAG2, CDR, INFORMATION, ITSELF, METADATA, QOS, SERIALIZED, Channel, Message
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import Track
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
     from frametool.recordings.made import Kind
 
 NAME = "recording"  # of the file in a bag2 folder, whatever that is called: two runs write the same bytes
@@ -186,6 +196,45 @@ class RecordingFile:
             "relative_file_paths": [file], "files": [{"path": file, **times, "message_count": count}],
             "custom_data": before.get("custom_data"), "ros_distro": before.get("ros_distro") or "",
         }  # fmt: skip
+
+
+def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
+    """Yield the bytes of a recording of a tree: what stands in one message, what moves in one for each stamp."""
+    form, asked = style.form, style.recording
+    topics = {"tf_static": any(track.standing for track in tree.tracks()), "tf": tree.moves}
+    if asked.topic and all(topics.values()):
+        raise ValueInvalid(f"the tree stands and moves, on two topics; {asked.topic} names one")
+    if not any(topics.values()):
+        raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
+    file = RecordingFile(form, asked.folder)
+    moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.standing), key=itemgetter(0))
+    messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))
+    first = next(messages, None)
+    if topics["tf_static"]:
+        still = [row for track in tree.tracks() if track.standing for row in _samples(track, style)]
+        data = serialised(KINDS["tf_static"], form, *_columns(still))
+        file.write(file.channel(KINDS["tf_static"], asked.topic), 0 if first is None else first[0], data)
+    if first is not None:
+        channel = file.channel(KINDS["tf"], asked.topic)
+        for stamp, rows in chain([first], messages):
+            check_stamps(np.array([stamp]), form)
+            file.write(channel, stamp, serialised(KINDS["tf"], form, *_columns(rows)))
+    yield from file.pieces()
+
+
+Sample: TypeAlias = "tuple[int, tuple[str, str], Components]"
+
+
+def _samples(track: Track, style: Style) -> Iterator[Sample]:
+    """Yield the samples of a frame as stamp, (parent, child) and pose; what stands has the stamp 0."""
+    for stamp_ns, parent, (tx, ty, tz, x, y, z, w) in track.walk():
+        turn = (x, y, z, w) if style.keep_sign else quaternion.from_quaternion(x, y, z, w, floats)
+        yield stamp_ns or 0, (parent, track.child), tuple(part + 0.0 for part in (tx, ty, tz, *turn))
+
+
+def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
+    """Return frames, stamps and poses of samples."""
+    return zip(*((frames, stamp, pose) for stamp, frames, pose in samples), strict=True)
 
 
 def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:

@@ -111,11 +111,12 @@ def test_the_package_stays_as_small_as_it_can_be_read() -> None:
     # 35 110 before places on the Earth were read and written wherever positions are (500), words, times, axes and forms
     # that people bring (1 400), options of recordings and what Windows asks for (150), records in another form in bulk (170),
     # what recordings hold besides, and CSV that waits in a file (60)
-    assert lines.total() - lines["later"] <= 37_480
-    assert files.total() - files["later"] <= 250
+    # recordings, read, written and copied by mcap and rosbags: 1 170, which stood among what came later
+    assert lines.total() - lines["later"] <= 38_500
+    assert files.total() - files["later"] <= 252
     # trajectories compared: 1 800; measurements solved: 2 600, covariances: 800, the Earth: 1 500, files by hand: 400;
-    # recordings written: 450, and copied to the byte: 1 750; lists of poses, and files beside whose messages are foreign ones: 100
-    assert lines["later"] <= 9_510
+    # what options say of recordings, and what is reported of a copy: 590; lists of poses: 50
+    assert lines["later"] <= 7_750
 
 
 def loaded_by(*arguments: str, stdin: str = "") -> set[str]:

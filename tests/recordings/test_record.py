@@ -382,7 +382,33 @@ def test_files_of_a_folder_are_joined_whatever_numbers_they_use(run: Run, tmp_pa
     assert [each[0] for each in after.channels.values()] == ["/a", "/b", "/c"]
 
 
+@pytest.mark.parametrize("chosen", [(), ("--between", "1700000000,1700000001")])
+def test_files_of_a_folder_are_counted_each_by_itself(chosen: tuple[str, ...], run: Run, tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    for number, count in enumerate((3, 1)):
+        sent = [Sent("/tf", *Maker("mcap").transforms(("map", "base", LIDAR, START + at)), START + at) for at in range(count)]
+        write(tmp_path / f"part{number}", "mcap", sent).rename(tmp_path / f"run/run_{number}.mcap")
+    (tmp_path / "run/metadata.yaml").write_text(
+        "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n"
+        "  relative_file_paths: [run_0.mcap, run_1.mcap]\n"
+    )
+    assert run("lookup", "run", "map", "base").status == 0
+    done = run("record", "run", *chosen, "-o", "new.mcap")
+    assert done.status == 0, done.err
+    assert len(read(tmp_path / "new.mcap")) == 4
+
+
 # --- what is not whole ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
+def test_a_chunk_that_promises_more_than_a_file_holds_is_not_unpacked(compression: str, run: Run, tmp_path: Path) -> None:
+    size = 600 << 20
+    head = struct.pack("<QQQI", 0, 0, size, 0) + by_hand.text(compression) + struct.pack("<Q", 9)
+    (tmp_path / "run.mcap").write_bytes(by_hand.whole(by_hand.header(), by_hand.record(6, head + b"no chunk.")))
+    done = run("record", "run.mcap", "-o", "new.mcap")
+    assert (done.status, done.err.count("frametool: run.mcap: ")) == (1, 1)
+    assert f"a chunk of {size} bytes; {1 << 28} are read" in done.err
 
 
 def check_spoilt(form: str, folder: Path, run: Run, count: int) -> None:
