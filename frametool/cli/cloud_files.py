@@ -46,7 +46,7 @@ class BagOfClouds:
     def __init__(self, path: str, output: Output, stream: Stream) -> None:
         """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
         from frametool.grammar.edges import Tally
-        from frametool.ros.bags import opened_bag
+        from frametool.recordings.read import opened_recording
         from frametool.ros.point_clouds import cloud_topics
 
         self.path = path
@@ -65,7 +65,7 @@ class BagOfClouds:
         self.tally = Tally()
         chosen = settings().topics
         with ExitStack() as opened:
-            self.reader = opened.enter_context(opened_bag(path, self.tally))
+            self.reader = opened.enter_context(opened_recording(path, self.tally))
             self.topics = cloud_topics(self.reader, chosen, path)
             self.opened = opened.pop_all()
         clouds = {topic.strip("/") for topic in self.topics}

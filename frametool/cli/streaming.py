@@ -150,7 +150,7 @@ class Stream:
         if not is_bag(self.path):
             return None
         from frametool.grammar.edges import Tally
-        from frametool.ros.bag_records import open_records
+        from frametool.recordings.records import open_records
 
         topics = settings().topics
         self._opened = open_records(self.path, topics, Tally())

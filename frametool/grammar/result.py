@@ -28,7 +28,7 @@ INFINITE = float("inf")
 class Recorded(NamedTuple):
     """What of results a recording holds.
 
-    kinds: the messages, by their names in `ros.recordings`; () as results are
+    kinds: the messages, by their names in `recordings.made`; () as results are
     topic: of all of them; "" the usual ones
     frames: which frame poses are seen from and which is theirs, where they do not say it
     folder: where there is room for it while it is written

@@ -47,13 +47,13 @@ def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
     chosen: with or without a leading `/`
     Raises Unanswered where there are several to choose from, FormatError where there is none.
     """
-    there = sorted({each.topic for each in reader.connections if each.msgtype == CLOUD})
+    there = sorted({each.topic for each in reader.channels if each.type == CLOUD})
     wanted = {topic.strip("/") for topic in chosen}
     found = [topic for topic in there if topic.strip("/") in wanted]
     if found:
         return found
     if not there:
-        known = listing({each.topic for each in reader.connections}) or "none"
+        known = listing({each.topic for each in reader.channels}) or "none"
         raise FormatError(f"no clouds (PointCloud2) in the bag; its topics: {known}", source=path)
     if wanted:
         known = listing(there, near=next(iter(chosen)))
@@ -65,11 +65,10 @@ def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
 
 def read_clouds(reader: Any, topics: Sequence[str], path: str, tally: Tally) -> Iterator[PointCloud | FormatError]:
     """Yield the clouds of some topics in the order they were recorded; in the place of a broken one its error."""
-    connections = [each for each in reader.connections if each.topic in topics and each.msgtype == CLOUD]
-    for number, (connection, _, data) in enumerate(reader.messages(connections=connections), 1):
-        message = reader.deserialize(data, connection.msgtype)
+    channels = [each for each in reader.channels if each.topic in topics and each.type == CLOUD]
+    for number, (channel, _, data, *_) in enumerate(reader.messages(channels), 1):
         try:
-            yield _cloud(message, number, connection.topic, tally)
+            yield _cloud(reader.types.read(channel, data), number, channel.topic, tally)
         except ValueInvalid as error:
             yield FormatError(str(error), source=path, line=number)
 

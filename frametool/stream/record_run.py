@@ -20,14 +20,11 @@ from frametool.errors import (
 from frametool.formats.load import Recording, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
-from frametool.ros.bags import TYPES, recorded_edge
-from frametool.ros.latched import added_messages
-from frametool.ros.message_bytes import Transforms
-from frametool.ros.moved_messages import MOVED_TYPES, MessageMover
-from frametool.ros.record_changes import RecordChanges, RecordContents
-from frametool.ros.record_copy import copied
-from frametool.ros.recorded_edges import MOST_NAMED, STATIC, EdgePlan, RecordedEdges, replaced
-from frametool.ros.recordings import SECONDS_ROS2
+from frametool.recordings.copy import RecordCopy
+from frametool.recordings.edges import MOST_NAMED, STATIC, EdgePlan, RecordedEdges, replaced
+from frametool.recordings.made import SECONDS_ROS2
+from frametool.recordings.moved import MOVED_TYPES, MessageMover
+from frametool.recordings.transforms import TYPES, RawTransform, recorded_edges
 from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
 
 if TYPE_CHECKING:
@@ -35,10 +32,9 @@ if TYPE_CHECKING:
 
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
-    from frametool.ros.message_chunks import Channel
-    from frametool.ros.record_changes import Change
-    from frametool.ros.record_copy import Advance, CopiedRecording
-    from frametool.ros.recorded_edges import AddedEdge
+    from frametool.recordings.copy import Advance, Change
+    from frametool.recordings.edges import AddedEdge
+    from frametool.recordings.read import Channel, RecordingReader
 
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
 OTHER_TRANSFORMS = "FrameTransform"  # of Foxglove, and lists of them
@@ -68,12 +64,11 @@ class RecordRequest(NamedTuple):
 class RecordRun:
     """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done."""
 
-    def __init__(self, recording: CopiedRecording, request: RecordRequest) -> None:
+    def __init__(self, recording: RecordingReader, request: RecordRequest) -> None:
         """Begin with a recording that is not read yet."""
         self.recording, self.request = recording, request
-        self.changes = RecordChanges(request.window)
-        self.contents = RecordContents(recording, self.changes)
-        self.edges = RecordedEdges(recording.path, ros1=recording.is_ros1)
+        self.copy = RecordCopy(recording, request.window)
+        self.edges = RecordedEdges(recording.path)
         self.plan = EdgePlan([], [], [])
         self.added: dict[str, list[AddedEdge]] = {}  # by the topics they come on
         self.transform_topics = {topic for topic in request.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
@@ -88,13 +83,12 @@ class RecordRun:
         that do not fit, LookupFailed for a frame that is not there and a window without messages.
         """
         request = self.request
-        self.contents.read(advance, self._collect_edges if request.tree is not None else None)
-        channels = self.recording.channels
-        self._check_topics(channels)
-        if request.window and not self.contents.inside:
+        self.copy.look(advance, self._see)
+        self._check_topics()
+        if request.window and not self.copy.inside:
             raise NoDataAt(self._empty(request.window))
         if request.tree is not None or request.into:
-            self._refuse_others(channels)
+            self._refuse_others()
         if request.tree is not None:
             self.plan = self.edges.plan(request.tree, replace=request.replace)
             for edge in self.plan.added:
@@ -102,92 +96,99 @@ class RecordRun:
             for root in self.edges.apart(self.plan.added):
                 near = did_you_mean(root, self.edges.frames)
                 warn(f"{self.recording.path}: frame {shown(root)} is in none of its transforms{near}")
-        changes = self.changes.change
         if self.plan.replaced:
-            change = self._replacer()
-            changes |= {number: change for number, each in channels.items() if self._is_used(each)}
+            self.copy.change |= {each: self._replacing(each) for each in self._used()}
         if request.into:
-            ros1, normalize = self.recording.is_ros1, request.normalize
-            self.mover = mover = MessageMover(self._frames(), request.into, ros1=ros1, normalize=normalize)
-            named = {number: each for number, each in channels.items() if self._is_named(each)}
-            changes |= {number: self._moving(each, mover) for number, each in named.items()}
+            frames, types = self._frames(), self.recording.types
+            self.mover = mover = MessageMover(frames, request.into, types, normalize=request.normalize)
+            self.copy.change |= {each: self._moving(each, mover) for each in self._named()}
+
+    def _used(self) -> list[Channel]:
+        """Return the channels whose transforms are used."""
+        return [each for each in self.recording.channels if self._is_used(each)]
 
     def _is_used(self, channel: Channel) -> bool:
         """Tell whether the transforms of a channel are used: those of the topics that are named, or all."""
         return channel.type in TYPES and (not self.transform_topics or _is_among(channel.topic, self.transform_topics))
 
-    def _is_named(self, channel: Channel) -> bool:
-        """Tell whether the messages of a channel are to be moved."""
-        return _is_among(channel.topic, {*self.request.topics} - self.transform_topics)
+    def _named(self) -> list[Channel]:
+        """Return the channels whose messages are to be moved."""
+        named = {*self.request.topics} - self.transform_topics
+        return [each for each in self.recording.all if _is_among(each.topic, named)]
 
-    def _collect_edges(self, channel: Channel, data: bytes) -> None:
+    def _see(self, channel: Channel, data: bytes) -> None:
         """Collect the edges of a message of transforms."""
-        if not self._is_used(channel):
+        if self.request.tree is None or not self._is_used(channel):
             return
         with _on_topic(channel.topic, self.recording.path):
-            self.edges.add(channel.topic, data)
+            for each in self.recording.types.read(channel, data).transforms:
+                self.edges.add(channel.topic, RawTransform.of(each))
 
-    def _check_topics(self, channels: dict[int, Channel]) -> None:
+    def _check_topics(self) -> None:
         """Raise FormatError for a topic that is not there or cannot be moved, Misused where none is to be moved."""
-        path, into = self.recording.path, self.request.into
-        known = {channel.topic for channel in channels.values()}
+        path, into, channels = self.recording.path, self.request.into, self.recording.all
+        known = {channel.topic for channel in channels}
         for topic in self.request.topics:
             if not _is_among(topic, known):
                 raise FormatError(f"no topic {topic}{alternatives(topic, known, 'topics')}", source=path)
-        named = [channel for channel in channels.values() if self._is_named(channel)]
-        for topic, kind, _ in named:
-            if kind not in MOVED_TYPES:
-                raise FormatError(f"{topic} holds {kind or 'no type'}; --into moves {MOVES}", source=path)
+        named = self._named()
+        for each in named:
+            if each.type not in MOVED_TYPES:
+                raise FormatError(f"{each.topic} holds {each.type or 'no type'}; --into moves {MOVES}", source=path)
         if into and not named:
-            movable = sorted({each.topic for each in channels.values() if each.type in MOVED_TYPES})
+            movable = sorted({each.topic for each in channels if each.type in MOVED_TYPES})
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
             beside = f" beside {first_of(sorted(self.transform_topics), MOST_NAMED)}" if self.transform_topics else ""
             raise Misused(f"--into moves the messages of topics that are named{beside}; {remedy}", source=path)
 
-    def _refuse_others(self, channels: dict[int, Channel]) -> None:
-        """Raise FormatError for transforms that cannot be read here, as protobuf's."""
-        for topic, kind, encoding in channels.values():
-            if kind.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
-                raise FormatError(f"{topic} holds {kind}: no transforms of recordings", source=self.recording.path)
-            if encoding == "ros1" and not self.recording.is_ros1:
-                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.recording.path)
+    def _refuse_others(self) -> None:
+        """Raise FormatError for transforms that cannot be read here, as protobuf's, and for topics that are foreign."""
+        path = self.recording.path
+        for each in self.recording.foreign:
+            if each.type.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
+                raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=path)
+            if each.encoding == "ros1":
+                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=path)
+        self.recording.refuse_foreign(self.request.topics)
 
     def _empty(self, window: tuple[int, int]) -> str:
         """Say that no message lies in a window."""
-        span = self.contents.span
+        span = self.copy.span
         there = f"they are logged from {' to '.join(map(format_stamp, span))}" if span else "it has none at all"
         return f"{self.recording.path}: no messages from {' to '.join(map(format_stamp, window))}; {there}"
 
     def _frames(self) -> Frames:
         """Return all transforms as they are in the copy."""
         more = [*self.plan.added, *self.plan.replaced]
-        channels = self.recording.channels
-        if not more and not any(self.contents.counts[number] for number in channels if self._is_used(channels[number])):
+        used = [each for each in self._used() if self.copy.counts[each]]
+        if not more and not used:
             raise FormatError("no transforms in it; --with FILE brings some", source=self.recording.path)
-        source = TransformsOfCopy(self.recording, self.transform_topics, more)
+        source = TransformsOfCopy(self.recording, used, self.transform_topics, more)
         return load_sources([source], Rules(normalize=self.request.normalize))
 
-    def _replacer(self) -> Change:
+    def _replacing(self, channel: Channel) -> Change:
         """Return a function that puts the new values into messages of transforms."""
-        edges = {edge.child: edge for edge in self.plan.replaced}
+        edges, types = {edge.child: edge for edge in self.plan.replaced}, self.recording.types
         names = [child.encode() for child in edges]
 
-        def change(data: bytes, _log_ns: int) -> bytes:
+        def change(data: bytes) -> bytes:
             if not any(name in data for name in names):
                 return data
-            new = replaced(data, edges, self.edges.bare, ros1=self.recording.is_ros1)
-            self.rewritten += new is not data
-            return new
+            message = types.read(channel, data)
+            if not replaced(message, edges, self.edges.bare):
+                return data
+            self.rewritten += 1
+            return types.write(channel, message)
 
         return change
 
     def _moving(self, channel: Channel, mover: MessageMover) -> Change:
         """Return a function that moves the messages of a channel; one that cannot be moved is an error, or left out."""
 
-        def change(data: bytes, _log_ns: int) -> bytes | None:
+        def change(data: bytes) -> bytes | None:
             number = self.moved[channel.topic] = self.moved.get(channel.topic, 0) + 1
             try:
-                new = mover.moved(channel.type, data)
+                new = mover.moved(channel, data)
             except (LookupFailed, ValueInvalid) as error:
                 stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header.stamp_ns)}"
                 fate = " (message skipped)" if self.request.on_error == SKIP else ""
@@ -205,9 +206,8 @@ class RecordRun:
 
     def pieces(self, form: str, folder: str, advance: Advance) -> Iterator[bytes]:
         """Yield the bytes of the copy in a form; folder: where there is room for it while it is written."""
-        first_ns = self.contents.first_ns or 0
-        added = added_messages(self.recording, self.added, first_ns if first_ns < LAST_STAMP else 0)
-        yield from copied(self.recording, self.changes, added, first_ns, form, folder, advance)
+        first_ns = self.copy.first_ns or 0
+        yield from self.copy.pieces(form, folder, self.added, first_ns if first_ns < LAST_STAMP else 0, advance)
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""
@@ -221,13 +221,13 @@ class RecordRun:
             count, topics = sum(self.moved.values()) - self.skipped, first_of([*self.moved], MOST_NAMED)
             stayed = f", {self.unmoved} of them were in it" if self.unmoved else ""
             yield f"{_count(count)} in {self.request.into} ({topics}){stayed}"
-        if self.contents.outside:
-            yield f"kept outside of --between: {_count(self.contents.outside)} on {STATIC}"
+        if self.copy.outside:
+            yield f"kept outside of --between: {_count(self.copy.outside)} on {STATIC}"
         for is_usual, how in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
-            if kinds := sorted(kind for kind, usual in self.recording.undefined.items() if usual is is_usual):
+            if kinds := sorted(kind for kind, usual in self.copy.undefined.items() if usual is is_usual):
                 yield f"types that it does not define are {how}: {first_of(kinds, MOST_NAMED)}"
         if not (self.added or self.rewritten or self.moved or self.request.window):
-            yield f"nothing is changed: {_count(sum(self.contents.counts.values()))} copied"
+            yield f"nothing is changed: {_count(sum(self.copy.counts.values()))} copied"
 
     def remarks(self) -> Iterator[Remark]:
         """Yield what was odd in messages that were moved."""
@@ -248,10 +248,12 @@ class RecordRun:
 class TransformsOfCopy(Recording):
     """The transforms of a recording as its copy has them: some of its edges are replaced, and others are added."""
 
-    def __init__(self, recording: CopiedRecording, topics: set[str], more: Sequence[AddedEdge]) -> None:
-        """Take the recording, the topics that are read (all if none), and the edges that are added or replaced."""
+    def __init__(
+        self, recording: RecordingReader, channels: Sequence[Channel], topics: set[str], more: Sequence[AddedEdge]
+    ) -> None:
+        """Take the recording, the channels and topics that are read, and the edges that are added or replaced."""
         super().__init__(recording.path, topics=topics)
-        self.recording, self.more = recording, more
+        self.recording, self.channels, self.more = recording, channels, more
 
     def pieces(
         self, report: Report = stop, *, tell: bool = True, normalize: bool = False  # noqa: ARG002
@@ -260,12 +262,8 @@ class TransformsOfCopy(Recording):
         self.close()
         options = Options(self.tally, self.topics, report, normalize, self.answers)
         children = {edge.child for edge in self.more}
-        for number, (channel, log_ns, data) in enumerate(self.recording.messages(TYPES), 1):
-            with _on_topic(channel.topic, self.path):
-                for said in Transforms(data, ros1=self.recording.is_ros1):
-                    edge = recorded_edge(said, number, channel.topic, log_ns, self.path, options)
-                    if edge is not None and edge.child not in children:
-                        yield edge
+        found = recorded_edges(self.recording, self.channels, options) if self.channels else ()
+        yield from (edge for edge in found if edge.child not in children)
         yield from (Edge(edge.parent, edge.child, edge.numbers) for edge in self.more)
         self.tell()
 

@@ -10,7 +10,8 @@ from frametool.errors import ValueInvalid, first_of, listing, warn
 from frametool.formats.rows.pose_rows import MOST_NAMED
 from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.ros.recordings import KINDS, MessageTemplate, RecordingFile, check_stamps, serialised
+from frametool.recordings.made import KINDS, MessageTemplate, check_stamps, serialised
+from frametool.recordings.write import RecordingFile
 from frametool.stream.row_layout import AS_READ, POINT, POSE
 from frametool.stream.row_poses import plain_cells
 from frametool.stream.writers import refuse_scale_in

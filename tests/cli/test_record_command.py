@@ -101,7 +101,7 @@ def test_a_link_to_the_recording_is_not_written_over(link: Callable[[str, str], 
 def test_without_the_extra_one_line_says_what_to_install(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     done = run("record", str(folder / "run.bag"), "--with", TREE, "-o", "new.bag")
-    said = "recordings are written with an extra; install it: pip install 'frametool[bag]'"
+    said = "bags are read with an extra; install it: pip install 'frametool[bag]'"
     assert (done.status, done.err) == (5, f"frametool: {folder / 'run.bag'}: {said}\n")
 
 

@@ -92,7 +92,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
     functions = {"poses": "write_poses", "points": "write_points", "tree": "write_tree", "report": "write_points"}
     functions |= {"trajectory": "write_poses", "arrays": "create"}
     if "recording" in row.writes:  # poses and points are messages there
-        functions = dict.fromkeys(("poses", "points"), "MessageTemplate") | dict.fromkeys(("tree", "recording"), "tree_pieces")
+        functions = dict.fromkeys(("poses", "points"), "RecordingFile") | dict.fromkeys(("tree", "recording"), "tree_pieces")
     if "arrays" in row.writes:  # poses and points are columns there
         functions |= {"poses": "create", "points": "create"}
     for what in row.writes:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "fit", "explain",
-    "calc", "sim", "view", "cli",
+    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "recordings", "formats", "lint", "stream", "fit",
+    "explain", "calc", "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.parent != ROOT or path.stem in LAYERS)
@@ -106,16 +106,17 @@ def test_no_imports_inside_a_room_run_in_a_circle() -> None:
 
 
 MOST_LINES = {  # code lines of a room, and in brackets what is aimed at; no bound is raised, a feature pays with others
-    "stream": 9_333,  # 6 200
+    "stream": 9_330,  # 6 200
     "formats": 7_627,  # 6 900
-    "cli": 6_523,  # 5 200
-    "ros": 3_110,  # 1 900
-    "fit": 2_688,  # 2 200
-    "view": 2_149,  # 1 800
+    "cli": 6_526,  # 5 200
+    "ros": 1_224,  # with recordings 1 900
+    "recordings": 1_150,
+    "fit": 2_637,  # 2 200
+    "view": 2_153,  # 1 800
     "explain": 1_749,  # 1 000
 }
-MOST_IN_ALL = 45_450  # 36 000
-MOST_FILES = 315  # 190
+MOST_IN_ALL = 44_669  # 36 000
+MOST_FILES = 309  # 190
 MOST_OF_PAGES = 1_900
 
 

@@ -47,7 +47,8 @@ def chunk(raw: bytes, compression: str = "") -> bytes:
 
 
 def attachment(name: str, data: bytes) -> bytes:
-    return record(9, struct.pack("<QQ", 3, 4) + text(name) + text("text/plain") + struct.pack("<Q", len(data)) + data + bytes(4))
+    body = struct.pack("<QQ", 3, 4) + text(name) + text("text/plain") + struct.pack("<Q", len(data)) + data
+    return record(9, body + struct.pack("<I", zlib.crc32(body)))
 
 
 def metadata(name: str, **said: str) -> bytes:

@@ -82,7 +82,7 @@ def command(
 
     An MCAP file or ROS 2 bag becomes MCAP (-o NEW.mcap) or a folder (-f bag2 -o FOLDER), a ROS 1 bag one (-o NEW.bag).
     """
-    from frametool.ros.record_copy import opened_recording
+    from frametool.recordings.read import opened_recording
     from frametool.stream.record_run import RecordRequest, RecordRun
 
     _refuse_idle(more, into, topics)
@@ -100,9 +100,9 @@ def command(
         report=lambda error: say_error(error, in_json=False), normalize=normalize,
     )  # fmt: skip
     quiet = settings().quiet
-    with opened_place(copy, place, force=force) as write, opened_recording(path, form, tally) as opened:
+    with opened_place(copy, place, force=force) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, request)
-        with ProgressBar(2 * opened.size, quiet=quiet, counted="messages") as progress:
+        with ProgressBar(None, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
             for piece in run.pieces(copy, folder_of(place), progress.advance):
                 write(piece)

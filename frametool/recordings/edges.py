@@ -5,21 +5,20 @@ Of each edge only its first values are kept, and whether others follow: memory d
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import BadTopology, bare, first_of, shown
 from frametool.frames.path import to_root
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Names, Topics
-from frametool.ros.message_bytes import Transforms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
-    from frametool.ros.message_bytes import RawTransform
+    from frametool.recordings.transforms import RawTransform
 
 SAME = 1e-12  # metres, of positions a metre long, and radians: what composing and writing numbers leaves
 STATIC = "tf_static"
@@ -67,31 +66,16 @@ class EdgePlan(NamedTuple):
 class RecordedEdges:
     """The edges of a recording, by their children."""
 
-    def __init__(self, name: str, *, ros1: bool) -> None:
+    def __init__(self, name: str) -> None:
         """Begin without any; `name` is that of the recording in messages."""
-        self.name, self.ros1 = name, ros1
+        self.name = name
         self.known: dict[str, RecordedEdge] = {}
         self.names, self._topics = Names(), Topics()
         self._conflicts: dict[str, str] = {}  # of frames that come from two robots
-        # topic and size of messages -> what is alike in those that say nothing new, and between which bytes
-        self._alike: dict[tuple[str, int], list[tuple[int, int, bytes]]] = {}
         self._topic_of: dict[str, str] = {}  # frame -> the topic by which it came first
 
-    def add(self, topic: str, data: bytes) -> None:
-        """Add the transforms of a message; raises ValueInvalid if it cannot be read."""
-        known = self._alike.get((topic, len(data)), [(0, 0, b".")])
-        if all(data[begin:end] == text for begin, end, text in known):
-            return  # most messages say nothing new
-        message, found = Transforms(data, ros1=self.ros1), []
-        for transform in message:
-            begin, end = message.names
-            end = end if self._added(topic, transform).varies else message.fields.at
-            found.append((begin, end, data[begin:end]))
-        message.fields.whole()
-        self._alike[topic, len(data)] = found
-
-    def _added(self, topic: str, transform: RawTransform) -> RecordedEdge:
-        """Add a transform and return its edge."""
+    def add(self, topic: str, transform: RawTransform) -> None:
+        """Add a transform."""
         parent, child, numbers = self.bare(transform.parent), self.bare(transform.child), transform.numbers
         edge = self.known.get(child)
         if edge is None:
@@ -105,7 +89,6 @@ class RecordedEdges:
                 self._conflicts[child] = problem
         if not edge.varies and numbers != edge.numbers:
             edge.varies = not is_same(numbers, edge.numbers)
-        return edge
 
     def bare(self, name: str) -> str:
         """Return a frame's name without a leading slash."""
@@ -205,11 +188,17 @@ def _unit(tx: float, ty: float, tz: float, x: float, y: float, z: float, w: floa
     return tx, ty, tz, *quaternion.normalized(x, y, z, w, floats)
 
 
-def replaced(data: bytes, edges: dict[str, AddedEdge], bare_name: Callable[[str], str], *, ros1: bool) -> bytes:
-    """Return a message of transforms with other numbers in some edges; the same object where it has none of them."""
-    message, found = Transforms(data, ros1=ros1), False
-    for transform in message:
-        if edge := edges.get(bare_name(transform.child)):
-            message.fields.put(edge.numbers)
-            found = True
-    return message.fields.whole() if found else data
+def replaced(message: Any, edges: dict[str, AddedEdge], bare_name: Callable[[str], str]) -> bool:
+    """Put other numbers into some edges of a message of transforms; return True if it has any of them."""
+    found = [(each, edges.get(bare_name(each.child_frame_id))) for each in message.transforms]
+    for each, edge in found:
+        if edge is not None:
+            put(each.transform.translation, edge.numbers[:3])
+            put(each.transform.rotation, edge.numbers[3:])
+    return any(edge for _, edge in found)
+
+
+def put(part: Any, numbers: Sequence[float]) -> None:
+    """Put numbers into x, y, z and w of a part of a message."""
+    for name, number in zip("xyzw", numbers, strict=False):
+        setattr(part, name, number)

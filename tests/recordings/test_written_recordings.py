@@ -19,8 +19,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import ConnectionExtRosbag1, QosDurability, QosReliability
 
 from frametool.errors import ValueInvalid
-from frametool.ros import recordings
-from frametool.ros.recordings import KINDS, MessageTemplate, serialised
+from frametool.recordings import write as recordings
+from frametool.recordings.made import KINDS, MessageTemplate, serialised
 
 if TYPE_CHECKING:
     from collections.abc import Callable

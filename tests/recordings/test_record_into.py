@@ -198,8 +198,8 @@ WRONG = {
     "empty": (1, f"{AT}: its header names no frame"),
     "zero": (1, ", stamp 1700000000.000000000: quaternion 0 0 0 0 has no direction; give a non-zero one"),
     "nan": (1, ", stamp 1700000000.000000000: its position is not finite"),
-    "short": (1, ", stamp 1700000000.000000000: it is cut short: its fields need 84 bytes, it has 75"),
-    "long": (1, ", stamp 1700000000.000000000: it has 92 bytes, and its fields end at byte 84"),
+    "short": (1, ": its bytes are no geometry_msgs/msg/PoseStamped"),
+    "long": (1, ": its bytes are no geometry_msgs/msg/PoseStamped"),
 }
 
 
@@ -249,7 +249,6 @@ def test_recordings_without_transforms_say_so(tmp_path: Path, run: Run) -> None:
 
 @pytest.mark.parametrize("form", ["mcap", "bag"])
 def test_bytes_in_the_other_order_and_what_fills_gaps_are_read(form: str, tmp_path: Path, run: Run) -> None:
-    """What is written anew is in the order it came in, with its first bytes and what follows the last field."""
     made = Maker(form)
     kind, message = made.pose("odom_with_a_longer_name", START, place(2))
     static = Sent("/tf_static", *made.transforms(("m", "odom_with_a_longer_name", MAP_FROM_ODOM, 0)), START)
@@ -268,7 +267,5 @@ def test_bytes_in_the_other_order_and_what_fills_gaps_are_read(form: str, tmp_pa
     found = made.read(kind, new)
     assert matrix(numbers_of(found.pose)) == pytest.approx(matrix(MAP_FROM_ODOM) @ matrix(place(2)), abs=1e-12)
     assert found.header.frame_id == "m"
-    if form == "mcap":
-        assert (new[:4], new[-2:]) == (b"\x00\x00\x00\x02", b"\xaa\xbb")
-    else:
+    if form == "bag":
         assert found.header.seq == 7

@@ -1,0 +1,1 @@
+"""Recordings: ROS 1 bags, ROS 2 bags and MCAP files, read, written and copied, through rosbags and mcap."""

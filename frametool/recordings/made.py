@@ -1,0 +1,146 @@
+"""Messages that are made: transforms, poses, points and fixes, as rosbags serialises them.
+
+A message is serialised by the library once for the frames it names; stamps and numbers are then put in their places,
+for one and for a million alike.
+"""
+
+from __future__ import annotations
+
+import struct
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from frametool.errors import ValueInvalid, shown
+from frametool.frames.stamps import BILLION, format_stamp
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.text.spans import Floats, Ints
+
+BAG1 = "bag1"
+SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; those of ROS 2 are int32
+SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
+
+
+class Kind(NamedTuple):
+    """What one kind of message is: the usual topic, its type, how many numbers each of its stamps has.
+
+    stays: it is latched, so that who comes late gets it too
+    """
+
+    topic: str
+    type: str
+    numbers: int
+    stays: bool = False
+
+
+KINDS = {
+    "tf_static": Kind("/tf_static", "tf2_msgs/msg/TFMessage", 7, stays=True),
+    "tf": Kind("/tf", "tf2_msgs/msg/TFMessage", 7),
+    "pose": Kind("/pose", "geometry_msgs/msg/PoseStamped", 7),
+    "path": Kind("/path", "nav_msgs/msg/Path", 7),
+    "point": Kind("/point", "geometry_msgs/msg/PointStamped", 3),
+    "fix": Kind("/fix", "sensor_msgs/msg/NavSatFix", 3),
+}
+
+
+@lru_cache
+def typestore(*, ros1: bool) -> Any:
+    """Return the usual types of messages."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    if KINDS["tf"].type not in store.types:  # the library's Noetic has only tf/tfMessage
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", KINDS["tf"].type))
+    return store
+
+
+def check_stamps(stamps_ns: Ints, form: str) -> None:
+    """Raise ValueInvalid for a stamp whose seconds a message cannot hold."""
+    first, last = SECONDS.get(form, SECONDS_ROS2)
+    seconds = stamps_ns // BILLION
+    bad = stamps_ns[(seconds < first) | (seconds > last)]
+    if len(bad):
+        stamp = format_stamp(int(bad[0]))
+        raise ValueInvalid(f"stamp {stamp} has no place in {form}, whose seconds are {first} .. {last}")
+
+
+class MessageTemplate:
+    """The bytes of a message about one frame, and where its stamp and numbers stand in them."""
+
+    def __init__(self, kind: Kind, form: str, parent: str, child: str = "") -> None:
+        """Serialise one with numbers that nothing else in it is; raises ValueInvalid for names that are no text."""
+        numbers = [_PROBE * (at + 1) for at in range(kind.numbers)]
+        self.bytes = serialised(kind, form, [(parent, child)], [_PROBE_NS], [numbers])
+        self.stamp_at = self.bytes.index(struct.pack("<II", *divmod(_PROBE_NS, BILLION)))
+        self.numbers_at = self.bytes.index(struct.pack(f"<{kind.numbers}d", *numbers))
+
+    def filled(self, stamps_ns: Ints, numbers: Floats) -> list[bytes]:
+        """Return a message for each of stamps (n,) and numbers (n, k)."""
+        count, size = len(stamps_ns), len(self.bytes)
+        rows = np.tile(np.frombuffer(self.bytes, np.uint8), (count, 1))
+        times = np.column_stack(np.divmod(stamps_ns, BILLION)).astype("<u4")  # seconds before 1970 wrap, as int32 does
+        for at, part in ((self.stamp_at, times), (self.numbers_at, np.ascontiguousarray(numbers, "<f8"))):
+            own = part.view(np.uint8)
+            rows[:, at : at + own.shape[1]] = own
+        whole = rows.tobytes()
+        return [whole[at : at + size] for at in range(0, count * size, size)]
+
+
+_PROBE = 1.2345678912345e-67
+_PROBE_NS = 1532698752_187654321
+
+
+def serialised(
+    kind: Kind, form: str, frames: Sequence[tuple[str, str]], stamps_ns: Sequence[int],
+    numbers: Sequence[Sequence[float]],
+) -> bytes:  # fmt: skip
+    """Return one message; frames: (parent, child) of each of its transforms or poses.
+
+    Raises ValueInvalid for names that are no text.
+    """
+    store = typestore(ros1=form == BAG1)
+    message = _message(store.types, kind, frames, [divmod(stamp, BILLION) for stamp in stamps_ns], numbers)
+    try:
+        return bytes((store.serialize_ros1 if form == BAG1 else store.serialize_cdr)(message, kind.type))
+    except UnicodeEncodeError as error:
+        raise ValueInvalid(f"{shown(error.object)} is no name that can be written") from None
+
+
+def _message(
+    types: Any, kind: Kind, frames: Sequence[tuple[str, str]], stamps: Sequence[tuple[int, int]],
+    numbers: Sequence[Sequence[float]],
+) -> Any:  # fmt: skip
+    """Return one message of the library's types; stamps are seconds and nanoseconds."""
+
+    def part(name: str, *values: Any) -> Any:
+        return types[f"geometry_msgs/msg/{name}"](*values)
+
+    def header(at: int) -> Any:
+        make = types["std_msgs/msg/Header"]
+        counter = (0,) if "seq" in make.__dataclass_fields__ else ()  # of ROS 1
+        return make(*counter, types["builtin_interfaces/msg/Time"](*stamps[at]), frames[at][0])
+
+    def pose(at: int) -> Any:
+        own = numbers[at]
+        return part("PoseStamped", header(at), part("Pose", part("Point", *own[:3]), part("Quaternion", *own[3:])))
+
+    def transform(at: int) -> Any:
+        own = numbers[at]
+        moved = part("Transform", part("Vector3", *own[:3]), part("Quaternion", *own[3:]))
+        return part("TransformStamped", header(at), frames[at][1], moved)
+
+    each, make = range(len(frames)), types[kind.type]
+    if kind.type == KINDS["tf"].type:
+        return make([transform(at) for at in each])
+    if kind == KINDS["path"]:
+        return make(header(len(frames) - 1), [pose(at) for at in each])
+    if kind == KINDS["pose"]:
+        return pose(0)
+    if kind == KINDS["point"]:
+        return make(header(0), part("Point", *numbers[0]))
+    fixed_by_gps = types["sensor_msgs/msg/NavSatStatus"](0, 1)
+    return make(header(0), fixed_by_gps, *numbers[0], np.zeros(9), 0)  # covariance not known

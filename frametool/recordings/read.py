@@ -1,0 +1,427 @@
+"""Recordings read: ROS 1 bags by rosbags, MCAP files by mcap, databases by sqlite3; the extra `frametool[bag]`.
+
+Messages are bytes here, in the order of their log times; whoever wants to know what they say asks `types`.
+"""
+
+from __future__ import annotations
+
+import shutil
+from bisect import bisect_left
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from io import BufferedReader, BytesIO, FileIO
+from operator import itemgetter
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.documents.document import parse_documents
+from frametool.errors import FileProblem, FormatError, FrametoolError, shown
+from frametool.grammar.readers import Note
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator
+
+    from frametool.grammar.edges import Tally
+
+BAG1, BAG2, MCAP = "bag1", "bag2", "mcap"
+CDR = "cdr"
+METADATA, INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
+ITSELF, SERIALIZED = "rosbag2", "serialized_metadata"  # the metadata that rosbag2 puts into an MCAP file, of itself
+QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # what rosbag2 says of a channel of MCAP
+MOST = 1 << 28  # bytes of a chunk: one that promises more is not unpacked
+LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
+NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
+RECORD_HEAD = 9  # bytes
+BLOCK = 1 << 10  # messages
+
+
+@dataclass(eq=False, slots=True)
+class Channel:
+    """What messages of one publisher have in common.
+
+    topic, type: as ROS 2 writes them, `/pose` and `geometry_msgs/msg/PoseStamped`
+    encoding: of its messages: `cdr`, `ros1`, or what else there is
+    schema: name, encoding and text of the definition of its type, as in MCAP; None where there is none
+    said: what else is said of it: quality of service in ROS 2, callerid and latching in ROS 1
+    digest: the hash of the type
+    """
+
+    topic: str
+    type: str
+    encoding: str = CDR
+    schema: tuple[str, str, bytes] | None = None
+    said: dict[str, str] = field(default_factory=dict)
+    digest: str = ""
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """Return what makes it another one."""
+        return self.topic, self.type, self.encoding, self.schema, *self.said.items()
+
+    @property
+    def is_static(self) -> bool:
+        """Return True for a topic of transforms for good."""
+        return self.topic.rpartition("/")[2] == "tf_static"
+
+
+class Message(NamedTuple):
+    """A message as it was recorded; times are nanoseconds."""
+
+    channel: Channel
+    log_ns: int
+    data: bytes
+    publish_ns: int = 0
+    sequence: int = 0
+
+
+class _Bounded(BufferedReader):
+    """A file of which no more is asked for than is there, whatever a length in it says."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(FileIO(path))
+        self.length = path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read some bytes."""
+        return super().read(-1 if size is None else min(size, self.length))
+
+
+class McapFile:
+    """An MCAP file; compression: of its chunks."""
+
+    def __init__(self, path: Path, opened: ExitStack, tally: Tally) -> None:
+        """Read its summary, or all of it where that says too little."""
+        from mcap.reader import SeekingReader
+
+        self.stream = opened.enter_context(_Bounded(path))
+        self._schemas: dict[int, tuple[str, str, bytes]] = {}
+        self.channels: dict[int, Channel] = {}
+        reader = SeekingReader(self.stream)
+        self.head, summary = reader.get_header(), reader.get_summary()
+        said = summary.statistics if summary else None
+        if said is None:
+            tally.note(Note("odd", NO_SUMMARY.format(path.name), ()), 1)
+        self.said = said
+        chunks = summary.chunk_indexes if summary else []
+        self._chunks = chunks if said and said.chunk_count == len(chunks) else []
+        self.compression = self._chunks[0].compression if self._chunks else ""
+        if summary and said and said.channel_count == len(summary.channels):
+            self._register(*summary.schemas.values(), *summary.channels.values())
+        else:
+            for _ in self._found(None):
+                pass
+
+    def expected(self, wanted: Collection[Channel] | None) -> int | None:
+        """Return how many messages there are said to be on some channels, or on all; None where nothing is said."""
+        if wanted is None or self.said is None:
+            return self.said.message_count if self.said else None
+        counts = self.said.channel_message_counts
+        return sum(counts.get(number, 0) for number, each in self.channels.items() if each in wanted)
+
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
+        """Yield the messages on some channels, or on all; chunks whose times overlap are merged."""
+        time, held = itemgetter(1), list[Message]()
+        try:
+            for found in self._found(wanted):
+                found.sort(key=time)
+                at = bisect_left(held, found[0].log_ns, key=time)
+                yield from held[:at]
+                held = sorted([*held[at:], *found], key=time) if at < len(held) else found
+        except Exception:
+            yield from held
+            raise
+        yield from held
+
+    def others(self) -> Iterator[Any]:
+        """Yield its attachments and metadata, as records of mcap."""
+        from mcap.records import Attachment, Metadata
+
+        if self.said is None or self.said.attachment_count or self.said.metadata_count:
+            yield from (each for each in self._all() if isinstance(each, Attachment | Metadata))
+
+    def _all(self) -> Iterator[Any]:
+        """Yield all records as they lie."""
+        from mcap.stream_reader import StreamReader
+
+        self.stream.seek(0)
+        yield from StreamReader(self.stream, emit_chunks=True).records
+
+    def _records(self, wanted: Collection[Channel] | None) -> Iterator[Any]:
+        """Yield the records that hold messages of some channels: chunk by chunk, or else all there are."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Chunk
+
+        if not self._chunks:
+            yield from self._all()
+        numbers = {number for number, each in self.channels.items() if wanted is None or each in wanted}
+        for each in sorted(self._chunks, key=lambda each: each.message_start_time):
+            if not numbers.isdisjoint(each.message_index_offsets) or not each.message_index_offsets:
+                self.stream.seek(each.chunk_start_offset + RECORD_HEAD)
+                yield Chunk.read(ReadDataStream(self.stream))
+
+    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+        """Yield the messages of each chunk, and those outside of chunks, many together."""
+        from mcap import records
+
+        found: list[Message] = []
+        for each in self._records(wanted):
+            for one in _records_of(each) if isinstance(each, records.Chunk) else (each,):
+                if isinstance(one, records.Message):
+                    channel = self.channels[one.channel_id]
+                    if wanted is None or channel in wanted:
+                        found.append(Message(channel, one.log_time, one.data, one.publish_time, one.sequence))
+                elif isinstance(one, records.Schema | records.Channel):
+                    self._register(one)
+            if found and (isinstance(each, records.Chunk) or len(found) > BLOCK):
+                yield found
+                found = []
+        if found:
+            yield found
+
+    def _register(self, *records: Any) -> None:
+        """Register schemas and channels that are not known yet."""
+        for each in records:
+            if hasattr(each, "data"):
+                self._schemas.setdefault(each.id, (each.name, each.encoding, each.data))
+            elif each.id not in self.channels:
+                schema = self._schemas[each.schema_id] if each.schema_id else None
+                name = schema[0] if schema else ""
+                if each.message_encoding == "ros1" and "/msg/" not in name:
+                    name = name.replace("/", "/msg/")
+                digest = each.metadata.get(HASH, "")
+                made = Channel(each.topic, name, each.message_encoding, schema, each.metadata, digest)
+                self.channels[each.id] = made
+
+
+def _records_of(chunk: Any) -> list[Any]:
+    """Return what is in a chunk; raises ValueError for one that is too large, before it is unpacked."""
+    import zstandard
+    from mcap.stream_reader import breakup_chunk
+
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd" and size <= MOST:
+        size = max(size, zstandard.frame_content_size(chunk.data))
+    if size > MOST:
+        raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
+    return breakup_chunk(chunk, validate_crc=True)
+
+
+class DatabaseFile:
+    """A sqlite3 file of rosbag2; what its tables hold depends on its version."""
+
+    head, compression = None, ""
+
+    def __init__(self, path: Path, opened: ExitStack, _tally: Tally) -> None:
+        """Let sqlite3 check its pages, as rows on a broken one would be missing without a word, and read its topics."""
+        from sqlite3 import Row, connect
+
+        self.database = connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
+        opened.callback(self.database.close)
+        ((said,),) = self.database.execute("PRAGMA quick_check(1)").fetchall()
+        ((lost,),) = self.database.execute(LOST).fetchall() if said == "ok" else [[0]]
+        if said != "ok" or lost:
+            said = f"{lost} messages belong to no topic" if lost else " ".join(said.split())[:100]
+            raise FormatError(f"the bag is damaged: {said}", source=str(path))
+        rows = self.database.cursor()
+        rows.row_factory = Row
+        has = "SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'"
+        listed = rows.execute("SELECT * FROM message_definitions").fetchall() if rows.execute(has).fetchone() else []
+        defined = {each["topic_type"]: (each["encoding"], each["encoded_message_definition"]) for each in listed}
+        topics = map(dict, rows.execute("SELECT * FROM topics ORDER BY id").fetchall())
+        self.channels = {each["id"]: self._channel(each, defined.get(each["type"])) for each in topics}
+
+    @staticmethod
+    def _channel(topic: dict[str, Any], defined: tuple[str, str] | None) -> Channel:
+        kind, digest = topic["type"], topic.get("type_description_hash") or ""
+        said = {QOS: topic.get(QOS) or ""} | ({HASH: digest} if digest else {})
+        schema = (kind, defined[0], defined[1].encode()) if defined else None
+        return Channel(topic["name"], kind, topic["serialization_format"], schema, said, digest)
+
+    def expected(self, _wanted: Collection[Channel] | None) -> None:
+        """Return None: only the metadata of the folder say how many messages there are."""
+
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
+        """Yield the messages on some channels, or on all."""
+        numbers = ",".join(str(number) for number, each in self.channels.items() if wanted is None or each in wanted)
+        some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY timestamp, id"  # noqa: S608 - numbers
+        for number, log_ns, data in self.database.execute(some):
+            yield Message(self.channels[number], log_ns, data, log_ns)
+
+
+class Bag1File:
+    """A ROS 1 bag; the index of its messages is in memory, as the library has it."""
+
+    head = None
+
+    def __init__(self, path: Path, opened: ExitStack, _tally: Tally) -> None:
+        """Read its index."""
+        from rosbags.rosbag1.reader import Reader, decompressors
+
+        self.reader = opened.enter_context(Reader(path))
+        self._connections = {each.id: each for each in self.reader.connections}
+        self.channels = {number: self._channel(each) for number, each in self._connections.items()}
+        used = {id(each.decompressor) for each in self.reader.chunks.values()}
+        names = [name for name, each in decompressors.items() if id(each) in used]
+        self.compression = names[0].removeprefix("none") if names else ""
+
+    @staticmethod
+    def _channel(connection: Any) -> Channel:
+        said = {"callerid": connection.ext.callerid, "latching": connection.ext.latching}
+        said = {name: str(each) for name, each in said.items() if each is not None}
+        schema = connection.msgtype, "ros1msg", connection.msgdef.data.encode()
+        return Channel(connection.topic, connection.msgtype, "ros1", schema, said, connection.digest)
+
+    def expected(self, wanted: Collection[Channel] | None) -> int:
+        """Return how many messages the chunks say that there are on some channels, or on all."""
+        others = {number for number, each in self.channels.items() if wanted is not None and each not in wanted}
+        counts = (chunk.connection_counts for chunk in self.reader.chunk_infos)
+        return sum(count for each in counts for number, count in each.items() if number not in others)
+
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
+        """Yield the messages on some channels, or on all."""
+        channels = self.channels
+        some = [each for number, each in self._connections.items() if wanted is None or channels[number] in wanted]
+        for each, log_ns, data in self.reader.messages(some):
+            yield Message(channels[each.id], log_ns, data, log_ns)
+
+
+class RecordingReader:
+    """A recording that is open.
+
+    channels: equal ones of several files are one; foreign: those whose messages are not ROS's
+    metadata: of a folder, every value as text; head: profile and library of MCAP
+    """
+
+    def __init__(self, path: str, opened: ExitStack, tally: Tally) -> None:
+        """Open its files, as long as the stack is."""
+        from frametool.recordings.types import MessageTypes
+
+        self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
+        if files[0].is_dir():
+            self.metadata = read_metadata((files[0] / METADATA).read_text(encoding="utf-8"), f"{path}/{METADATA}")
+            files = _files_of(files[0], self.metadata, opened)
+        with files[0].open("rb") as first:
+            self.is_ros1 = first.read(8) == b"#ROSBAG "
+        self.files = [self._kind(file)(file, opened, tally) for file in files]
+        self._is_packed = self.metadata.get("compression_mode", "").lower() == "message"
+        known: dict[tuple[Any, ...], Channel] = {}
+        for each in self.files:
+            each.channels |= {number: known.setdefault(one.key, one) for number, one in each.channels.items()}
+        told = {(each["name"], each["type"]): each.get("type_description_hash", "") for each in self._topics()}
+        for channel in known.values():
+            channel.digest = channel.digest or told.get((channel.topic, channel.type)) or ""
+        encoding = "ros1" if self.is_ros1 else CDR
+        self.all = [*known.values()]
+        self.channels = [each for each in self.all if each.encoding == encoding]
+        self.foreign = [each for each in self.all if each.encoding != encoding]
+        self.types = MessageTypes(self.channels, ros1=self.is_ros1)
+
+    def _kind(self, file: Path) -> Any:
+        storage = self.metadata.get("storage_identifier") or file.suffix.removeprefix(".")
+        return Bag1File if self.is_ros1 else DatabaseFile if storage in ("sqlite3", "db3") else McapFile
+
+    def _topics(self) -> Iterator[dict[str, Any]]:
+        for each in self.metadata.get("topics_with_message_count") or ():
+            yield {**each["topic_metadata"], "count": each["message_count"]}
+
+    def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Message]:
+        """Yield the messages on some channels, or on all; raises FormatError where not all are there."""
+        total, wanted = 0, None if wanted is None else {*wanted}
+        for file in self.files:
+            count = 0
+            for count, message in enumerate(file.messages(wanted), 1):  # noqa: B007 - the last counts
+                yield _unpacked(message) if self._is_packed else message
+            self._check(count, file.expected(wanted), wanted)
+            total += count
+        self._check(total, self._expected(wanted), wanted)
+
+    def _expected(self, wanted: Collection[Channel] | None) -> int | None:
+        """Return how many messages the metadata say that there are."""
+        if wanted is None:
+            said = self.metadata.get("message_count")
+            return None if said is None else int(said)
+        named = {(each.topic, each.type) for each in wanted}
+        counts = [int(each["count"]) for each in self._topics() if (each["name"], each["type"]) in named]
+        return sum(counts) if counts else None
+
+    def _check(self, count: int, expected: int | None, wanted: Collection[Channel] | None) -> None:
+        """Raise FormatError unless as many messages are there as are said to be."""
+        if expected not in (None, count):
+            names = "" if wanted is None else f" on {', '.join(sorted({each.topic for each in wanted}))}"
+            raise FormatError(f"the bag is damaged: {count} of {expected} messages{names} are there", source=self.path)
+
+    def refuse_foreign(self, chosen: Iterable[str]) -> None:
+        """Raise FormatError for a topic that is asked for and whose messages are in another encoding than ROS's."""
+        named = {topic.strip("/") for topic in chosen}
+        for each in self.foreign:
+            if each.topic.strip("/") in named:
+                what = f"the messages of {each.topic} are encoded as {shown(each.encoding)}; cdr is read"
+                raise FormatError(what, source=self.path)
+
+
+def _unpacked(message: Message) -> Message:
+    """Unpack a message that is packed by itself."""
+    import zstandard
+
+    return message._replace(data=zstandard.open(BytesIO(message.data)).read(MOST))
+
+
+def read_metadata(text: str, name: str) -> dict[str, Any]:
+    """Read metadata, of a folder or as they stand in an MCAP file; every value in them is text.
+
+    Raises ValueError for what is no YAML.
+    """
+    try:
+        documents = parse_documents(text, name)
+    except FormatError as error:
+        raise ValueError(str(error)) from None
+    found = next((each.value for each in documents if type(each.value) is dict), {})
+    return dict(found.get(INFORMATION, found))
+
+
+def _files_of(folder: Path, metadata: dict[str, Any], opened: ExitStack) -> list[Path]:
+    """Return the files of a bag in their order; those compressed as a whole are unpacked, as long as it is open."""
+    found = [folder / PurePath(name).name for name in metadata["relative_file_paths"]]
+    if metadata.get("compression_mode", "").lower() != "file":
+        return found
+    import zstandard
+
+    home, plain = Path(opened.enter_context(TemporaryDirectory(prefix="frametool."))), []
+    for path in found:
+        plain.append(home / path.stem)
+        with zstandard.open(path, "rb") as packed, plain[-1].open("wb") as file:
+            shutil.copyfileobj(packed, file)
+    return plain
+
+
+@contextmanager
+def opened_recording(path: str, tally: Tally) -> Iterator[RecordingReader]:
+    """Open a recording; whatever the libraries raise for a broken one is one error.
+
+    Raises FileProblem without the extra.
+    """
+    if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
+        raise FormatError("nothing in it: an empty file is no bag", source=path)
+    try:
+        import mcap  # noqa: F401 - whether it is there
+        import rosbags.highlevel  # noqa: F401 - as well
+    except ImportError:
+        raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
+
+    if path == "-":
+        raise FileProblem("stdin: a bag cannot be read from a pipe; name its file")
+    with broken(path), ExitStack() as opened:
+        yield RecordingReader(path, opened, tally)
+
+
+@contextmanager
+def broken(path: str) -> Iterator[None]:
+    """Make one error of whatever reading a broken bag raises: anything, also MemoryError."""
+    try:
+        yield
+    except (FrametoolError, BrokenPipeError):
+        raise
+    except Exception as error:  # noqa: BLE001 - see above
+        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
+        raise FormatError(f"the bag cannot be read; is it whole, and its suffix right? ({said})", source=path) from None

@@ -1,0 +1,286 @@
+"""Recordings written: MCAP files and folders by mcap, ROS 1 bags by rosbags, the extra `frametool[bag]`.
+
+New messages are logged at their stamps, or at the one before where a stamp goes back.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import contextmanager, suppress
+from heapq import merge
+from itertools import chain, groupby
+from operator import itemgetter
+from pathlib import Path
+from shutil import rmtree
+from tempfile import gettempdir, mkdtemp
+from typing import IO, TYPE_CHECKING, Any, Self, TypeAlias
+from weakref import finalize
+
+import numpy as np
+
+from frametool.documents.yaml_writer import dump
+from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable
+from frametool.geometry import floats, quaternion
+from frametool.recordings.made import KINDS, check_stamps, serialised, typestore
+from frametool.recordings.read import BAG1, BAG2, CDR, INFORMATION, ITSELF, METADATA, QOS, SERIALIZED, Channel, Message
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import Track
+    from frametool.geometry.types import Components
+    from frametool.grammar.result import Style
+    from frametool.recordings.made import Kind
+
+NAME = "recording"  # of the file in a bag2 folder, whatever that is called: two runs write the same bytes
+PIECE = 1 << 20  # bytes
+NO_EXTRA = "recordings are written with an extra; install it: pip install 'frametool[bag]'"
+VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last that says policies by numbers
+BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service
+
+
+class FirstPiece(bytes):
+    """The first bytes of a file in a folder, with its name."""
+
+    name: str
+
+    def __new__(cls, piece: bytes, name: str) -> Self:
+        """Take a piece and a name."""
+        made = super().__new__(cls, piece)
+        made.name = name
+        return made
+
+
+class RecordingFile:
+    """A recording that is being written, into a file without a name until `pieces` yields what is in it."""
+
+    def __init__(self, form: str, folder: str = "", compression: str = "", *, head: Any = None) -> None:
+        """Open it in a folder that has room for it; raises FileProblem without the extra.
+
+        compression: of its chunks, as MCAP files and bags name them; head: profile and library of MCAP
+        """
+        try:
+            from mcap.writer import CompressionType
+            from mcap.writer import Writer as McapWriter
+            from rosbags.rosbag1 import Writer as Writer1
+        except ImportError:
+            raise FileProblem(NO_EXTRA) from None
+
+        self.form, self.log_ns = form, 0
+        self.counts: dict[Channel, int] = {}
+        self.span: tuple[int, int] | None = None  # of log times
+        self._folder = folder
+        self._numbers: dict[Any, Any] = {}  # of schemas and channels, or connections
+        with room_in(folder):
+            home = Path(mkdtemp(".part", ".frametool.", folder or None))
+            place = home / NAME
+            self._writer: Any
+            if form == BAG1:
+                self._writer = Writer1(place)
+                if compression:
+                    self._writer.set_compression(Writer1.CompressionFormat[compression.upper()])
+                self._writer.open()
+                self._stream = self._writer.bio
+            else:
+                self._stream = place.open("xb")
+                self._writer = McapWriter(self._stream, compression=CompressionType[compression.upper() or "NONE"])
+                self._writer.start(*((head.profile, head.library) if head else ("ros2", "frametool")))
+            self._file = place.open("rb")
+        self._discard = finalize(self, _discarded, self._stream, self._file, home)
+        with suppress(OSError):  # Windows does not let go of the name of an open file
+            rmtree(home)
+
+    def channel(self, kind: Kind, topic: str = "") -> Channel:
+        """Begin a topic, the usual one of its kind unless told, and return what `write` takes."""
+        made = new_channel(kind, topic or kind.topic, ros1=self.form == BAG1)
+        self.begin([made])
+        return made
+
+    def begin(self, channels: Iterable[Channel]) -> None:
+        """Begin some channels."""
+        for each in channels:
+            self.counts.setdefault(each, 0)
+            if each.key not in self._numbers:
+                self._numbers[each.key] = self._connection(each) if self.form == BAG1 else self._channel(each)
+            self._numbers[each] = self._numbers[each.key]
+
+    def _connection(self, channel: Channel) -> Any:
+        said = channel.said
+        latching = int(said["latching"]) if said.get("latching") else None
+        _, _, definition = channel.schema or ("", "", b"")
+        return self._writer.add_connection(
+            channel.topic, channel.type, msgdef=definition.decode(), md5sum=channel.digest or "*",
+            callerid=said.get("callerid"), latching=latching,
+        )  # fmt: skip
+
+    def _channel(self, channel: Channel) -> int:
+        schema = channel.schema
+        if schema is not None and schema not in self._numbers:
+            self._numbers[schema] = self._writer.register_schema(*schema)
+        number = self._numbers[schema] if schema else 0
+        return int(self._writer.register_channel(channel.topic, channel.encoding, number, channel.said))
+
+    def write(self, channel: Channel, stamp_ns: int, data: bytes | memoryview) -> None:
+        """Write one message; what comes late is logged with the one before."""
+        self.log_ns = max(self.log_ns, stamp_ns)
+        self.add(Message(channel, self.log_ns, bytes(data), self.log_ns))
+
+    def add(self, message: Message) -> None:
+        """Write one message as it was recorded."""
+        channel, log_ns, data, publish_ns, sequence = message
+        number = self._numbers[channel]
+        try:
+            if self.form == BAG1:
+                self._writer.write(number, log_ns, data)
+            else:
+                self._writer.add_message(number, log_ns, data, publish_ns, sequence)
+        except OSError as error:
+            raise _named(error, self._folder) from None
+        self.counts[channel] += 1
+        first, last = self.span or (log_ns, log_ns)
+        self.span = min(first, log_ns), max(last, log_ns)
+
+    def add_other(self, other: Any) -> None:
+        """Write an attachment or metadata, a record of mcap; what rosbag2 says of the file itself is made anew."""
+        if hasattr(other, "metadata"):
+            self._writer.add_metadata(other.name, other.metadata)
+        else:
+            self._writer.add_attachment(other.create_time, other.log_time, other.name, other.media_type, other.data)
+
+    def pieces(self, before: dict[str, Any] | None = None, *, itself: bool = True) -> Iterator[bytes]:
+        """End the recording and yield its bytes; of a folder file after file, each begun by a FirstPiece.
+
+        before: the metadata of what is copied; itself: whether MCAP holds what rosbag2 says of a file
+        """
+        metadata: dict[str, Any] = {}
+        with room_in(self._folder):
+            if self.form == BAG1:
+                self._writer.close()
+            else:
+                metadata = self._metadata(before or {})
+                if itself or self.form == BAG2:
+                    self._writer.add_metadata(ITSELF, {SERIALIZED: dump(metadata)})
+                self._writer.finish()
+                self._stream.close()
+        if self.form == BAG2:
+            yield FirstPiece(dump({INFORMATION: metadata}).encode(), METADATA)
+            yield FirstPiece(self._file.read(PIECE), f"{NAME}.mcap")
+        while piece := self._file.read(PIECE):
+            yield piece
+        self._discard()
+
+    def _metadata(self, before: dict[str, Any]) -> dict[str, Any]:
+        """Return what rosbag2 says of a recording, with what it said before of where that comes from."""
+        from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
+
+        first, last = self.span or (0, 0)
+        by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in self.counts)
+        topics: dict[tuple[str, ...], dict[str, Any]] = {}
+        for each, count in self.counts.items():
+            qos: Any = each.said.get(QOS, "")
+            if not by_numbers:
+                with suppress(Exception):  # what cannot be read stays as it is
+                    qos = dump_qos_v9(parse_qos(qos or []))
+            about = {"name": each.topic, "type": each.type, "serialization_format": each.encoding, QOS: qos}
+            about["type_description_hash"] = each.digest
+            row = topics.setdefault((*map(str, about.values()),), {"topic_metadata": about, "message_count": 0})
+            row["message_count"] += count
+        count = sum(self.counts.values())
+        times = {"duration": {"nanoseconds": last - first}, "starting_time": {"nanoseconds_since_epoch": first}}
+        file = f"{NAME}.mcap"
+        return {
+            "version": VERSION_OF_NUMBERS if by_numbers else VERSION, "storage_identifier": "mcap", **times,
+            "message_count": count, "topics_with_message_count": [*topics.values()],
+            "compression_format": "", "compression_mode": "",
+            "relative_file_paths": [file], "files": [{"path": file, **times, "message_count": count}],
+            "custom_data": before.get("custom_data"), "ros_distro": before.get("ros_distro") or "",
+        }  # fmt: skip
+
+
+def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
+    """Yield the bytes of a recording of a tree: what stands in one message, what moves in one for each stamp."""
+    form, asked = style.form, style.recording
+    topics = {"tf_static": any(track.standing for track in tree.tracks()), "tf": tree.moves}
+    if asked.topic and all(topics.values()):
+        raise ValueInvalid(f"the tree stands and moves, on two topics; {asked.topic} names one")
+    if not any(topics.values()):
+        raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
+    file = RecordingFile(form, asked.folder)
+    moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.standing), key=itemgetter(0))
+    messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))
+    first = next(messages, None)
+    if topics["tf_static"]:
+        still = [row for track in tree.tracks() if track.standing for row in _samples(track, style)]
+        data = serialised(KINDS["tf_static"], form, *_columns(still))
+        file.write(file.channel(KINDS["tf_static"], asked.topic), 0 if first is None else first[0], data)
+    if first is not None:
+        channel = file.channel(KINDS["tf"], asked.topic)
+        for stamp, rows in chain([first], messages):
+            check_stamps(np.array([stamp]), form)
+            file.write(channel, stamp, serialised(KINDS["tf"], form, *_columns(rows)))
+    yield from file.pieces()
+
+
+Sample: TypeAlias = "tuple[int, tuple[str, str], Components]"
+
+
+def _samples(track: Track, style: Style) -> Iterator[Sample]:
+    """Yield the samples of a frame as stamp, (parent, child) and pose; what stands has the stamp 0."""
+    for stamp_ns, parent, (tx, ty, tz, x, y, z, w) in track.walk():
+        turn = (x, y, z, w) if style.keep_sign else quaternion.from_quaternion(x, y, z, w, floats)
+        yield stamp_ns or 0, (parent, track.child), tuple(part + 0.0 for part in (tx, ty, tz, *turn))
+
+
+def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
+    """Return frames, stamps and poses of samples."""
+    return zip(*((frames, stamp, pose) for stamp, frames, pose in samples), strict=True)
+
+
+def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:
+    """Close what was opened for a recording, and remove what is left of it."""
+    stream.close()
+    file.close()
+    rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def room_in(folder: str) -> Iterator[None]:
+    """Name the folder in which there is no room, or what else the system says of it."""
+    try:
+        yield
+    except FrametoolError:
+        raise
+    except OSError as error:
+        raise _named(error, folder) from None
+
+
+def _named(error: OSError, folder: str) -> FileProblem:
+    return FileProblem(f"{printable(folder or gettempdir())}: {(error.strerror or str(error)).lower()}")
+
+
+def new_channel(kind: Kind, topic: str, *, ros1: bool, like: Iterable[Channel] = ()) -> Channel:
+    """Return a channel of messages that are made; like: others of the same recording, whose definition is taken."""
+    store = typestore(ros1=ros1)
+    definition, digest = store.generate_msgdef(kind.type, ros_version=1 if ros1 else 2)
+    known = [each for each in like if each.type == kind.type]
+    encoding = "ros1" if ros1 else CDR
+    schema = kind.type, f"ros{2 - ros1}msg", definition.encode()
+    said = {"latching": str(int(kind.stays))}
+    if not ros1:
+        by_numbers = any(BY_NUMBERS.search(each.said.get(QOS, "")) for each in like)
+        said, digest = {QOS: latched(by_numbers=by_numbers) if kind.stays else ""}, store.hash_rihs01(kind.type)
+    if known:
+        return Channel(topic, kind.type, encoding, known[0].schema, said, known[0].digest)
+    return Channel(topic, kind.type, encoding, schema, said, digest)
+
+
+def latched(*, by_numbers: bool) -> str:
+    """Return the quality of service of a topic that is there for who comes late, as channels have it."""
+    from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+    from rosbags.rosbag2.metadata import dump_qos_v8, dump_qos_v9
+
+    for_ever = QosTime(9223372036, 854775807)
+    made = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, for_ever, for_ever,
+               QosLiveliness.AUTOMATIC, for_ever, avoid_ros_namespace_conventions=False)  # fmt: skip
+    return str(dump_qos_v8([made])) if by_numbers else dump(dump_qos_v9([made]))
