@@ -34,4 +34,4 @@ def test_a_test_is_slow_from_a_limit_on_and_stays_so_until_half_of_it() -> None:
 
 def test_a_slow_test_is_one_that_is_there() -> None:
     names = {f"{path.relative_to(TESTS.parent)}::{name}" for path in TESTS.rglob("test_*.py") for name in re.findall(r"(?m)^def (test_\w+)", path.read_text(encoding="utf-8"))}
-    assert set(selection.slow_tests()) - names == set()
+    assert {name for name in selection.slow_tests() if not name.endswith("::runTest")} - names == set()  # a machine of hypothesis
