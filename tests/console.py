@@ -58,6 +58,12 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
+def split(text: str) -> tuple[list[str], list[float]]:
+    """Part a text into its words and its numbers: another libm may differ in a number's last digit."""
+    pieces = re.split(r"((?<![\w.])[-+]?\d+\.\d+(?:e[-+]\d+)?)", text)
+    return [" ".join(piece.split()) for piece in pieces[::2]], [float(piece) for piece in pieces[1::2]]
+
+
 def rewritten(text: str, bin_folder: Path) -> str:
     """Give the text with every console block as it prints now."""
 

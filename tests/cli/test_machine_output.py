@@ -7,6 +7,7 @@ import shlex
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from console import split
 from machine_output import COMMANDS, GOLDEN, ROOT, STREAMS
 
 from frametool.cli.commands import COMMANDS as NAMES
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     Run = Callable[..., Outcome]
 
 STORED = [json.loads(line) for line in GOLDEN.read_text().splitlines()]
+FITS = {"solve", "compare", "align", "mean"}  # by LAPACK, whose last digits are the processor's
 SILENT = {"help", "view", "record"}  # nothing for machines; pictures and recordings have tests of their own
 
 
@@ -27,7 +29,12 @@ SILENT = {"help", "view", "record"}  # nothing for machines; pictures and record
 def test_what_machines_read_keeps_every_byte(run: Run, tmp_path: Path, each: dict[str, Any]) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     outcome = run(*shlex.split(each["run"]), stdin=STREAMS[each["in"]])
-    assert (outcome.status, outcome.out) == (each["status"], each["out"]), outcome.err
+    assert outcome.status == each["status"], outcome.err
+    if each["run"].split()[0] in FITS:
+        assert split(outcome.out)[0] == split(each["out"])[0]
+        assert split(outcome.out)[1] == pytest.approx(split(each["out"])[1], rel=1e-9, abs=1e-12)
+    else:
+        assert outcome.out == each["out"]
 
 
 def test_the_golden_file_has_every_line_of_its_table() -> None:

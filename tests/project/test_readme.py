@@ -47,12 +47,6 @@ def bin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("bin")
 
 
-def split(text: str) -> tuple[list[str], list[float]]:
-    """Part a text into its words and its numbers: another libm may differ in a number's last digit."""
-    pieces = re.split(r"((?<![\w.])[-+]?\d+\.\d+(?:e[-+]\d+)?)", text)
-    return [" ".join(piece.split()) for piece in pieces[::2]], [float(piece) for piece in pieces[1::2]]
-
-
 def shown(command: str, bin_folder: Path) -> str:
     """Return what a terminal shows; README's own questions are asked by processes too, as a person asks them."""
     text = printed(command, console.ROOT, console.WIDTH) if understands(command) else console.printed(command, bin_folder)
@@ -62,9 +56,9 @@ def shown(command: str, bin_folder: Path) -> str:
 
 @pytest.mark.parametrize(("command", "output"), EXAMPLES, ids=[command for command, _ in EXAMPLES])
 def test_a_readme_example_prints_what_the_readme_shows(command: str, output: str, bin_folder: Path) -> None:
-    words, numbers = split(shown(command, bin_folder))
-    assert words == split(output)[0]
-    assert numbers == pytest.approx(split(output)[1], rel=1e-12, abs=1e-15)
+    words, numbers = console.split(shown(command, bin_folder))
+    assert words == console.split(output)[0]
+    assert numbers == pytest.approx(console.split(output)[1], rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize(("name", "command"), HELP_EXAMPLES, ids=[command for _, command in HELP_EXAMPLES])
