@@ -31,7 +31,7 @@ def compose(a: Components, b: Components) -> Components:
         return (*rigid.compose(*first, s1 * x, s1 * y, s1 * z, *second[3:]), s1 * s2)
     from frametool.geometry import uncertainty
 
-    beside = uncertainty.composed(first, covariance_of(a), second, covariance_of(b))
+    beside = uncertainty.propagate_compose(first, covariance_of(a), second, covariance_of(b))
     return (*rigid.compose(*first, *second), *(beside or ()))
 
 
@@ -46,7 +46,7 @@ def inverse(a: Components) -> Components:
         return (x, y, z, *rotation)
     from frametool.geometry import uncertainty
 
-    return (x, y, z, *rotation, *uncertainty.inverted(pose, a[EXACT:]))
+    return (x, y, z, *rotation, *uncertainty.propagate_inverse(pose, a[EXACT:]))
 
 
 def relative(a: Components, b: Components) -> Components:
@@ -59,8 +59,8 @@ def relative(a: Components, b: Components) -> Components:
     from frametool.geometry import uncertainty
 
     of_a = covariance_of(a)
-    back = rigid.inverse(*first)
-    beside = uncertainty.composed(back, of_a and uncertainty.inverted(first, of_a), second, covariance_of(b))
+    of_back = of_a and uncertainty.propagate_inverse(first, of_a)
+    beside = uncertainty.propagate_compose(rigid.inverse(*first), of_back, second, covariance_of(b))
     return (*pose, *(beside or ()))
 
 

@@ -71,7 +71,7 @@ class MessageMover:
         entries = fields.doubles(uncertainty.POSE)
         if pose is not None and any(entries) and entries[0] != uncertainty.UNKNOWN:
             uncertainty.taken(entries)
-            fields.put([entry + 0.0 for entry in uncertainty.turned(entries, *pose[3:])])
+            fields.put([entry + 0.0 for entry in uncertainty.rotate_covariance(entries, *pose[3:])])
 
     def odometry(self, fields: MessageFields) -> None:
         """Move an Odometry, without its twist."""

@@ -157,4 +157,4 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     within((FIX,), check, entries)
     level = Pose(rotation=(0.0, 0.0, 0.0, 1.0))
     at = placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
-    return tuple(uncertainty.turned(tuple(entries), *at.components[3:]))
+    return tuple(uncertainty.rotate_covariance(tuple(entries), *at.components[3:]))

@@ -200,7 +200,7 @@ class Run:
                     for row, column in np.argwhere((own < 0.0 if shape.sigma else own <= 0.0).T).tolist():
                         self._blame(row, self.plan.names[at + column], what.format(own[column, row]))
                 else:
-                    for row, reason in uncertainty.bad_rows([*own]).items():
+                    for row, reason in uncertainty.problems(own.T).items():
                         self._blame(row, self.plan.names[at], reason)
                 at += size
             first += shape.size
