@@ -13,8 +13,8 @@ from frametool.cli.group import settings
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
-from frametool.geometry.place import Earth, Origin, Place
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.place import Earth, Origin, Place, Utm, kernels
+from frametool.geometry.representations import POSITIONS
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.place import read_at
 from frametool.grammar.readers import Misfit, Reading, tell
@@ -80,11 +80,10 @@ def mapping_of(texts: Sequence[str], name: str) -> str:
     """Write bare numbers of a place as the mapping that says the same; raises click.UsageError for another count."""
     from frametool.documents.json import dump
 
-    row = REPRESENTATIONS[name]
-    zoned = name == "utm" and len(texts) == 3 and earth().zone is not None
+    row, arithmetic = POSITIONS[name], kernels(name)
+    zoned = arithmetic is Utm and len(texts) == 3 and earth().zone is not None
     fields = row.names[zoned:]
-    least = {"lla": 2, "utm": 3}.get(name, 3) - zoned
-    if not least <= len(texts) <= len(fields):
+    if not (arithmetic.least or len(fields)) - zoned <= len(texts) <= len(fields):
         raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")
     members: Any = dict(zip(fields, texts, strict=False))
-    return dump({"ecef": members} if name == "ecef" else {"utm": members} if name == "utm" else members)
+    return dump({name: members} if arithmetic.is_nested else members)

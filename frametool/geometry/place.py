@@ -6,6 +6,8 @@ numbers only, floats or arrays of one shape; a zone of UTM is a number, as `tran
 
 from __future__ import annotations
 
+from functools import cache
+from importlib import import_module
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,10 +15,11 @@ from frametool.errors import ValueInvalid
 from frametool.geometry import earth, floats, quaternion, rigid
 from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.floats import RADIAN, SQRT_HALF, nearest
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import POSITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from typing import Self
 
     from frametool.geometry.types import Components, Namespace, Rigid, Vector
 
@@ -25,6 +28,7 @@ LLA, UTM = "lla", "utm"
 LOCAL = (ENU, NED)
 ZONE, AXES = "zone", "axes"  # what is written as a word
 SAMPLE = 0.5  # a number that is no zone
+ROUNDING = 1e-6  # metres or degrees: numbers that differ by no more are the same one, as it was read
 EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both are whole degrees
 GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
 UNSAID = (
@@ -70,7 +74,7 @@ class Origin:
 class Place(NamedTuple):
     """One way to write positions on the Earth, and what rotations there are given in.
 
-    name: of its row of REPRESENTATIONS
+    name: of its row of POSITIONS
     fields: what each of its numbers is, in their order
     axes: of rotations: enu, ned, grid, ecef; "" where nothing is said, or each row has its own among its numbers
     level: rotations are headings: turns about down, which a frame whose z is up has another way round
@@ -94,8 +98,8 @@ class Place(NamedTuple):
         for name in names:
             if name in LOCAL and earth_.origin is None:
                 raise ValueInvalid(f"--to {name} needs --origin: {{lat: .., lon: ..}}, or first for the first position")
-            fields = REPRESENTATIONS[name].names
-            axes = ECEF if name == ECEF else name if name in LOCAL else earth_.axes or (GRID if name == UTM else ENU)
+            fields = POSITIONS[name].names
+            axes = ECEF if name == ECEF else name if name in LOCAL else earth_.axes or kernels(name).axes
             origin = earth_.origin if name in LOCAL else None
             made.append(cls(name, fields, axes, earth_.zone, origin))
         return made[0]._replace(more=tuple(made[1:]))
@@ -110,7 +114,7 @@ class Place(NamedTuple):
             return None
         if name in LOCAL and said.origin is None:
             raise ValueInvalid(f"--from {name} needs --origin: {{lat: .., lon: ..}}")
-        return cls(name, REPRESENTATIONS[name].names, name, None, said.origin if name in LOCAL else None)
+        return cls(name, POSITIONS[name].names, name, None, said.origin if name in LOCAL else None)
 
     @property
     def size(self) -> int:
@@ -125,7 +129,7 @@ class Place(NamedTuple):
     @property
     def columns(self) -> tuple[str, ...]:
         """Name its numbers as columns of a table."""
-        own = dict(zip(REPRESENTATIONS[self.name].names, REPRESENTATIONS[self.name].columns, strict=True))
+        own = dict(zip(POSITIONS[self.name].names, POSITIONS[self.name].columns, strict=True))
         rest = (name for each in self.more for name in each.columns)
         return (*(own.get(field, field) for field in self.fields), *rest)
 
@@ -148,34 +152,16 @@ class Place(NamedTuple):
     # --- reading ---
 
     def lla(self, numbers: Sequence[Any]) -> Components:
-        """Return lat, lon in degrees and alt of its numbers, also of ECEF and local axes."""
-        if self.name in (ECEF, *LOCAL):
-            x, y, z = self.ecef(numbers)
-            return earth.lla(x, y, z, namespace(numbers))
-        given = dict(zip(self.fields, numbers, strict=True))
-        zero = numbers[0] - numbers[0]
-        alt = given.get("alt", zero)
-        if "msl" in given:
-            alt = given["msl"] + given["undulation"]
-        if self.name == UTM:
-            zone = given[ZONE] if self.zone is None else self.zone + zero
-            return *mercator.lat_lon(zone, given["easting"], given["northing"], namespace(numbers)), alt
-        lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
-        return lat, lon, alt
+        """Return lat, lon in degrees and alt of its numbers."""
+        return kernels(self.name).to_lla(self, self.given(numbers), namespace(numbers))
 
     def ecef(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in ECEF of its numbers; NaN for what is no place, and `check` says why."""
-        if self.name == ECEF:
-            return self._three(numbers)
-        if self.name in LOCAL and self.origin is not None:
-            return rigid.apply(*self.origin.pose(self.name), *self._three(numbers))
-        lat, lon, alt = self.lla(numbers)
-        return earth.ecef(lat, lon, alt, namespace(numbers))
+        return kernels(self.name).to_ecef(self, self.given(numbers), namespace(numbers))
 
-    def _three(self, numbers: Sequence[Any]) -> Components:
-        """Return x, y, z, or the numbers of local axes, 0 for one that is not there."""
-        given = dict(zip(self.fields, numbers, strict=True))
-        return tuple(given.get(name, numbers[0] - numbers[0]) for name in REPRESENTATIONS[self.name].names)
+    def given(self, numbers: Sequence[Any]) -> dict[str, Any]:
+        """Return its numbers by field."""
+        return dict(zip(self.fields, numbers, strict=True))
 
     def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
         """Return a rotation given in the axes there, as x y z w, in ECEF."""
@@ -222,17 +208,12 @@ class Place(NamedTuple):
         return earth.ecef_from_axes(lat, lon, self.axes, xp, convergence)
 
     def _zone_of(self, numbers: Sequence[Any]) -> Any:
-        given = dict(zip(self.fields, numbers, strict=True))
-        return given.get(ZONE, self.zone)
+        return self.given(numbers).get(ZONE, self.zone)
 
     def check(self, numbers: Sequence[float]) -> None:
         """Raise ValueInvalid unless floats are a place."""
-        given = dict(zip(self.fields, numbers, strict=True))
-        if self.name == UTM:
-            zone = given[ZONE] if self.zone is None else self.zone
-            mercator.check_grid(zone, given["easting"], given["northing"])
-        elif self.name == LLA:
-            earth.check_lla(*self.lla(numbers))
+        given = self.given(numbers)
+        kernels(self.name).check(self, given)
         if GRID in (self.axes, AXES in given and earth.AXES[int(given[AXES])]):
             lat, lon, _ = self.lla(numbers)
             mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
@@ -245,26 +226,33 @@ class Place(NamedTuple):
             if each.origin is not None:
                 each.origin.settle(x, y, z)
 
-    def numbers(self, x: Any, y: Any, z: Any) -> list[Any]:
-        """Return its numbers of a position in ECEF; NaN where there are none, and `check_result` says why."""
+    def numbers(self, x: Any, y: Any, z: Any, read: Spot | None = None) -> list[Any]:
+        """Return its numbers of a position in ECEF; NaN where there are none, and `check_result` says why.
+
+        read: the place that the position was read as, where nothing has moved it: that is not taken through ECEF
+        """
         xp = namespace((x, y, z))
+        lla: Components = ()
+        if read is not None and kernels(read.place.name).is_angular:
+            lat, lon, alt = read.place.lla(read.numbers)
+            lla = lat, earth.eastward(lon, xp), earth.with_latitude(x, y, z, alt, xp)
         found: list[Any] = []
-        place: Components = ()
         for each in (self, *self.more):
-            if each.name == ECEF:
-                found += [x, y, z]
-            elif each.origin is not None:
+            row = kernels(each.name)
+            if each.origin is not None:
                 each.origin.settle(x, y, z)
-                found += earth.seen_from(*each.origin.pose(each.name), x, y, z)
+            if row.is_angular:
+                lla = lla or earth.lla(x, y, z, xp)
+                own = row.from_lla(each, lla, xp)
             else:
-                lat, lon, alt = place = place or earth.lla(x, y, z, xp)
-                if each.name == LLA:
-                    found += place
-                    continue
-                zone = _held(each.zone, lat, lon, xp)
-                ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
-                easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
-                found += [zone, easting, northing, alt, *grid[: len(each.fields) - 4]]
+                own = row.from_ecef(each, (x, y, z), xp)
+            own = own[: len(each.fields)]
+            if read is not None and (read.place.name, read.place.origin) == (each.name, each.origin):
+                as_read = read.place.given(read.numbers)
+                own = tuple(
+                    _as_read(as_read.get(field), number, xp) for field, number in zip(each.fields, own, strict=True)
+                )
+            found += own
         return found
 
     def local(self, x: Any, y: Any, z: Any, rotation: Components) -> Components:
@@ -282,25 +270,217 @@ class Place(NamedTuple):
     def check_result(self, x: float, y: float, z: float) -> None:
         """Raise ValueInvalid unless a position in ECEF can be written so."""
         for each in (self, *self.more):
-            if each.name in (LLA, UTM):
-                earth.check_ecef(x, y, z)
-            if each.name == UTM or each.axes == GRID:
-                lat, lon, _ = earth.lla(x, y, z, floats)
-                mercator.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
+            kernels(each.name).check_result(each, x, y, z)
+            if each.axes == GRID:
+                _check_zone(each, x, y, z)
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers as the keys that a mapping has."""
-        own = dict(zip(self.fields, numbers, strict=False))
-        if self.name == UTM:
-            zone = own[ZONE]
-            own = {UTM: own | {ZONE: zone if zone == SAMPLE else mercator.ZONES[int(zone)]}}
-        elif self.name == ECEF:
-            own = {ECEF: [*own.values()]}
+        own = kernels(self.name).entry(dict(zip(self.fields, numbers, strict=False)))
         rest = numbers[len(self.fields) :]
         for each in self.more:
             own |= each.entry(rest)
             rest = rest[each.size :]
         return own
+
+
+class Spot(NamedTuple):
+    """A position as it was read: how it is written, and its numbers."""
+
+    place: Place
+    numbers: Sequence[Any]
+
+
+class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot be added to
+    """The components of a result at the place that its row was read as: `read`."""
+
+    read: Spot
+
+    def __new__(cls, parts: Components, read: Spot) -> Self:
+        """Put the two together."""
+        made = super().__new__(cls, parts)
+        made.read = read
+        return made
+
+
+class Kernels:
+    """The arithmetic of a row of POSITIONS, which has two of the first four functions: to and from lla, or ECEF.
+
+    given: numbers by field; place: the zone and the origin that hold for all
+    axes: of rotations there, where nobody says; is_angular: latitude and longitude say it, without a way through ECEF
+    least: how many of the numbers there must be; is_nested: a mapping has them below its name
+    """
+
+    axes = ENU
+    is_angular = True
+    is_nested = False
+    least: int | None = None
+
+    @classmethod
+    def to_lla(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:
+        """Return lat, lon in degrees and alt."""
+        x, y, z = cls.to_ecef(place, given, xp)
+        return earth.lla(x, y, z, xp)
+
+    @classmethod
+    def to_ecef(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:
+        """Return x, y, z."""
+        lat, lon, alt = cls.to_lla(place, given, xp)
+        return earth.ecef(lat, lon, alt, xp)
+
+    @classmethod
+    def from_lla(cls, place: Place, lla: Components, xp: Namespace) -> Components:
+        """Return its numbers of a place."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_ecef(cls, place: Place, xyz: Components, xp: Namespace) -> Components:
+        """Return its numbers of a position in ECEF."""
+        raise NotImplementedError
+
+    @classmethod
+    def check(cls, place: Place, given: dict[str, Any]) -> None:
+        """Raise ValueInvalid unless floats are a place."""
+        if cls.is_angular:
+            earth.check_lla(*cls.to_lla(place, given, floats))
+
+    @classmethod
+    def check_result(cls, place: Place, x: float, y: float, z: float) -> None:  # noqa: ARG003 - UTM's is held
+        """Raise ValueInvalid unless a position in ECEF can be written so."""
+        if cls.is_angular:
+            earth.check_ecef(x, y, z)
+
+    @staticmethod
+    def entry(own: dict[str, Any]) -> dict[str, Any]:
+        """Return its numbers as the keys that a mapping has."""
+        return own
+
+
+class Lla(Kernels):
+    """Latitude, longitude and the height above the ellipsoid, or above the sea with the geoid's."""
+
+    least = 2
+
+    @classmethod
+    def to_lla(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:  # noqa: ARG003
+        """Return them in degrees."""
+        lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
+        return lat, lon, _height(given, lat)
+
+    @classmethod
+    def from_lla(cls, place: Place, lla: Components, xp: Namespace) -> Components:  # noqa: ARG003
+        """Return them as they are."""
+        return lla
+
+
+class Utm(Kernels):
+    """Zone, easting, northing and height, and what results say beside them."""
+
+    axes = GRID
+    is_nested = True
+    least = 3
+
+    @classmethod
+    def to_lla(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:
+        """Return the place in a zone."""
+        east = given["easting"]
+        zone = given[ZONE] if place.zone is None else place.zone + (east - east)
+        return *mercator.lat_lon(zone, east, given["northing"], xp), _height(given, east)
+
+    @classmethod
+    def from_lla(cls, place: Place, lla: Components, xp: Namespace) -> Components:
+        """Return them in the zone that is held, or that of each place."""
+        lat, lon, alt = lla
+        zone = _held(place.zone, lat, lon, xp)
+        ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
+        easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
+        return zone, easting, northing, alt, *grid
+
+    @classmethod
+    def check(cls, place: Place, given: dict[str, Any]) -> None:
+        """Raise ValueInvalid for what is out of UTM's reach."""
+        mercator.check_grid(given[ZONE] if place.zone is None else place.zone, given["easting"], given["northing"])
+
+    @classmethod
+    def check_result(cls, place: Place, x: float, y: float, z: float) -> None:
+        """Raise ValueInvalid for what is out of UTM's reach."""
+        earth.check_ecef(x, y, z)
+        _check_zone(place, x, y, z)
+
+    @staticmethod
+    def entry(own: dict[str, Any]) -> dict[str, Any]:
+        """Return them below `utm`, the zone as the word that it stands for."""
+        zone = own[ZONE]
+        return {UTM: own | {ZONE: zone if zone == SAMPLE else mercator.ZONES[int(zone)]}}
+
+
+class Ecef(Kernels):
+    """The Earth's frame itself."""
+
+    axes = ECEF
+    is_angular = False
+    is_nested = True
+
+    @classmethod
+    def to_ecef(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:  # noqa: ARG003
+        """Return them as they are."""
+        return tuple(given[axis] for axis in "xyz")
+
+    @classmethod
+    def from_ecef(cls, place: Place, xyz: Components, xp: Namespace) -> Components:  # noqa: ARG003
+        """Return them as they are."""
+        return xyz
+
+    @staticmethod
+    def entry(own: dict[str, Any]) -> dict[str, Any]:
+        """Return them as a list below `ecef`."""
+        return {ECEF: [*own.values()]}
+
+
+class Local(Kernels):
+    """Axes at the origin, east, north, up or north, east, down; what is not there is 0."""
+
+    is_angular = False
+
+    @classmethod
+    def to_ecef(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:  # noqa: ARG003
+        """Return the position in ECEF."""
+        zero = next(iter(given.values())) * 0.0
+        return rigid.apply(*_origin(place).pose(place.name), *(given.get(n, zero) for n in POSITIONS[place.name].names))
+
+    @classmethod
+    def from_ecef(cls, place: Place, xyz: Components, xp: Namespace) -> Components:  # noqa: ARG003
+        """Return the position seen from the origin."""
+        return earth.seen_from(*_origin(place).pose(place.name), *xyz)
+
+
+def _origin(place: Place) -> Origin:
+    if place.origin is None:
+        raise ValueInvalid(f"{place.name} needs an origin")
+    return place.origin
+
+
+@cache
+def kernels(name: str) -> type[Kernels]:
+    """Return the arithmetic of a row of POSITIONS."""
+    module, _, found = POSITIONS[name].kernels.partition(":")
+    return getattr(import_module(module), found)  # type: ignore[no-any-return]
+
+
+def _height(given: dict[str, Any], other: Any) -> Any:
+    """Return the height above the ellipsoid, 0 where none is given."""
+    return given["msl"] + given["undulation"] if "msl" in given else given.get("alt", other - other)
+
+
+def _as_read(own: Any, made: Any, xp: Namespace) -> Any:
+    """Return a number as it was read where it is the one that was computed, but for rounding."""
+    return made if own is None else xp.where(abs(own - made) <= ROUNDING, own, made)
+
+
+def _check_zone(place: Place, x: float, y: float, z: float) -> None:
+    """Raise ValueInvalid for a position in ECEF beyond UTM, or beyond the zone that is held."""
+    lat, lon, _ = earth.lla(x, y, z, floats)
+    mercator.check_utm(_held(place.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
 
 class Earth(NamedTuple):

@@ -90,7 +90,7 @@ class Representation:
     alone: columns that say the last number where the others are missing and 0
     batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
     overview: the units in which an overview shows it ("" for no unit)
-    is_place: it says a position on the Earth and no rotation; `geometry.place` has its arithmetic
+    is_place: it says a position on the Earth and no rotation: a row of POSITIONS
     """
 
     __slots__ = (
@@ -177,6 +177,17 @@ class Representation:
             shown = " ".join(f"{value:g}" for value in components)
             raise ValueInvalid(f"{self.name} {shown} is not finite; give finite numbers", rule="not-finite")
         return tuple(components)
+
+
+class Position(Representation):
+    """One way to write positions on the Earth; `kernels` is the `module:Class` of its arithmetic, a `place.Kernels`."""
+
+    __slots__ = ("kernels",)
+
+    def __init__(self, columns: str, summary: str, kernels: str, names: str = "") -> None:
+        """Describe it; its numbers are called as its columns where `names` does not say otherwise."""
+        super().__init__(columns, (), summary, names=names or columns)
+        self.kernels = kernels
 
 
 def _arithmetic(kernel: Callable[..., Components]) -> Callable[..., Components]:
@@ -305,16 +316,23 @@ REPRESENTATIONS: dict[str, Representation] = {
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
         batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
     ),
-    "lla": Representation("lat lon alt", (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
-                          names="lat lon alt"),
-    "ecef": Representation("ecef_x ecef_y ecef_z", (), "the Earth's frame: x to lat 0 lon 0, z to the north pole"),
-    "utm": Representation("utm_zone easting northing alt", (), "UTM, a zone as 32N or 32S and metres",
-                          names="zone easting northing alt"),
-    "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up"),
-    "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down"),
+}  # fmt: skip
+PLACE = "frametool.geometry.place"
+POSITIONS: dict[str, Position] = {
+    "lla": Position("lat lon alt", "WGS84 latitude, longitude (degrees), metres above the ellipsoid", f"{PLACE}:Lla"),
+    "ecef": Position(
+        "ecef_x ecef_y ecef_z", "the Earth's frame: x to lat 0 lon 0, z to the north pole", f"{PLACE}:Ecef", "x y z"
+    ),
+    "utm": Position(
+        "utm_zone easting northing alt", "UTM, a zone as 32N or 32S and metres", f"{PLACE}:Utm",
+        "zone easting northing alt",
+    ),
+    "enu": Position("east north up", "metres east, north, up of --origin", f"{PLACE}:Local"),
+    "ned": Position("north east down", "metres north, east, down of --origin", f"{PLACE}:Local"),
 }  # fmt: skip
 EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
-ROTATIONS = {_name: _row for _name, _row in REPRESENTATIONS.items() if not _row.is_place}
+ROTATIONS = {**REPRESENTATIONS}
+REPRESENTATIONS |= POSITIONS
 for _name, _row in REPRESENTATIONS.items():
     _row.name = _name
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Number, Rigid
 
-
     Entries: TypeAlias = Sequence[Any]
     Rows: TypeAlias = list[list[Any]]
 
@@ -41,9 +40,14 @@ def propagate(jacobian: Rows, entries: Entries) -> Components:
     whole = np.stack(np.broadcast_arrays(*flat, *entries), axis=-1)
     side = len(jacobian[0])
     j, a = (part.reshape(*whole.shape[:-1], -1, side) for part in np.split(whole, [len(flat)], axis=-1))
-    found = j @ a @ np.swapaxes(j, -1, -2)
+    found = _product(_product(j, a), np.swapaxes(j, -1, -2))
     rows = found.tolist() if found.ndim == 2 else np.moveaxis(found, (-2, -1), (0, 1))
     return symmetric([number for row in rows for number in row])
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Multiply matrices, each sum in its order: BLAS has another one on every processor."""
+    return sum(a[..., :, at, None] * b[..., None, at, :] for at in range(a.shape[-1]))  # type: ignore[return-value]
 
 
 def propagate_compose(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | None) -> Components | None:
@@ -53,9 +57,13 @@ def propagate_compose(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | 
 
 
 def propagate_inverse(pose: Rigid, entries: Entries) -> Components:
-    """Return the covariance of b_from_a of that of a_from_b: R' J A J' R, J the adjoint of -t."""
+    """Return the covariance of b_from_a of that of a_from_b: J A J', J = [R', R'[t]x; 0, R']."""
     x, y, z, *rotation = pose
-    return rotate_covariance(propagate(adjoint(-x, -y, -z), entries), *quaternion.conjugate(*rotation))
+    back = quaternion.conjugate(*rotation)
+    crossed = [quaternion.rotate(*back, *each) for each in ((x - x, z, -y), (-z, x - x, x), (y, -x, x - x))]
+    rows = _rows(*back)
+    upper = [row + list(beside) for row, beside in zip(rows, zip(*crossed, strict=True), strict=True)]
+    return propagate(upper + [[0.0] * 3 + row for row in rows], entries)
 
 
 def of_point(pose: Rigid, entries: Entries | None, point: Components, of_point: Entries | None) -> Components | None:
@@ -79,11 +87,14 @@ def adjoint(x: Number, y: Number, z: Number) -> Rows:
 
 def rotate_covariance(entries: Entries, x: Number, y: Number, z: Number, w: Number) -> Components:
     """Return each 3 x 3 block C as R C R'."""
-    nine = quaternion.to_matrix(x, y, z, w)
-    rows = [list(nine[at : at + 3]) for at in (0, 3, 6)]
-    zeros = [0.0] * 3
+    rows, zeros = _rows(x, y, z, w), [0.0] * 3
     whole = rows if len(entries) == POINT else [row + zeros for row in rows] + [zeros + row for row in rows]
     return propagate(whole, entries)
+
+
+def _rows(x: Number, y: Number, z: Number, w: Number) -> Rows:
+    nine = quaternion.to_matrix(x, y, z, w)
+    return [list(nine[at : at + 3]) for at in (0, 3, 6)]
 
 
 def of_moved(move: Callable[..., Components], pose: Rigid, entries: Entries) -> Components:
@@ -149,7 +160,7 @@ def problems(rows: Array) -> dict[int, str]:
     whole = np.where(np.isfinite(rows).all(axis=1)[:, None], rows, 0.0).reshape(-1, side, side)
     roots = np.sqrt(abs(np.diagonal(whole, axis1=1, axis2=2)))
     skewed: Any = abs(whole - whole.swapaxes(1, 2)) > ASYMMETRY * roots[:, :, None] * roots[:, None, :]
-    wrong = skewed.any((1, 2)) | (whole[:, 0, 0] == UNKNOWN)
+    wrong: Any = skewed.any((1, 2)) | (whole[:, 0, 0] == UNKNOWN)
     values = np.linalg.eigvalsh(np.where(wrong[:, None, None], 0.0, whole))
     found = {}
     for row in np.flatnonzero(wrong | (values[:, 0] < -NEGATIVE * abs(values[:, -1]))).tolist():

@@ -39,6 +39,11 @@ PLACE_KEYS = frozenset((
 ))  # fmt: skip
 FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 EARTH_FRAMES = representations.EARTH_FRAMES
+# the positions whose keys and columns are just their names and numbers: ours have readers of their own
+FLAT = {
+    name: row.names for name, row in representations.POSITIONS.items()
+    if not row.kernels.startswith(representations.PLACE)
+}  # fmt: skip
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -87,7 +92,7 @@ def _is_known(name: str) -> bool:
 
 def may_be_on_earth(name: str) -> bool:
     """Tell whether a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
-    return re.search(_EARTH, name) is not None
+    return re.search(_EARTH, name) is not None or any(name in names for names in FLAT.values())
 
 
 def may_be_uncertain(name: str) -> bool:

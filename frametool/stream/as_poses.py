@@ -26,7 +26,7 @@ from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
 from frametool.stream.header import listed
-from frametool.stream.row_layout import AS_READ, POINT, POSE, Shape, Target
+from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
@@ -125,7 +125,8 @@ class FormatConverter:
             return []
         from frametool.stream.earth_columns import zone_notes
 
-        numbers = place.numbers(*(np.ascontiguousarray(poses.numbers[there, at]) for at in range(3)))
+        x, y, z = (np.ascontiguousarray(poses.numbers[there, at]) for at in range(3))
+        numbers = place.numbers(x, y, z)
         return zone_notes(place, numbers, lambda row: int(poses.lines[there[row]]))
 
     def _settle(self, shape: Shape, plan: Plan, columns: str, line: int = 0) -> None:
@@ -154,7 +155,7 @@ class FormatConverter:
             poses = rows.of_block(text)
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            poses = self._with_place(poses, lambda: [*rows.given])
+            poses = self._with_place(poses, lambda count: [*rows.given[:count]])
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
             if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
@@ -200,8 +201,7 @@ class FormatConverter:
         yield Step(rows.poses(opened.nothing()), Outcome(b""))
         for batch in opened.batches():
             poses = rows.poses(batch)
-            numbers = partial(_numbers_of, batch, rows.layout.places, poses.lines)
-            poses = self._with_place(poses, numbers)
+            poses = self._with_place(poses, partial(_numbers_of, batch, rows.layout.places, poses.lines))
             if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
@@ -213,12 +213,13 @@ class FormatConverter:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.form} has no place for them")
 
-    def _with_place(self, poses: RowPoses, numbers: Callable[[], Sequence[Any]]) -> RowPoses:
+    def _with_place(self, poses: RowPoses, numbers: Callable[[int], Sequence[Any]]) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        if not is_recording(self.style.form) or self.shape.place is None:
+        if not (is_recording(self.style.form) or self.style.place) or self.shape.place is None:
             return poses
-        read = self.request.operation.place_as_read(self.shape, numbers())
-        return poses._replace(extras={**poses.extras, AS_READ: np.column_stack(read)}) if read else poses
+        operation = self.request.operation
+        read = operation.place_as_read(self.shape, numbers) if operation.keeps_frames else ()
+        return poses._replace(read=np.column_stack(read)) if read else poses
 
     # --- forms that list poses ---
 
@@ -258,9 +259,9 @@ class FormatConverter:
             faults.clear()
 
 
-def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints) -> list[Floats]:
-    """Return some columns of a batch in some of its rows."""
-    return [batch.numbers(place).values[rows] for place in places]
+def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints, count: int) -> list[Floats]:
+    """Return the first columns of some in some rows of a batch."""
+    return [batch.numbers(place).values[rows] for place in places[:count]]
 
 
 def _none() -> RowPoses:

@@ -106,8 +106,9 @@ def move(shape: Shape, own: Components, beside: Components, mover: Components, *
         found = carry(pose, mover[EXACT:], own, beside[:size] or None)
         return (*moved, *(found or ()), *beside[size:])
     for size in shape.covariance:
-        by = MOVERS[kind] if kind in (TWIST, WRENCH) else None
-        own_covariance = beside[:size]
-        turned = uncertainty.of_moved(by, pose, own_covariance) if by else uncertainty.rotate_covariance(own_covariance, *pose[3:])
+        if kind in (TWIST, WRENCH):
+            turned = uncertainty.of_moved(MOVERS[kind], pose, beside[:size])
+        else:
+            turned = uncertainty.rotate_covariance(beside[:size], *pose[3:])
         moved, beside = (*moved, *turned), beside[size:]
     return (*moved, *beside)

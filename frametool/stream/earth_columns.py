@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.geometry.earth import AXES as AXES_AT
-from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place
-from frametool.geometry.representations import HEADING, REPRESENTATIONS, Notation
+from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, UNSAID, UTM, ZONE, Earth, Place, kernels
+from frametool.geometry.representations import HEADING, POSITIONS, Notation
 from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 from frametool.geometry.transverse_mercator import zone_number
-from frametool.grammar.names import FIX, PARENT_COLUMNS, may_be_on_earth
+from frametool.grammar.names import FIX, FLAT, PARENT_COLUMNS, may_be_on_earth
 from frametool.grammar.place import (
     GEOID,
     NO_ALT,
@@ -47,11 +47,11 @@ if TYPE_CHECKING:
 
     Reader: TypeAlias = Callable[[str], float]
 
-ECEF_COLUMNS = REPRESENTATIONS[ECEF].columns
+ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
 OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES,
           STATUS, DATUM, EPSG, PARENT)  # fmt: skip
-FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for name in OTHERS}
+FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
     r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
@@ -86,7 +86,7 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
     found = [
         (prefix, columns)
         for prefix, spots in groups.items()
-        for kind in ((given,) if given else (LLA, ECEF, UTM, ENU, NED))
+        for kind in ((given,) if given else POSITIONS)
         if (columns := _position(kind, spots, groups, earth)) is not None
     ]
     if not found:
@@ -108,6 +108,9 @@ def _position(
         return _columns(kind, axes, spots, earth) if len(axes) == 3 else None
     if kind in LOCAL:
         return _local(kind, spots, earth)
+    if kind in FLAT:
+        there = [(name, spots[name]) for name in FLAT[kind] if name in spots]
+        return _columns(kind, there, spots, earth) if len(there) == len(FLAT[kind]) else None
     fields: list[tuple[str, NamedColumn]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
     if kind == UTM:
         zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE) or spots.get(EPSG)
@@ -125,7 +128,7 @@ def _position(
 
 def _local(kind: str, spots: dict[str, NamedColumn], earth: Earth) -> Columns | None:
     """Return the columns of local axes, where an origin says of which; without one they are other data."""
-    wanted = REPRESENTATIONS[kind].names
+    wanted = POSITIONS[kind].names
     if earth.origin is None or wanted[2] not in spots:
         return None
     there = [(name, spots[name]) for name in wanted if name in spots]
@@ -182,8 +185,8 @@ def chosen(places: Sequence[int], names: Sequence[str], kind: str, earth: Earth)
 
     Raises ValueInvalid for a count that it does not have.
     """
-    fields = REPRESENTATIONS[kind].names
-    least = {LLA: 2, UTM: 3}.get(kind, 3)
+    fields = POSITIONS[kind].names
+    least = kernels(kind).least or len(fields)
     if kind == UTM and earth.zone is not None:
         fields, least = fields[1:], 2
     if not least <= len(places) <= len(fields):
@@ -256,7 +259,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     numbers = {name: at for at, name in reversed([*enumerate(names or ())])}
     places = [at for word in spec.split(",") for at in places_named(word.strip(), numbers, width)]
     called = names or [f"column {at + 1}" for at in range(width)]
-    most = len(REPRESENTATIONS[request.given_place].names) - (
+    most = len(POSITIONS[request.given_place].names) - (
         request.given_place == UTM and request.earth is not None and request.earth.zone is not None
     )
     try:
@@ -273,7 +276,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 def of_width(width: int, request: Request) -> str:
     """Say which columns of a table without names are a place: all of them, or those behind a stamp."""
-    fields = len(REPRESENTATIONS[request.given_place].names)
+    fields = len(POSITIONS[request.given_place].names)
     fields -= request.given_place == UTM and request.earth is not None and request.earth.zone is not None
     return f"2-{width}" if width == fields + 1 else f"1-{width}"
 

@@ -284,6 +284,8 @@ class Run:
 
     def _constant_too(self, parts: Components) -> Components:
         """Repeat what an expression makes of no row as often as there are rows."""
+        if self.plan.operation.formula is None:
+            return parts
         return tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
 
     def _times(self, at: int) -> Ints:

@@ -21,7 +21,7 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault
 from frametool.stream.header import listed
 from frametool.stream.layout import NAMED, Kept
-from frametool.stream.row_layout import PARTS, POSE, Shape
+from frametool.stream.row_layout import AS_READ, PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.geometry.place import Place
+    from frametool.geometry.place import Place, Spot
+    from frametool.geometry.types import Components
     from frametool.stream.faults import RowNote
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
@@ -57,6 +58,7 @@ class RowPoses(NamedTuple):
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
     given: the frames that the rows of the input are given in
+    read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
     """
 
     numbers: Floats
@@ -66,6 +68,25 @@ class RowPoses(NamedTuple):
     names: Sequence[str | None]
     extras: Mapping[str, Cells]
     given: Sequence[str | None] = ()
+    read: Floats | None = None
+
+    def spot(self, row: int) -> Spot | None:
+        """Return the place that a row was read as."""
+        return None if self.read is None else _spot(tuple(self.read[row].tolist()))
+
+    def unmoved(self, parts: Components) -> Components:
+        """Return the components of the rows with what they were read as, if it is known."""
+        if self.read is None:
+            return parts
+        from frametool.geometry.place import Unmoved
+
+        return Unmoved(parts, _spot(tuple(np.ascontiguousarray(self.read.T))))
+
+
+def _spot(lla: Components) -> Spot:
+    from frametool.geometry.place import LLA, Place, Spot
+
+    return Spot(Place(LLA, ("lat", "lon", "alt")), lla)
 
 
 class TablePoses:
@@ -199,6 +220,7 @@ def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
         numbers=block.numbers[rows],
         stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
         lines=block.lines[rows],
+        read=None if block.read is None else block.read[rows],
         parents=parents,
         names=names,
         extras={name: cells_at(each, rows) for name, each in block.extras.items()},
@@ -265,12 +287,14 @@ def _block(
     """Return results as a block, with what else each of them says."""
     stamps = [other.get("stamp_ns") for other in others]
     is_stamped = bool(stamps) and all(type(stamp) is int for stamp in stamps)
-    used = {"stamp_ns"} if is_stamped else set[str]()
+    used = {AS_READ, *["stamp_ns"] * is_stamped}
+    read = [other[AS_READ] for other in others if AS_READ in other]
     keys = dict.fromkeys(key for other in others for key in other if key not in used)
     parents, names = (each[:1] if len(set(each)) == 1 else each for each in (parents, names))
     return RowPoses(
         numbers, np.array(stamps, np.int64) if is_stamped else None, np.arange(len(numbers)), parents, names,
         {key: objects([other.get(key) for other in others]) for key in keys},
+        read=np.array(read, np.float64) if read and len(read) == len(others) else None,
     )  # fmt: skip
 
 
@@ -303,6 +327,7 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
         if stamps is not None:
             said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
         said |= {name: texts[at] for name, texts in others.items()}
+        pose = pose._replace(read=block.spot(at))
         made.append((NoResult if numbers is null else Result)(pose if placed else pose._replace(position=None), said))
     return made
 
@@ -323,7 +348,7 @@ def points_of(
         if place is not None and not is_null:
             from frametool.grammar.place import point_entry
 
-            own, named = point_entry(frames[at], numbers[:size], place), {}
+            own, named = point_entry(frames[at], numbers[:size], place, block.spot(at)), {}
         else:
             own = spelled(kind, None if is_null else numbers[:size])
         own |= with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[size:], strict=True)))
