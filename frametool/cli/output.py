@@ -79,6 +79,8 @@ class Output:
             from frametool.cli.earth import places_of
 
             notations, place = places_of(notations or ())
+        if settings().origin == "first" and not (place and place.is_local):
+            raise UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
         self.notations = notations or ()
         self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")

@@ -106,10 +106,12 @@ class Place(NamedTuple):
 
     @classmethod
     def of_xyz(cls, name: str, said: Earth) -> Place | None:
-        """Return what x, y, z are in ecef, or in the local axes of the origin; None of a name that has none.
+        """Return what x, y, z are in ecef, in the zone that is held, or in the local axes of the origin; else None.
 
         Raises ValueInvalid for local axes without an origin.
         """
+        if name == UTM and said.zone is not None:
+            return cls(name, POSITIONS[name].names[1:], said.axes, said.zone)
         if name not in (ECEF, *LOCAL):
             return None
         if name in LOCAL and said.origin is None:
@@ -120,6 +122,11 @@ class Place(NamedTuple):
     def size(self) -> int:
         """Count its numbers."""
         return len(self.fields) + sum(each.size for each in self.more)
+
+    @property
+    def is_local(self) -> bool:
+        """Return True if one of the ways it is written in has an origin."""
+        return any(each.origin is not None for each in (self, *self.more))
 
     @property
     def sample(self) -> tuple[float, ...]:

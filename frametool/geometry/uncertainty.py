@@ -157,7 +157,7 @@ def problems(rows: Array) -> dict[int, str]:
     import numpy as np
 
     side = round(rows.shape[1] ** 0.5)
-    whole = np.where(np.isfinite(rows).all(axis=1)[:, None], rows, 0.0).reshape(-1, side, side)
+    whole = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, 0.0).reshape(-1, side, side)
     roots = np.sqrt(abs(np.diagonal(whole, axis1=1, axis2=2)))
     skewed: Any = abs(whole - whole.swapaxes(1, 2)) > ASYMMETRY * roots[:, :, None] * roots[:, None, :]
     wrong: Any = skewed.any((1, 2)) | (whole[:, 0, 0] == UNKNOWN)

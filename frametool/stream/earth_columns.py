@@ -16,7 +16,7 @@ from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, UNSAID, UTM, Z
 from frametool.geometry.representations import HEADING, POSITIONS, Notation
 from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 from frametool.geometry.transverse_mercator import zone_number
-from frametool.grammar.names import FIX, FLAT, PARENT_COLUMNS, may_be_on_earth
+from frametool.grammar.names import FIX, FLAT, PARENT_COLUMNS, may_be_on_earth, may_be_uncertain
 from frametool.grammar.place import (
     GEOID,
     NO_ALT,
@@ -32,8 +32,8 @@ from frametool.grammar.place import (
     zone_of_epsg,
 )
 from frametool.stream.faults import ZONES, Misused, RowNote
-from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, places_named
-from frametool.stream.row_layout import POINT, VECTOR
+from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
+from frametool.stream.row_layout import POINT, VECTOR, place_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -221,8 +221,8 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
         found = find(names, earth, given)
         if found is None and (place := Place.of_xyz(given, earth)) and (positions := find_positions(header)):
             found = PoseColumns(positions[0]._replace(unit=place), None)
-        if found is None and not given and (half := _half(names)):
-            raise ValueInvalid(half)  # noqa: TRY301 - so that it gets its place as others do
+        if problem := _problem(found, names, request):
+            raise ValueInvalid(problem)  # noqa: TRY301 - so that it gets its place as others do
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     if found is None or found.position is None:
@@ -236,6 +236,21 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     if found.rotation is None and (name := unsaid_heading(names)) and not turned:
         warn(f"{source}: {shown(name)} has no unit and stays data; name it heading_deg")
     return PoseColumns(found.position, found.rotation or next(iter(turned), None))
+
+
+def _problem(found: PoseColumns | None, names: Sequence[str], request: Request) -> str:
+    """Say why what --from asks for, or a place that is there by half, cannot be read; "" where all is well."""
+    given = request.given_place
+    if found is None:
+        row = POSITIONS.get(given)
+        missing = row and f"no columns of {given} ({' '.join(row.columns)}) among: {listed(names)}"
+        return f"{missing}; name them with --columns" if missing else _half(names)
+    place = place_of(found.position.unit) if found.position else None
+    is_held = request.earth is not None and request.earth.zone is not None
+    asked = [each.name for each in (request.place, *request.place.more)] if request.place else []
+    if is_held and given == UTM and place and ZONE in place.fields and UTM not in asked:
+        return "--zone has no effect: each row says its zone"
+    return ""
 
 
 def _half(names: Iterable[str]) -> str:
@@ -365,7 +380,9 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
     return [RowNote(line_of(row), "band-s", band_s(float(zone[row]), float(northing[row])), ZONE) for row in rows]
 
 
-def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tuple[Request, tuple[Shape, ...]]:
+def check_rows(
+    request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str
+) -> tuple[Request, tuple[Shape, ...]]:
     """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
 
     Raises FormatError for a rotation whose axes nobody says.
@@ -385,6 +402,9 @@ def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tupl
         bare = shape.notation is None and all(form.representation.name == "quaternion" for form in request.notations)
         request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
     if shape.notation is None and not (request.operation.inverse or request.operation.similar):
+        has_idle_axes = request.earth and request.earth.axes and request.operation.keeps_frames
+        if has_idle_axes and not (request.all_numbers or any(map(may_be_uncertain, names))):
+            raise Misused("--local-axes has no effect: the rows have no rotation")
         return request, shapes
     if shape.notation is None or not (place.axes or AXES in place.fields):
         raise FormatError(UNSAID, source=source, line=1)

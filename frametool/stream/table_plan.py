@@ -60,7 +60,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     if on_earth:
         from frametool.stream.earth_columns import check_rows, readers_of
 
-        request, shapes = check_rows(request, shapes, source)
+        request, shapes = check_rows(request, shapes, table.names or (), source)
     if request.place is not None and (request.operation.moves or not on_earth):
         from frametool.stream.earth_columns import refuse_elsewhere
 
