@@ -295,7 +295,6 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
         if key not in OURS and not is_sigma(key) and (hint := did_you_mean(key, MISSPELT, cutoff=0.75)):
             raise Misfit(f"unknown key {shown(key)}{hint}", (*path, key), key=True)
     plain = {key: each for key, each in row.items() if key not in (CHILD, "id", "children")}
-    plain = within(path, _with_columns, plain, request)
     for record in find_records(plain, request, reading, path):
         if not record.values:
             raise Misfit(f"no pose; {LIKE}", path)
@@ -305,21 +304,6 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
         made = _made(pose, reading.bare(pose.parent or ""), reading.bare(child), label)
         own = record.values[: record.shape.own_size]
         yield record, made._replace(written=None if record.shape.inverse else _written(record.shape, own))
-
-
-def _with_columns(row: dict[str, Any], request: Request) -> dict[str, Any]:
-    """Return a row with the covariance that its keys say which are called as columns: sigma_x, c11."""
-    names = [key for key in row if is_sigma(key) or key in columns()]
-    places, sigma = find_columns(names, 36)
-    if not places:
-        return row
-    numbers = [within((name,), read_number, row.pop(name)) for name in names]
-    if sigma:
-        units = [(at, unit or "deg" * (request.degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma)]
-        numbers = [*of_sigmas([in_unit(numbers[places[at]], unit) if at >= 0 else 0.0 for at, unit in units])]
-    if not COVARIANCE_KEYS.isdisjoint(row):
-        raise Misfit("sigma and covariance in one row; keep one")
-    return row | {"covariance": [repr(number) for number in numbers]}
 
 
 def _one_child(child: Any, name: str | None) -> str:
