@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
-from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -29,7 +28,7 @@ from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, notes_of
+from frametool.stream.run import Outcome, notes_of, run
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
 from frametool.stream.writers import LEARNED
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.block_writer import BlockWriter
+    from frametool.stream.faults import BadRows
     from frametool.stream.request import Request
     from frametool.text.spans import Floats, Ints
 
@@ -108,6 +108,21 @@ class FormatConverter:
             return self._rows(stream, header=header)
         return self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
 
+    def gathered(self, stream: BufferedReader, bad: BadRows) -> list[tuple[RowPoses, Ints]]:
+        """Return the results of all blocks that have some, and the lines of their rows; bad rows go to `bad`."""
+        found: list[tuple[RowPoses, Ints]] = []
+
+        def outcomes() -> Iterator[Outcome]:
+            line = int(self.is_table)  # what lists poses says itself where they stand
+            for poses, outcome in self.steps(stream):
+                if len(poses.numbers):
+                    found.append((poses, poses.lines + line))
+                line += outcome.lines
+                yield outcome
+
+        run(outcomes(), lambda _: None, bad, lambda *_: None)
+        return found
+
     def _writer(self) -> BlockWriter:
         """Choose what writes the results, by what they are."""
         operation = self.request.operation
@@ -148,14 +163,12 @@ class FormatConverter:
         request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
         self._settle(rows.shape, rows.plan, rows.columns, line=1)
-        count = 0
+        count = before = mended = 0
         yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
-        for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
-            before, mended = rows.rows, rows.mended
-            poses = rows.of_block(text)
+        for block, _, text in rows.blocks(begun):
+            poses = self._with_place(block, lambda size: [*rows.given[:size]])
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            poses = self._with_place(poses, lambda count: [*rows.given[:count]])
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
             if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
@@ -167,6 +180,7 @@ class FormatConverter:
                     b"", rows.faults, rows.rows - before, text.count(b"\n"), rows.mended - mended, rows.notes, len(text)
                 ),
             )
+            before, mended = rows.rows, rows.mended
         if self.stamps:
             self.stamps.finish(count, self.source)
         if is_trajectory(self.form):
@@ -242,20 +256,20 @@ class FormatConverter:
         rename = rename_of(request) or (lambda parent, name: (parent, name))
         for each in blocks(self.module.poses(file, options), form, file, options, named=False):
             block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
-            run = Run(plan, block, state)
-            good = run.rows.tolist()
+            done = Run(plan, block, state)
+            good = done.rows.tolist()
             images = [each.images[row] for row in good]
             extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
             if self.form == self.style.form:
                 extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
-            lines = np.array(each.lines, np.int64)[run.rows]
+            lines = np.array(each.lines, np.int64)[done.rows]
             own = each.names[0] is not None
             pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
-            stamps = None if own or block.times is None else block.times[run.rows]
-            poses = RowPoses(run.results, self._held(stamps, form), lines, parents, names, extras)
-            found = sorted(faults + run.faults())
-            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
+            stamps = None if own or block.times is None else block.times[done.rows]
+            poses = RowPoses(done.results, self._held(stamps, form), lines, parents, names, extras)
+            found = sorted(faults + done.faults())
+            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block)))
             faults.clear()
 
 

@@ -21,10 +21,10 @@ from frametool.formats.load import EdgePlace, close_all, lines_of
 from frametool.formats.trees.tree_reader import read_edges, shown_keys
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.grammar.covariance import AXES, columns, find_columns, in_unit, is_sigma, of_sigmas
+from frametool.grammar.covariance import AXES, columns, is_sigma
 from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
-from frametool.grammar.readers import Misfit, Reading, kind, read_number, tell, within
+from frametool.grammar.readers import Misfit, Reading, kind, tell, within
 from frametool.stream.record import INNER, KNOWN, find_records, placed, value_at
 from frametool.stream.record_values import pose_of, stamp_of
 from frametool.stream.request import COMBINED, Operation, Request
@@ -204,10 +204,9 @@ def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
     rows = TablePoses(begun, file.form, request, file.name)
     if rows.shape.notation is None:
         raise FormatError(f"no rotation among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
-    line, bare = 1 + begun.lines, file.tally.names.bare
+    bare = file.tally.names.bare
     has_place = rows.shape.whole or rows.shape.unit is not None
-    for text in filter(None, (begun.rest, *begun.blocks)):
-        block = rows.of_block(text)
+    for block, line, _ in rows.blocks(begun):
         for below, column, reason, *_ in rows.faults:
             raise FormatError(f"{column}{': ' * bool(column)}{reason}", source=file.name, line=line + below)
         results = results_of(block, columns() if rows.shape.covariance else (), placed=has_place)
@@ -222,7 +221,6 @@ def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
             made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
             written = None if inverse else _written(rows.shape, given)
             yield MeasuredRow(made._replace(written=written), line + at, cells.get("stamp_ns"))
-        line += text.count(b"\n")
     file.tally.rough += [1] * rows.mended
     file.tell()
 

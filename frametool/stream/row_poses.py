@@ -6,6 +6,7 @@ Also turns single results into such blocks and back, and columns of texts into s
 from __future__ import annotations
 
 import re
+from itertools import chain
 from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -32,7 +33,7 @@ from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -134,6 +135,13 @@ class TablePoses:
     def columns(self) -> str:
         """List the columns there are."""
         return listed(self.table.names or ("columns without names",))
+
+    def blocks(self, begun: Begun) -> Iterator[tuple[RowPoses, int, bytes]]:
+        """Yield the poses of all blocks of a table, each with the line, from 1, at which it begins, and its text."""
+        line = 1 + begun.lines
+        for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
+            yield self.of_block(text), line, text
+            line += text.count(b"\n")
 
     def of_block(self, text: bytes) -> RowPoses:
         """Return the poses of a block, and leave what is wrong with other rows in `faults`."""

@@ -7,7 +7,7 @@ parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that stand still
 
 from __future__ import annotations
 
-from itertools import chain, groupby
+from itertools import groupby
 from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
@@ -46,13 +46,12 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     rows = TablePoses(begun, file.form, request, file.name)
     _check(rows, form, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
-    line, count = 1 + begun.lines, 0
-    for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
-        block = rows.of_block(text)
+    count = 0
+    for block, line, _ in rows.blocks(begun):
         for fault in rows.faults:
             options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
         yield from _pieces(block, _times(block, stamps, form, count), line, form, options)
-        line, count = line + text.count(b"\n"), count + len(block.numbers)
+        count += len(block.numbers)
     if stamps:
         stamps.finish(count, file.name)
     _tell(rows, form, options, count)

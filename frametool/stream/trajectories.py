@@ -28,12 +28,11 @@ from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
 from frametool.stream.record_results import stream_results
 from frametool.stream.request import Operation, Request
-from frametool.stream.run import Outcome, run
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
     from io import BufferedReader
     from os import PathLike
 
@@ -206,36 +205,25 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     own = answers if counts or form == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(form, request, Style("tum"), file.name, own)
-    numbers: list[Any] = []
-    stamps: list[Any] = []
-    lines: list[Any] = []
-    before = [int(converter.is_table)]  # what lists poses says itself where they stand
-    named: set[tuple[str | None, str | None]] = set()
-
-    def gathered() -> Iterator[Outcome]:
-        for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
-            before.append(before[-1] + outcome.lines)
-            if len(poses.numbers):
-                lines.append(poses.lines + before[-2])
-                numbers.append(poses.numbers)
-                stamps.append(poses.stamps_ns)
-                named.update(zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True))
-            yield outcome
-
-    run(gathered(), lambda _: None, bad, lambda *_: None)
-    if not numbers:
+    blocks = converter.gathered(cast("BufferedReader", file.stream), bad)
+    if not blocks:
         raise FormatError("no poses in it", source=file.name)
+    named = {
+        pair for poses, _ in blocks
+        for pair in zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True)
+    }  # fmt: skip
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
         raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
-    columns = np.concatenate(numbers)
+    columns = np.concatenate([poses.numbers for poses, _ in blocks])
     if columns.shape[1] not in (POSITION, 7):
         raise FormatError("rotations without positions are no trajectory", source=file.name)
     world, body = own.names(WORLD, BODY)
     parent, name = named.pop()
-    times: Any = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
+    stamps: Any = [poses.stamps_ns for poses, _ in blocks]
+    times = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
-    at = None if "arrays" in FORMATS[form].reads else np.concatenate(lines)
+    at = None if "arrays" in FORMATS[form].reads else np.concatenate([lines for _, lines in blocks])
     return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
 
 
