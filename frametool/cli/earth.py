@@ -13,7 +13,7 @@ from frametool.cli.group import settings
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
-from frametool.geometry.place import Earth, Origin, Place, Utm, kernels
+from frametool.geometry.place import UTM, Earth, Origin, Place, kernels
 from frametool.geometry.representations import POSITIONS
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.place import read_at
@@ -81,7 +81,7 @@ def mapping_of(texts: Sequence[str], name: str) -> str:
     from frametool.documents.json import dump
 
     row, arithmetic = POSITIONS[name], kernels(name)
-    zoned = arithmetic is Utm and len(texts) == 3 and earth().zone is not None
+    zoned = name == UTM and len(texts) == 3 and earth().zone is not None
     fields = row.names[zoned:]
     if not (arithmetic.least or len(fields)) - zoned <= len(texts) <= len(fields):
         raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")

@@ -160,11 +160,15 @@ class Place(NamedTuple):
 
     def lla(self, numbers: Sequence[Any]) -> Components:
         """Return lat, lon in degrees and alt of its numbers."""
-        return kernels(self.name).to_lla(self, self.given(numbers), namespace(numbers))
+        xp, row = namespace(numbers), kernels(self.name)
+        a, b, c = row.read(self, self.given(numbers), xp)
+        return (a, b, c) if row.is_angular else earth.lla(a, b, c, xp)
 
     def ecef(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in ECEF of its numbers; NaN for what is no place, and `check` says why."""
-        return kernels(self.name).to_ecef(self, self.given(numbers), namespace(numbers))
+        xp, row = namespace(numbers), kernels(self.name)
+        a, b, c = row.read(self, self.given(numbers), xp)
+        return earth.ecef(a, b, c, xp) if row.is_angular else (a, b, c)
 
     def given(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers by field."""
@@ -220,7 +224,10 @@ class Place(NamedTuple):
     def check(self, numbers: Sequence[float]) -> None:
         """Raise ValueInvalid unless floats are a place."""
         given = self.given(numbers)
-        kernels(self.name).check(self, given)
+        if self.name == UTM:
+            mercator.check_grid(given[ZONE] if self.zone is None else self.zone, given["easting"], given["northing"])
+        elif kernels(self.name).is_angular:
+            earth.check_lla(*self.lla(numbers))
         if GRID in (self.axes, AXES in given and earth.AXES[int(given[AXES])]):
             lat, lon, _ = self.lla(numbers)
             mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
@@ -250,10 +257,7 @@ class Place(NamedTuple):
                 each.origin.settle(x, y, z)
             if row.is_angular:
                 lla = lla or earth.lla(x, y, z, xp)
-                own = row.from_lla(each, lla, xp)
-            else:
-                own = row.from_ecef(each, (x, y, z), xp)
-            own = own[: len(each.fields)]
+            own = row.write(each, lla if row.is_angular else (x, y, z), xp)[: len(each.fields)]
             if read is not None and (read.place.name, read.place.origin) == (each.name, each.origin):
                 as_read = read.place.given(read.numbers)
                 own = tuple(
@@ -277,13 +281,19 @@ class Place(NamedTuple):
     def check_result(self, x: float, y: float, z: float) -> None:
         """Raise ValueInvalid unless a position in ECEF can be written so."""
         for each in (self, *self.more):
-            kernels(each.name).check_result(each, x, y, z)
-            if each.axes == GRID:
-                _check_zone(each, x, y, z)
+            if kernels(each.name).is_angular:
+                earth.check_ecef(x, y, z)
+            if each.name == UTM or each.axes == GRID:
+                lat, lon, _ = earth.lla(x, y, z, floats)
+                mercator.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers as the keys that a mapping has."""
-        own = kernels(self.name).entry(dict(zip(self.fields, numbers, strict=False)))
+        own = dict(zip(self.fields, numbers, strict=False))
+        if self.name == UTM:
+            own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else mercator.ZONES[int(own[ZONE])]}}
+        elif self.name == ECEF:
+            own = {ECEF: [*own.values()]}
         rest = numbers[len(self.fields) :]
         for each in self.more:
             own |= each.entry(rest)
@@ -310,165 +320,73 @@ class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot b
         return made
 
 
-class Kernels:
-    """The arithmetic of a row of POSITIONS, which has two of the first four functions: to and from lla, or ECEF.
+class Kernels(NamedTuple):
+    """The arithmetic of a row of POSITIONS.
 
-    given: numbers by field; place: the zone and the origin that hold for all
-    axes: of rotations there, where nobody says; is_angular: latitude and longitude say it, without a way through ECEF
-    least: how many of the numbers there must be; is_nested: a mapping has them below its name
+    read: takes a place, its numbers by field and a namespace, and returns lat, lon and alt; or x, y, z in ECEF
+    write: takes the place, these three and a namespace, and returns its numbers
+    is_angular: these are lat, lon, alt, which take no way through ECEF
+    least: how many of the numbers there must be; axes: of rotations there, where nobody says
+    is_nested: a mapping has the numbers below its name
     """
 
-    axes = ENU
-    is_angular = True
-    is_nested = False
+    read: Callable[[Place, dict[str, Any], Namespace], Components]
+    write: Callable[[Place, Components, Namespace], Components]
+    is_angular: bool = True
     least: int | None = None
-
-    @classmethod
-    def to_lla(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:
-        """Return lat, lon in degrees and alt."""
-        x, y, z = cls.to_ecef(place, given, xp)
-        return earth.lla(x, y, z, xp)
-
-    @classmethod
-    def to_ecef(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:
-        """Return x, y, z."""
-        lat, lon, alt = cls.to_lla(place, given, xp)
-        return earth.ecef(lat, lon, alt, xp)
-
-    @classmethod
-    def from_lla(cls, place: Place, lla: Components, xp: Namespace) -> Components:
-        """Return its numbers of a place."""
-        raise NotImplementedError
-
-    @classmethod
-    def from_ecef(cls, place: Place, xyz: Components, xp: Namespace) -> Components:
-        """Return its numbers of a position in ECEF."""
-        raise NotImplementedError
-
-    @classmethod
-    def check(cls, place: Place, given: dict[str, Any]) -> None:
-        """Raise ValueInvalid unless floats are a place."""
-        if cls.is_angular:
-            earth.check_lla(*cls.to_lla(place, given, floats))
-
-    @classmethod
-    def check_result(cls, place: Place, x: float, y: float, z: float) -> None:  # noqa: ARG003 - UTM's is held
-        """Raise ValueInvalid unless a position in ECEF can be written so."""
-        if cls.is_angular:
-            earth.check_ecef(x, y, z)
-
-    @staticmethod
-    def entry(own: dict[str, Any]) -> dict[str, Any]:
-        """Return its numbers as the keys that a mapping has."""
-        return own
+    axes: str = ENU
+    is_nested: bool = False
 
 
-class Lla(Kernels):
-    """Latitude, longitude and the height above the ellipsoid, or above the sea with the geoid's."""
-
-    least = 2
-
-    @classmethod
-    def to_lla(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:  # noqa: ARG003
-        """Return them in degrees."""
-        lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
-        return lat, lon, _height(given, lat)
-
-    @classmethod
-    def from_lla(cls, place: Place, lla: Components, xp: Namespace) -> Components:  # noqa: ARG003
-        """Return them as they are."""
-        return lla
+def _read_lla(_: Place, given: dict[str, Any], _xp: Namespace) -> Components:
+    lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
+    return lat, lon, _height(given, lat)
 
 
-class Utm(Kernels):
-    """Zone, easting, northing and height, and what results say beside them."""
-
-    axes = GRID
-    is_nested = True
-    least = 3
-
-    @classmethod
-    def to_lla(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:
-        """Return the place in a zone."""
-        east = given["easting"]
-        zone = given[ZONE] if place.zone is None else place.zone + (east - east)
-        return *mercator.lat_lon(zone, east, given["northing"], xp), _height(given, east)
-
-    @classmethod
-    def from_lla(cls, place: Place, lla: Components, xp: Namespace) -> Components:
-        """Return them in the zone that is held, or that of each place."""
-        lat, lon, alt = lla
-        zone = _held(place.zone, lat, lon, xp)
-        ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
-        easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
-        return zone, easting, northing, alt, *grid
-
-    @classmethod
-    def check(cls, place: Place, given: dict[str, Any]) -> None:
-        """Raise ValueInvalid for what is out of UTM's reach."""
-        mercator.check_grid(given[ZONE] if place.zone is None else place.zone, given["easting"], given["northing"])
-
-    @classmethod
-    def check_result(cls, place: Place, x: float, y: float, z: float) -> None:
-        """Raise ValueInvalid for what is out of UTM's reach."""
-        earth.check_ecef(x, y, z)
-        _check_zone(place, x, y, z)
-
-    @staticmethod
-    def entry(own: dict[str, Any]) -> dict[str, Any]:
-        """Return them below `utm`, the zone as the word that it stands for."""
-        zone = own[ZONE]
-        return {UTM: own | {ZONE: zone if zone == SAMPLE else mercator.ZONES[int(zone)]}}
+def _read_utm(place: Place, given: dict[str, Any], xp: Namespace) -> Components:
+    east = given["easting"]
+    zone = given[ZONE] if place.zone is None else place.zone + (east - east)
+    return *mercator.lat_lon(zone, east, given["northing"], xp), _height(given, east)
 
 
-class Ecef(Kernels):
-    """The Earth's frame itself."""
-
-    axes = ECEF
-    is_angular = False
-    is_nested = True
-
-    @classmethod
-    def to_ecef(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:  # noqa: ARG003
-        """Return them as they are."""
-        return tuple(given[axis] for axis in "xyz")
-
-    @classmethod
-    def from_ecef(cls, place: Place, xyz: Components, xp: Namespace) -> Components:  # noqa: ARG003
-        """Return them as they are."""
-        return xyz
-
-    @staticmethod
-    def entry(own: dict[str, Any]) -> dict[str, Any]:
-        """Return them as a list below `ecef`."""
-        return {ECEF: [*own.values()]}
+def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
+    lat, lon, alt = lla
+    zone = _held(place.zone, lat, lon, xp)
+    ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
+    easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
+    return zone, easting, northing, alt, *grid
 
 
-class Local(Kernels):
-    """Axes at the origin, east, north, up or north, east, down; what is not there is 0."""
-
-    is_angular = False
-
-    @classmethod
-    def to_ecef(cls, place: Place, given: dict[str, Any], xp: Namespace) -> Components:  # noqa: ARG003
-        """Return the position in ECEF."""
-        zero = next(iter(given.values())) * 0.0
-        return rigid.apply(*_origin(place).pose(place.name), *(given.get(n, zero) for n in POSITIONS[place.name].names))
-
-    @classmethod
-    def from_ecef(cls, place: Place, xyz: Components, xp: Namespace) -> Components:  # noqa: ARG003
-        """Return the position seen from the origin."""
-        return earth.seen_from(*_origin(place).pose(place.name), *xyz)
+def _read_local(place: Place, given: dict[str, Any], _: Namespace) -> Components:
+    """Return x, y, z of axes at the origin; what is not there is 0."""
+    zero = next(iter(given.values())) * 0.0
+    return rigid.apply(*_origin(place), *(given.get(name, zero) for name in POSITIONS[place.name].names))
 
 
-def _origin(place: Place) -> Origin:
+def _write_local(place: Place, xyz: Components, _: Namespace) -> Components:
+    return earth.seen_from(*_origin(place), *xyz)
+
+
+def _origin(place: Place) -> Rigid:
     if place.origin is None:
         raise ValueInvalid(f"{place.name} needs an origin")
-    return place.origin
+    return place.origin.pose(place.name)
+
+
+def _as_is(_: Place, three: Components, _xp: Namespace) -> Components:
+    return three
+
+
+LLA_KERNELS = Kernels(_read_lla, _as_is, least=2)
+UTM_KERNELS = Kernels(_read_utm, _write_utm, least=3, axes=GRID, is_nested=True)
+LOCAL_KERNELS = Kernels(_read_local, _write_local, is_angular=False)
+ECEF_KERNELS = Kernels(
+    lambda _, given, _xp: tuple(given[axis] for axis in "xyz"), _as_is, is_angular=False, axes=ECEF, is_nested=True
+)
 
 
 @cache
-def kernels(name: str) -> type[Kernels]:
+def kernels(name: str) -> Kernels:
     """Return the arithmetic of a row of POSITIONS."""
     module, _, found = POSITIONS[name].kernels.partition(":")
     return getattr(import_module(module), found)  # type: ignore[no-any-return]
@@ -482,12 +400,6 @@ def _height(given: dict[str, Any], other: Any) -> Any:
 def _as_read(own: Any, made: Any, xp: Namespace) -> Any:
     """Return a number as it was read where it is the one that was computed, but for rounding."""
     return made if own is None else xp.where(abs(own - made) <= ROUNDING, own, made)
-
-
-def _check_zone(place: Place, x: float, y: float, z: float) -> None:
-    """Raise ValueInvalid for a position in ECEF beyond UTM, or beyond the zone that is held."""
-    lat, lon, _ = earth.lla(x, y, z, floats)
-    mercator.check_utm(_held(place.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
 
 class Earth(NamedTuple):

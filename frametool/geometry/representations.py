@@ -180,7 +180,7 @@ class Representation:
 
 
 class Position(Representation):
-    """One way to write positions on the Earth; `kernels` is the `module:Class` of its arithmetic, a `place.Kernels`."""
+    """One way to write positions on the Earth; `kernels` names its arithmetic, `module:name` of a `place.Kernels`."""
 
     __slots__ = ("kernels",)
 
@@ -319,16 +319,14 @@ REPRESENTATIONS: dict[str, Representation] = {
 }  # fmt: skip
 PLACE = "frametool.geometry.place"
 POSITIONS: dict[str, Position] = {
-    "lla": Position("lat lon alt", "WGS84 latitude, longitude (degrees), metres above the ellipsoid", f"{PLACE}:Lla"),
-    "ecef": Position(
-        "ecef_x ecef_y ecef_z", "the Earth's frame: x to lat 0 lon 0, z to the north pole", f"{PLACE}:Ecef", "x y z"
-    ),
-    "utm": Position(
-        "utm_zone easting northing alt", "UTM, a zone as 32N or 32S and metres", f"{PLACE}:Utm",
-        "zone easting northing alt",
-    ),
-    "enu": Position("east north up", "metres east, north, up of --origin", f"{PLACE}:Local"),
-    "ned": Position("north east down", "metres north, east, down of --origin", f"{PLACE}:Local"),
+    "lla": Position("lat lon alt", "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
+                    f"{PLACE}:LLA_KERNELS"),
+    "ecef": Position("ecef_x ecef_y ecef_z", "the Earth's frame: x to lat 0 lon 0, z to the north pole",
+                     f"{PLACE}:ECEF_KERNELS", names="x y z"),
+    "utm": Position("utm_zone easting northing alt", "UTM, a zone as 32N or 32S and metres", f"{PLACE}:UTM_KERNELS",
+                    names="zone easting northing alt"),
+    "enu": Position("east north up", "metres east, north, up of --origin", f"{PLACE}:LOCAL_KERNELS"),
+    "ned": Position("north east down", "metres north, east, down of --origin", f"{PLACE}:LOCAL_KERNELS"),
 }  # fmt: skip
 EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
 ROTATIONS = {**REPRESENTATIONS}

@@ -15,7 +15,7 @@ ROW = """
 import sys
 from frametool.geometry.representations import POSITIONS, REPRESENTATIONS, Position
 
-POSITIONS["web"] = REPRESENTATIONS["web"] = Position("web_x web_y", "Web Mercator", "toy_web:Web")
+POSITIONS["web"] = REPRESENTATIONS["web"] = Position("web_x web_y", "Web Mercator", "toy_web:WEB")
 POSITIONS["web"].name = "web"
 from frametool.cli import run
 sys.exit(run(sys.argv[1:]))
@@ -30,16 +30,15 @@ R = 6378137.0
 def plain(*numbers):
     return tuple(each if np.ndim(each) else float(each) for each in numbers)
 
-class Web(Kernels):
-    @classmethod
-    def to_lla(cls, place, given, xp):
-        x, y = given["web_x"], given["web_y"]
-        return plain(np.degrees(2.0 * np.arctan(np.exp(y / R)) - math.pi / 2), np.degrees(x / R), x * 0.0)
+def read(place, given, xp):
+    x, y = given["web_x"], given["web_y"]
+    return plain(np.degrees(2.0 * np.arctan(np.exp(y / R)) - math.pi / 2), np.degrees(x / R), x * 0.0)
 
-    @classmethod
-    def from_lla(cls, place, lla, xp):
-        lat, lon, _ = lla
-        return plain(R * np.radians(lon), R * np.log(np.tan(math.pi / 4 + np.radians(lat) / 2)))
+def write(place, lla, xp):
+    lat, lon, _ = lla
+    return plain(R * np.radians(lon), R * np.log(np.tan(math.pi / 4 + np.radians(lat) / 2)))
+
+WEB = Kernels(read, write)
 """
 LAT, LON = 48.1, 11.5
 X, Y = 6378137.0 * math.radians(LON), 6378137.0 * math.log(math.tan(math.pi / 4 + math.radians(LAT) / 2))
