@@ -75,12 +75,10 @@ class Output:
         self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
         self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
         place = None
-        if any(each.representation.is_place for each in notations or ()):
+        if settings().origin is not None or any(each.representation.is_place for each in notations or ()):
             from frametool.cli.earth import places_of
 
             notations, place = places_of(notations or ())
-        if settings().origin == "first" and not (place and place.is_local):
-            raise UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
         self.notations = notations or ()
         self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")

@@ -44,6 +44,7 @@ FLAT = {
     name: row.names for name, row in representations.POSITIONS.items()
     if not row.kernels.startswith(representations.PLACE)
 }  # fmt: skip
+FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -92,7 +93,7 @@ def _is_known(name: str) -> bool:
 
 def may_be_on_earth(name: str) -> bool:
     """Tell whether a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
-    return re.search(_EARTH, name) is not None or any(name in names for names in FLAT.values())
+    return re.search(_EARTH, name) is not None or name in FLAT_NAMES
 
 
 def may_be_uncertain(name: str) -> bool:

@@ -19,7 +19,7 @@ from frametool.geometry import floats, placed, quaternion
 from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
-from frametool.grammar.names import EARTH_FRAMES, FLAT
+from frametool.grammar.names import EARTH_FRAMES, FLAT, FLAT_NAMES
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
@@ -41,7 +41,7 @@ LOCAL_KEYS = frozenset(("east", "north", "up", "down"))
 UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
 HEADINGS = {"heading_deg": True, "heading_rad": False}
 SAID = frozenset(("datum", "epsg", "mgrs", LLA, "convergence_deg", "grid_scale"))
-EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}.union(*FLAT.values())
+EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | SAID | {ECEF, AT, *HEADINGS}| FLAT_NAMES
 NO_MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 DATUMS = ("WGS84", "WGS 84", "WGS-84", "wgs84")

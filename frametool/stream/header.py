@@ -361,6 +361,8 @@ def _half_rotation(header: Header, given: Notation | None) -> str:
 
 def _other_names(header: Header) -> str:
     """Recognise four columns that are a quaternion under names nobody has agreed upon: `ox oy oz ow`, `q0 .. q3`."""
+    if len(header.names) < 4:
+        return ""
     folded = {name.lower(): name for name in reversed(header.names)}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
     for stem in stems:
@@ -420,6 +422,8 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
     """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where told so."""
+    if len(names) < 6:
+        return None
     folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
     for each in LETTERS if kind == "" else (kind,):
         for base in [six_names(each), *(base.split() for base in LETTERS.get(each, ()) * bool(kind))]:

@@ -239,12 +239,11 @@ class Operation(NamedTuple):
 
     def _with_place(self, shape: Shape, numbers: Components, found: Components) -> Components:
         """Add to a result on the Earth that nothing moves the numbers that it was read as."""
-        place = shape.place
-        if place is None or not self.keeps_frames:
+        if shape.place is None or not self.keeps_frames:
             return found
         from frametool.geometry.place import Spot, Unmoved
 
-        return Unmoved(found, Spot(place, numbers[: place.size]))
+        return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
 
     def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""

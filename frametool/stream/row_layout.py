@@ -224,15 +224,10 @@ class Target(NamedTuple):
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
         own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
-        read = getattr(parts, "read", None)
-        if self.scaled:
-            return [*self.numbers(parts[:own], xp, parts[-1]), *parts[own:-1]]
-        return [*self.numbers(parts[:own], xp, read=read), *parts[own:]]
-
-    def numbers(self, parts: Components, xp: Namespace, scale: Any = None, read: Spot | None = None) -> list[Any]:
-        """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
-        full = self._full(parts, xp, scale, read)
-        return [number for place, number in enumerate(full) if place not in self.absent] if self.absent else full
+        full = self._full(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
+        if self.absent:
+            full = [number for place, number in enumerate(full) if place not in self.absent]
+        return [*full, *parts[own : len(parts) - self.scaled]]
 
     def left_out(self, parts: Components, xp: Namespace) -> list[tuple[str, Any]]:
         """Return the numbers of a result without a column, by name; a row where one is above FLAT is bad."""
@@ -242,6 +237,7 @@ class Target(NamedTuple):
         return [(names[place], full[place]) for place in self.absent]
 
     def _full(self, parts: Components, xp: Namespace, scale: Any = None, read: Spot | None = None) -> list[Any]:
+        """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
         if self.plain:
             return list(parts)
         position: list[Any] = []
@@ -296,8 +292,10 @@ class Target(NamedTuple):
 
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
+        if len(parts) < 7:
+            return None
         axes = next((axes for notation, _ in self.notations if (axes := notation.euler_axes)), None)
-        if axes is None or len(parts) < 7:
+        if axes is None:
             return None
         x, y, z, w = parts[3:7]
         return euler.locked(x, y, z, w, axes)

@@ -295,8 +295,8 @@ def _block(
     """Return results as a block, with what else each of them says."""
     stamps = [other.get("stamp_ns") for other in others]
     is_stamped = bool(stamps) and all(type(stamp) is int for stamp in stamps)
-    used = {AS_READ, *["stamp_ns"] * is_stamped}
     read = [other[AS_READ] for other in others if AS_READ in other]
+    used = (AS_READ, "stamp_ns" if is_stamped else AS_READ)
     keys = dict.fromkeys(key for other in others for key in other if key not in used)
     parents, names = (each[:1] if len(set(each)) == 1 else each for each in (parents, names))
     return RowPoses(

@@ -66,7 +66,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
 
         refuse_elsewhere(table, request, source)
     beside: tuple[int, ...] = ()
-    if any(may_be_uncertain(name) for name in table.names or ()):
+    if any(map(may_be_uncertain, table.names or ())):
         from frametool.stream.beside import covariance_columns
 
         beside, shapes = covariance_columns(table, request, shapes, source)
@@ -90,7 +90,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
-    poses = [_written(pose) for pose in poses]
+    poses = [_written(pose) for pose in poses] if on_earth else poses
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if beside and not request.keep:
         from frametool.stream.beside import with_entries_at
