@@ -100,7 +100,12 @@ def _entries(given: Covariance, size: int) -> Components:
         raise ValueInvalid(f"covariances: expected numbers of shape (..., {side}, {side})") from None
     if rows.shape[-2:] != (side, side):
         raise ValueInvalid(f"covariances: expected shape (..., {side}, {side}), got {rows.shape}")
-    _check_each(rows.reshape(-1, size), size)
+    flat = rows.reshape(-1, size)
+    for row in sorted({*np.flatnonzero(~np.isfinite(flat).all(1)).tolist(), *uncertainty.problems(flat)})[:1]:
+        try:
+            uncertainty.taken(flat[row], size)
+        except ValueInvalid as error:
+            raise ValueInvalid(f"row {row}: {error}") from None
     return tuple(rows[..., i, j] for i in range(side) for j in range(side))
 
 
@@ -111,14 +116,3 @@ def _are_many(given: Any, side: int) -> bool:
     first = given[0] if isinstance(given, (list, tuple)) and given else None
     inner = first[0] if isinstance(first, (list, tuple)) and first else None
     return len(getattr(first, "shape", ())) > 1 or hasattr(inner, "__len__")
-
-
-def _check_each(rows: Any, size: int) -> None:
-    """Raise ValueInvalid for the first of many covariances that is none."""
-    import numpy as np
-
-    for row in sorted({*np.flatnonzero(~np.isfinite(rows).all(1)).tolist(), *uncertainty.problems(rows)})[:1]:
-        try:
-            uncertainty.taken(rows[row], size)
-        except ValueInvalid as error:
-            raise ValueInvalid(f"row {row}: {error}") from None

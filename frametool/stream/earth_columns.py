@@ -185,11 +185,9 @@ def chosen(places: Sequence[int], names: Sequence[str], kind: str, earth: Earth)
 
     Raises ValueInvalid for a count that it does not have.
     """
-    fields = POSITIONS[kind].names
+    fields = POSITIONS[kind].names[-_count(kind, earth) :]
     least = kernels(kind).least or len(fields)
-    if kind == UTM and earth.zone is not None:
-        fields, least = fields[1:], 2
-    if not least <= len(places) <= len(fields):
+    if not least - (kind == UTM and earth.zone is not None) <= len(places) <= len(fields):
         raise ValueInvalid(f"{kind} has {len(fields)} numbers ({' '.join(fields)}); found {len(places)}")
     spots = [NamedColumn(place, names[at], "") for at, place in enumerate(places)]
     return _columns(kind, [*zip(fields, spots, strict=False)], {}, earth)
@@ -274,9 +272,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     numbers = {name: at for at, name in reversed([*enumerate(names or ())])}
     places = [at for word in spec.split(",") for at in places_named(word.strip(), numbers, width)]
     called = names or [f"column {at + 1}" for at in range(width)]
-    most = len(POSITIONS[request.given_place].names) - (
-        request.given_place == UTM and request.earth is not None and request.earth.zone is not None
-    )
+    most = _count(request.given_place, request.earth or Earth())
     try:
         position = chosen(places[:most], called, request.given_place, request.earth or Earth())
     except ValueInvalid as error:
@@ -291,9 +287,12 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 def of_width(width: int, request: Request) -> str:
     """Say which columns of a table without names are a place: all of them, or those behind a stamp."""
-    fields = len(POSITIONS[request.given_place].names)
-    fields -= request.given_place == UTM and request.earth is not None and request.earth.zone is not None
-    return f"2-{width}" if width == fields + 1 else f"1-{width}"
+    return f"2-{width}" if width == _count(request.given_place, request.earth or Earth()) + 1 else f"1-{width}"
+
+
+def _count(kind: str, earth: Earth) -> int:
+    """Count the numbers of a position, of UTM without the zone where that is held."""
+    return len(POSITIONS[kind].names) - (kind == UTM and earth.zone is not None)
 
 
 def of_fix(names: Sequence[str]) -> tuple[int, ...]:

@@ -299,12 +299,11 @@ class Run:
         operation = self.plan.operation
         for at, (shape, columns, _) in enumerate(self._things(self.columns)):
             own = tuple(float(column[row]) for column in columns)
-            rotation = partial(_checked, shape)
             times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
             try:
                 operation.result(
                     shape, own, None, floats, times_ns=times, compared=lambda pose: [pose], seconds=float,
-                    rotation=rotation,
+                    rotation=partial(_checked, shape),
                 )  # fmt: skip
             except FrametoolError as error:
                 return error
@@ -454,7 +453,8 @@ class Run:
         """Return the place of the first bad row, if the run stops there."""
         if self.plan.on_error != STOP or not (self.reasons or self.block.broken):
             return None
-        return min([*self.block.places[[*self.reasons]].tolist(), *(each.place for each in self.block.broken)])
+        bad: list[int] = self.block.places[[*self.reasons]].tolist()
+        return min([*bad, *(each.place for each in self.block.broken)])
 
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before place `end`: results, rows without one, and what passes."""

@@ -71,6 +71,10 @@ class RowPoses(NamedTuple):
     given: Sequence[str | None] = ()
     read: Floats | None = None
 
+    def for_each(self, names: Sequence[str | None]) -> Sequence[str | None]:
+        """Return parents or names, one a row."""
+        return names if len(names) == len(self.numbers) else [*names] * len(self.numbers)
+
     def spot(self, row: int) -> Spot | None:
         """Return the place that a row was read as."""
         return None if self.read is None else _spot(tuple(self.read[row].tolist()))
@@ -321,8 +325,7 @@ def _written(value: float) -> str:
 
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
     """Return a block as results, one a pose."""
-    size = len(block.numbers)
-    names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
+    names, parents = map(block.for_each, (block.names, block.parents))
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
@@ -344,8 +347,7 @@ def points_of(
     block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None
 ) -> list[dict[str, Any]]:
     """Return a block of points or vectors as mappings, one each, or of points on the Earth at a place."""
-    size = len(block.numbers)
-    frames = block.parents if len(block.parents) == size else list(block.parents) * size
+    frames = block.for_each(block.parents)
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []

@@ -208,7 +208,7 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Poin
         size = len(poses.numbers)
         given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in beside}
         if poses.names[0] is not None:
-            given[IDS[1]] = [*poses.names] if len(poses.names) == size else [*poses.names] * size
+            given[IDS[1]] = [*poses.for_each(poses.names)]
         for key, cells in beside.items():
             cells.extend(given.get(key, [None] * size))
     on_lines = "arrays" not in FORMATS[form].reads

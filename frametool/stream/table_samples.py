@@ -89,10 +89,10 @@ def _pieces(
     poses = list(zip(*(column.tolist() for column in columns), strict=True))
     lines = (block.lines + line).tolist()
     world, body = options.answers.names(*form.frames)
-    count = len(poses)
-    parents, names = _spread(block.parents, count, world), _spread(block.names, count, body)
+    parents = [name or world for name in block.for_each(block.parents)]
+    names = [name or body for name in block.for_each(block.names)]
     bare = options.tally.names.bare
-    for (parent, name), group in groupby(range(count), key=lambda at: (bare(parents[at]), bare(names[at]))):
+    for (parent, name), group in groupby(range(len(poses)), key=lambda at: (bare(parents[at]), bare(names[at]))):
         some = list(group)
         part = slice(some[0], some[-1] + 1)
         if times is not None:
@@ -100,12 +100,6 @@ def _pieces(
         else:
             yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
     options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or form.axes)
-
-
-def _spread(names: Sequence[str | None], count: int, otherwise: str) -> list[str]:
-    """Return a name for each row."""
-    given = [name or otherwise for name in names]
-    return given if len(given) == count else given * count
 
 
 def _tell(rows: TablePoses, form: Poses, options: Options, count: int) -> None:

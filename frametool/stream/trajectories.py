@@ -209,9 +209,8 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     if not blocks:
         raise FormatError("no poses in it", source=file.name)
     named = {
-        pair for poses, _ in blocks
-        for pair in zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True)
-    }  # fmt: skip
+        pair for each, _ in blocks for pair in zip(each.for_each(each.parents), each.for_each(each.names), strict=True)
+    }
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
         raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
@@ -247,10 +246,6 @@ def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request) -> Tra
     return Trajectory(
         times, columns[:, :POSITION], columns[:, POSITION:] if has_turns else None, parent or WORLD, name or BODY
     )
-
-
-def _all(names: Sequence[str | None], others: Sequence[str | None]) -> Sequence[str | None]:
-    return names if len(names) == len(others) else [*names] * len(others)
 
 
 def _of_tree(
