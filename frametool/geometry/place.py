@@ -320,6 +320,11 @@ class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot b
         return made
 
 
+def spot_of(lla: Sequence[Any]) -> Spot:
+    """Return latitude, longitude and height as a position that was read."""
+    return Spot(Place(LLA, ("lat", "lon", "alt")), tuple(lla))
+
+
 class Kernels(NamedTuple):
     """The arithmetic of a row of POSITIONS.
 

@@ -91,10 +91,12 @@ class Representation:
     batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
     overview: the units in which an overview shows it ("" for no unit)
     is_place: it says a position on the Earth and no rotation: a row of POSITIONS
+    kernels: of a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
     __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "is_place", "label",
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "is_place",
+        "kernels", "label",
         "name", "names", "overview", "searched", "shape", "summary", "whole",
     )  # fmt: skip
 
@@ -104,7 +106,7 @@ class Representation:
         check: Check | None = None, kept: Callable[..., Components] | None = None,
         shape: str | dict[str, int] = LIST, names: str = "", label: str = "", axes: str = "",
         whole: Whole | None = None, searched: bool = True, alone: str = "", overview: tuple[str, ...] = (),
-        batch: BatchRule | None = None,
+        batch: BatchRule | None = None, kernels: str = "",
     ) -> None:  # fmt: skip
         """Describe a notation.
 
@@ -130,6 +132,7 @@ class Representation:
         self._kept = kept
         self.batch = batch
         self.is_place = forward is _no_rotation
+        self.kernels = kernels
 
     def __repr__(self) -> str:
         """Show the name."""
@@ -177,17 +180,6 @@ class Representation:
             shown = " ".join(f"{value:g}" for value in components)
             raise ValueInvalid(f"{self.name} {shown} is not finite; give finite numbers", rule="not-finite")
         return tuple(components)
-
-
-class Position(Representation):
-    """One way to write positions on the Earth; `kernels` names its arithmetic, `module:name` of a `place.Kernels`."""
-
-    __slots__ = ("kernels",)
-
-    def __init__(self, columns: str, summary: str, kernels: str, names: str = "") -> None:
-        """Describe it; its numbers are called as its columns where `names` does not say otherwise."""
-        super().__init__(columns, (), summary, names=names or columns)
-        self.kernels = kernels
 
 
 def _arithmetic(kernel: Callable[..., Components]) -> Callable[..., Components]:
@@ -318,15 +310,17 @@ REPRESENTATIONS: dict[str, Representation] = {
     ),
 }  # fmt: skip
 PLACE = "frametool.geometry.place"
-POSITIONS: dict[str, Position] = {
-    "lla": Position("lat lon alt", "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
-                    f"{PLACE}:LLA_KERNELS"),
-    "ecef": Position("ecef_x ecef_y ecef_z", "the Earth's frame: x to lat 0 lon 0, z to the north pole",
-                     f"{PLACE}:ECEF_KERNELS", names="x y z"),
-    "utm": Position("utm_zone easting northing alt", "UTM, a zone as 32N or 32S and metres", f"{PLACE}:UTM_KERNELS",
-                    names="zone easting northing alt"),
-    "enu": Position("east north up", "metres east, north, up of --origin", f"{PLACE}:LOCAL_KERNELS"),
-    "ned": Position("north east down", "metres north, east, down of --origin", f"{PLACE}:LOCAL_KERNELS"),
+POSITIONS = {
+    "lla": Representation("lat lon alt", (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
+                          names="lat lon alt", kernels=f"{PLACE}:LLA_KERNELS"),
+    "ecef": Representation("ecef_x ecef_y ecef_z", (), "the Earth's frame: x to lat 0 lon 0, z to the north pole",
+                           kernels=f"{PLACE}:ECEF_KERNELS"),
+    "utm": Representation("utm_zone easting northing alt", (), "UTM, a zone as 32N or 32S and metres",
+                          names="zone easting northing alt", kernels=f"{PLACE}:UTM_KERNELS"),
+    "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up",
+                          kernels=f"{PLACE}:LOCAL_KERNELS"),
+    "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down",
+                          kernels=f"{PLACE}:LOCAL_KERNELS"),
 }  # fmt: skip
 EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
 ROTATIONS = {**REPRESENTATIONS}

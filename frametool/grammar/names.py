@@ -40,10 +40,7 @@ PLACE_KEYS = frozenset((
 FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 EARTH_FRAMES = representations.EARTH_FRAMES
 # the positions whose keys and columns are just their names and numbers: ours have readers of their own
-FLAT = {
-    name: row.names for name, row in representations.POSITIONS.items()
-    if not row.kernels.startswith(representations.PLACE)
-}  # fmt: skip
+FLAT = {key: row.names for key, row in representations.POSITIONS.items() if not row.kernels.startswith("frametool")}
 FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 
 

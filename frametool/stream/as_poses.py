@@ -28,7 +28,7 @@ from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, notes_of, run
+from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
 from frametool.stream.writers import LEARNED
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style
     from frametool.stream.block_writer import BlockWriter
-    from frametool.stream.faults import BadRows
     from frametool.stream.request import Request
     from frametool.text.spans import Floats, Ints
 
@@ -107,21 +106,6 @@ class FormatConverter:
         if self.is_table:
             return self._rows(stream, header=header)
         return self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
-
-    def gathered(self, stream: BufferedReader, bad: BadRows) -> list[tuple[RowPoses, Ints]]:
-        """Return the results of all blocks that have some, and the lines of their rows; bad rows go to `bad`."""
-        found: list[tuple[RowPoses, Ints]] = []
-
-        def outcomes() -> Iterator[Outcome]:
-            line = int(self.is_table)  # what lists poses says itself where they stand
-            for poses, outcome in self.steps(stream):
-                if len(poses.numbers):
-                    found.append((poses, poses.lines + line))
-                line += outcome.lines
-                yield outcome
-
-        run(outcomes(), lambda _: None, bad, lambda *_: None)
-        return found
 
     def _writer(self) -> BlockWriter:
         """Choose what writes the results, by what they are."""

@@ -453,8 +453,7 @@ class Run:
         """Return the place of the first bad row, if the run stops there."""
         if self.plan.on_error != STOP or not (self.reasons or self.block.broken):
             return None
-        bad: list[int] = self.block.places[[*self.reasons]].tolist()
-        return min([*bad, *(each.place for each in self.block.broken)])
+        return int(min([*self.block.places[[*self.reasons]].tolist(), *(each.place for each in self.block.broken)]))
 
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before place `end`: results, rows without one, and what passes."""

@@ -292,10 +292,8 @@ class Target(NamedTuple):
 
     def locked(self, parts: Components) -> Any:
         """Tell whether Euler angles among the notations are not unique; None where there are none."""
-        if len(parts) < 7:
-            return None
         axes = next((axes for notation, _ in self.notations if (axes := notation.euler_axes)), None)
-        if axes is None:
+        if axes is None or len(parts) < 7:
             return None
         x, y, z, w = parts[3:7]
         return euler.locked(x, y, z, w, axes)

@@ -6,6 +6,7 @@ Also turns single results into such blocks and back, and columns of texts into s
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from itertools import chain
 from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -77,21 +78,17 @@ class RowPoses(NamedTuple):
 
     def spot(self, row: int) -> Spot | None:
         """Return the place that a row was read as."""
-        return None if self.read is None else _spot(tuple(self.read[row].tolist()))
+        return None if self.read is None else _place().spot_of(self.read[row].tolist())
 
     def unmoved(self, parts: Components) -> Components:
         """Return the components of the rows with what they were read as, if it is known."""
         if self.read is None:
             return parts
-        from frametool.geometry.place import Unmoved
-
-        return Unmoved(parts, _spot(tuple(np.ascontiguousarray(self.read.T))))
+        return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))  # type: ignore[no-any-return]
 
 
-def _spot(lla: Components) -> Spot:
-    from frametool.geometry.place import LLA, Place, Spot
-
-    return Spot(Place(LLA, ("lat", "lon", "alt")), lla)
+def _place() -> Any:
+    return import_module("frametool.geometry.place")  # few rows are on the Earth
 
 
 class TablePoses:

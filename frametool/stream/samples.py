@@ -27,7 +27,7 @@ from frametool.stream.record import placed, value_at
 from frametool.stream.record_values import documents, pose_of
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import plain_cells
-from frametool.stream.trajectories import TREE
+from frametool.stream.trajectories import TREE, gathered
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Poin
         raise FormatError(f"no points in it: {FORMATS[form].summary}", source=file.name)
     converter = FormatConverter(form, Request(Operation(moves=True)), Style("json"), file.name, answers)
     beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
-    blocks = converter.gathered(cast("BufferedReader", file.stream), bad)
+    blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
     if not blocks:
         raise FormatError("no points in it", source=file.name)
     if blocks[0][0].numbers.shape[1] < 3 or not converter.placed:

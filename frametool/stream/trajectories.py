@@ -28,17 +28,20 @@ from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
 from frametool.stream.record_results import stream_results
 from frametool.stream.request import Operation, Request
+from frametool.stream.run import Outcome, run
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from io import BufferedReader
     from os import PathLike
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.grammar.edges import Report
+    from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
+    from frametool.text.spans import Ints
 
 POSITION = 3  # numbers
 TREE = rb"""(?m)^\s*(?:---\s*)?\{?\s*["']?(?:frames|transforms|angles)["']?\s*:"""  # keys of a tree, not of a record
@@ -198,6 +201,22 @@ def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, form: str | None =
     return sorted(found)
 
 
+def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows) -> list[tuple[RowPoses, Ints]]:
+    """Return the results of all blocks that have some, and the lines of their rows; bad rows go to `bad`."""
+    found: list[tuple[RowPoses, Ints]] = []
+
+    def outcomes() -> Iterator[Outcome]:
+        line = int(converter.is_table)  # what lists poses says itself where they stand
+        for poses, outcome in converter.steps(stream):
+            if len(poses.numbers):
+                found.append((poses, poses.lines + line))
+            line += outcome.lines
+            yield outcome
+
+    run(outcomes(), lambda _: None, bad, lambda *_: None)
+    return found
+
+
 def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
     row = FORMATS[form].poses
@@ -205,7 +224,7 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     own = answers if counts or form == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(form, request, Style("tum"), file.name, own)
-    blocks = converter.gathered(cast("BufferedReader", file.stream), bad)
+    blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
     if not blocks:
         raise FormatError("no poses in it", source=file.name)
     named = {

@@ -13,9 +13,11 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 ROW = """
 import sys
-from frametool.geometry.representations import POSITIONS, REPRESENTATIONS, Position
+from frametool.geometry.representations import POSITIONS, REPRESENTATIONS, Representation
 
-POSITIONS["web"] = REPRESENTATIONS["web"] = Position("web_x web_y", "Web Mercator", "toy_web:WEB")
+POSITIONS["web"] = REPRESENTATIONS["web"] = Representation(
+    "web_x web_y", (), "Web Mercator", names="web_x web_y", kernels="toy_web:WEB"
+)
 POSITIONS["web"].name = "web"
 from frametool.cli import run
 sys.exit(run(sys.argv[1:]))
