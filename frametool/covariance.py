@@ -7,7 +7,7 @@
 
 A covariance is 36 numbers, row-major, or 6 rows, over (x, y, z, turns about X, Y, Z), metres and radians, along the
 fixed axes of the parent, as ROS has it: t + d[:3], Exp(d[3:]) R.  None is exact.  All things count as independent.
-One transform is plain floats, and results are lists, of 36 numbers or of the 9 of a point; of arrays of transforms or
+Of one transform results are lists, of 36 numbers or of the 9 of a point; of arrays of transforms or
 of covariances (n, 6, 6) results are arrays (n, 6, 6) or (n, 3, 3).  Raise ValueInvalid for what is no covariance.
 `FrameTree.covariance` follows a tree; `frametool help covariance` says how to convert other conventions.
 """
@@ -100,7 +100,12 @@ def _entries(given: Covariance, size: int) -> Components:
         raise ValueInvalid(f"covariances: expected numbers of shape (..., {side}, {side})") from None
     if rows.shape[-2:] != (side, side):
         raise ValueInvalid(f"covariances: expected shape (..., {side}, {side}), got {rows.shape}")
-    _check_each(rows.reshape(-1, size), side)
+    flat = rows.reshape(-1, size)
+    for row in sorted({*np.flatnonzero(~np.isfinite(flat).all(1)).tolist(), *uncertainty.problems(flat)})[:1]:
+        try:
+            uncertainty.taken(flat[row], size)
+        except ValueInvalid as error:
+            raise ValueInvalid(f"row {row}: {error}") from None
     return tuple(rows[..., i, j] for i in range(side) for j in range(side))
 
 
@@ -111,21 +116,3 @@ def _are_many(given: Any, side: int) -> bool:
     first = given[0] if isinstance(given, (list, tuple)) and given else None
     inner = first[0] if isinstance(first, (list, tuple)) and first else None
     return len(getattr(first, "shape", ())) > 1 or hasattr(inner, "__len__")
-
-
-def _check_each(rows: Any, side: int) -> None:
-    """Raise ValueInvalid for the first of many covariances that is none."""
-    import numpy as np
-
-    whole = rows.reshape(-1, side, side)
-    roots = np.sqrt(abs(np.diagonal(whole, axis1=1, axis2=2)))
-    with np.errstate(invalid="ignore"):
-        skew = abs(whole - whole.swapaxes(1, 2)) > uncertainty.ASYMMETRY * roots[:, :, None] * roots[:, None, :]
-    doubtful = skew.any((1, 2)) | ~np.isfinite(rows).all(1)
-    values = np.linalg.eigvalsh(np.where(doubtful[:, None, None], 0.0, whole))
-    doubtful |= values[:, 0] < -uncertainty.NEGATIVE * abs(values[:, -1])
-    for row in np.flatnonzero(doubtful).tolist():
-        try:
-            uncertainty.taken(rows[row], side * side)
-        except ValueInvalid as error:
-            raise ValueInvalid(f"row {row}: {error}") from None

@@ -13,8 +13,8 @@ from frametool.cli.group import settings
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
-from frametool.geometry.place import Earth, Origin, Place
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.place import UTM, Earth, Origin, Place, kernels
+from frametool.geometry.representations import POSITIONS
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.place import read_at
 from frametool.grammar.readers import Misfit, Reading, tell
@@ -73,18 +73,20 @@ def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Plac
     """Part what --to names into rotations, and how positions are written; raises ValueInvalid for --to enu alone."""
     names = [each.representation.name for each in notations if each.representation.is_place]
     rest = tuple(each for each in notations if not each.representation.is_place)
-    return rest, Place.written(names, earth()) if names else None
+    place = Place.written(names, earth()) if names else None
+    if settings().origin == FIRST and not (place and place.is_local):
+        raise click.UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
+    return rest, place
 
 
 def mapping_of(texts: Sequence[str], name: str) -> str:
     """Write bare numbers of a place as the mapping that says the same; raises click.UsageError for another count."""
     from frametool.documents.json import dump
 
-    row = REPRESENTATIONS[name]
-    zoned = name == "utm" and len(texts) == 3 and earth().zone is not None
+    row, arithmetic = POSITIONS[name], kernels(name)
+    zoned = name == UTM and len(texts) == 3 and earth().zone is not None
     fields = row.names[zoned:]
-    least = {"lla": 2, "utm": 3}.get(name, 3) - zoned
-    if not least <= len(texts) <= len(fields):
+    if not (arithmetic.least or len(fields)) - zoned <= len(texts) <= len(fields):
         raise click.UsageError(f"{name} has {len(row.names)} numbers ({' '.join(row.names)}); found {len(texts)}")
     members: Any = dict(zip(fields, texts, strict=False))
-    return dump({"ecef": members} if name == "ecef" else {"utm": members} if name == "utm" else members)
+    return dump({name: members} if arithmetic.is_nested else members)

@@ -79,7 +79,7 @@ class Output:
         self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
         self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
         place = None
-        if any(each.representation.is_place for each in notations or ()):
+        if settings().origin is not None or any(each.representation.is_place for each in notations or ()):
             from frametool.cli.earth import places_of
 
             notations, place = places_of(notations or ())

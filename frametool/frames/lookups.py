@@ -205,7 +205,7 @@ class Frames:
 
         steps = [*(placed.inverse(edge(child)) for child in reversed(down)), *map(edge, reversed(up))]
         found = placed.covariance_of(reduce(placed.compose, steps, IDENTITY)) or (0.0,) * uncertainty.POSE
-        return tuple(entry + 0.0 for entry in uncertainty.symmetric([found[at : at + 6] for at in range(0, 36, 6)]))
+        return tuple(entry + 0.0 for entry in uncertainty.symmetric(found))
 
     # --- many lookups ---
 

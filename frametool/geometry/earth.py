@@ -63,11 +63,17 @@ def lla(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
         sine, cosine = _halley(run, rise, sine, cosine, xp)
     sine, cosine = _unit(sine, EC * cosine, xp)
     alt = beside * cosine + z * sine - A * xp.sqrt(1.0 - E2 * sine * sine)
-    squared = squared + z * z
-    if not (xp.least(squared) >= NEAREST and xp.furthest(squared) <= FURTHEST):
-        alt = xp.where((squared >= NEAREST) & (squared <= FURTHEST), alt, nan)
+    alt = with_latitude(x, y, z, alt, xp)
     lon = bearing(y + 0.0, x + 0.0, xp.maximum(beside, TINY), xp) * RADIAN
     return incline(sine, cosine, xp) * RADIAN + 0.0, eastward(lon, xp), alt + 0.0
+
+
+def with_latitude(x: N, y: N, z: N, alt: N, xp: Functions[N]) -> N:
+    """Return the height of positions in ECEF that have a latitude, NaN of others."""
+    squared = x * x + y * y + z * z
+    if xp.least(squared) >= NEAREST and xp.furthest(squared) <= FURTHEST:
+        return alt
+    return xp.where((squared >= NEAREST) & (squared <= FURTHEST), alt, nan)
 
 
 def _halley(run: N, rise: N, sine: N, cosine: N, xp: Functions[N]) -> Two[N]:

@@ -6,6 +6,8 @@ numbers only, floats or arrays of one shape; a zone of UTM is a number, as `tran
 
 from __future__ import annotations
 
+from functools import cache
+from importlib import import_module
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,10 +15,11 @@ from frametool.errors import ValueInvalid
 from frametool.geometry import earth, floats, quaternion, rigid
 from frametool.geometry import transverse_mercator as mercator
 from frametool.geometry.floats import RADIAN, SQRT_HALF, nearest
-from frametool.geometry.representations import REPRESENTATIONS
+from frametool.geometry.representations import POSITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from typing import Self
 
     from frametool.geometry.types import Components, Namespace, Rigid, Vector
 
@@ -25,6 +28,7 @@ LLA, UTM = "lla", "utm"
 LOCAL = (ENU, NED)
 ZONE, AXES = "zone", "axes"  # what is written as a word
 SAMPLE = 0.5  # a number that is no zone
+ROUNDING = 1e-6  # metres or degrees: numbers that differ by no more are the same one, as it was read
 EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both are whole degrees
 GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
 UNSAID = (
@@ -70,7 +74,7 @@ class Origin:
 class Place(NamedTuple):
     """One way to write positions on the Earth, and what rotations there are given in.
 
-    name: of its row of REPRESENTATIONS
+    name: of its row of POSITIONS
     fields: what each of its numbers is, in their order
     axes: of rotations: enu, ned, grid, ecef; "" where nothing is said, or each row has its own among its numbers
     level: rotations are headings: turns about down, which a frame whose z is up has another way round
@@ -94,28 +98,35 @@ class Place(NamedTuple):
         for name in names:
             if name in LOCAL and earth_.origin is None:
                 raise ValueInvalid(f"--to {name} needs --origin: {{lat: .., lon: ..}}, or first for the first position")
-            fields = REPRESENTATIONS[name].names
-            axes = ECEF if name == ECEF else name if name in LOCAL else earth_.axes or (GRID if name == UTM else ENU)
+            fields = POSITIONS[name].names
+            axes = ECEF if name == ECEF else name if name in LOCAL else earth_.axes or kernels(name).axes
             origin = earth_.origin if name in LOCAL else None
             made.append(cls(name, fields, axes, earth_.zone, origin))
         return made[0]._replace(more=tuple(made[1:]))
 
     @classmethod
     def of_xyz(cls, name: str, said: Earth) -> Place | None:
-        """Return what x, y, z are in ecef, or in the local axes of the origin; None of a name that has none.
+        """Return what x, y, z are in ecef, in the zone that is held, or in the local axes of the origin; else None.
 
         Raises ValueInvalid for local axes without an origin.
         """
+        if name == UTM and said.zone is not None:
+            return cls(name, POSITIONS[name].names[1:], said.axes, said.zone)
         if name not in (ECEF, *LOCAL):
             return None
         if name in LOCAL and said.origin is None:
             raise ValueInvalid(f"--from {name} needs --origin: {{lat: .., lon: ..}}")
-        return cls(name, REPRESENTATIONS[name].names, name, None, said.origin if name in LOCAL else None)
+        return cls(name, POSITIONS[name].names, name, None, said.origin if name in LOCAL else None)
 
     @property
     def size(self) -> int:
         """Count its numbers."""
         return len(self.fields) + sum(each.size for each in self.more)
+
+    @property
+    def is_local(self) -> bool:
+        """Return True if one of the ways it is written in has an origin."""
+        return any(each.origin is not None for each in (self, *self.more))
 
     @property
     def sample(self) -> tuple[float, ...]:
@@ -125,7 +136,7 @@ class Place(NamedTuple):
     @property
     def columns(self) -> tuple[str, ...]:
         """Name its numbers as columns of a table."""
-        own = dict(zip(REPRESENTATIONS[self.name].names, REPRESENTATIONS[self.name].columns, strict=True))
+        own = dict(zip(POSITIONS[self.name].names, POSITIONS[self.name].columns, strict=True))
         rest = (name for each in self.more for name in each.columns)
         return (*(own.get(field, field) for field in self.fields), *rest)
 
@@ -148,34 +159,20 @@ class Place(NamedTuple):
     # --- reading ---
 
     def lla(self, numbers: Sequence[Any]) -> Components:
-        """Return lat, lon in degrees and alt of its numbers, also of ECEF and local axes."""
-        if self.name in (ECEF, *LOCAL):
-            x, y, z = self.ecef(numbers)
-            return earth.lla(x, y, z, namespace(numbers))
-        given = dict(zip(self.fields, numbers, strict=True))
-        zero = numbers[0] - numbers[0]
-        alt = given.get("alt", zero)
-        if "msl" in given:
-            alt = given["msl"] + given["undulation"]
-        if self.name == UTM:
-            zone = given[ZONE] if self.zone is None else self.zone + zero
-            return *mercator.lat_lon(zone, given["easting"], given["northing"], namespace(numbers)), alt
-        lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
-        return lat, lon, alt
+        """Return lat, lon in degrees and alt of its numbers."""
+        xp, row = namespace(numbers), kernels(self.name)
+        a, b, c = row.read(self, self.given(numbers), xp)
+        return (a, b, c) if row.is_angular else earth.lla(a, b, c, xp)
 
     def ecef(self, numbers: Sequence[Any]) -> Components:
         """Return x, y, z in ECEF of its numbers; NaN for what is no place, and `check` says why."""
-        if self.name == ECEF:
-            return self._three(numbers)
-        if self.name in LOCAL and self.origin is not None:
-            return rigid.apply(*self.origin.pose(self.name), *self._three(numbers))
-        lat, lon, alt = self.lla(numbers)
-        return earth.ecef(lat, lon, alt, namespace(numbers))
+        xp, row = namespace(numbers), kernels(self.name)
+        a, b, c = row.read(self, self.given(numbers), xp)
+        return earth.ecef(a, b, c, xp) if row.is_angular else (a, b, c)
 
-    def _three(self, numbers: Sequence[Any]) -> Components:
-        """Return x, y, z, or the numbers of local axes, 0 for one that is not there."""
-        given = dict(zip(self.fields, numbers, strict=True))
-        return tuple(given.get(name, numbers[0] - numbers[0]) for name in REPRESENTATIONS[self.name].names)
+    def given(self, numbers: Sequence[Any]) -> dict[str, Any]:
+        """Return its numbers by field."""
+        return dict(zip(self.fields, numbers, strict=True))
 
     def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
         """Return a rotation given in the axes there, as x y z w, in ECEF."""
@@ -222,16 +219,14 @@ class Place(NamedTuple):
         return earth.ecef_from_axes(lat, lon, self.axes, xp, convergence)
 
     def _zone_of(self, numbers: Sequence[Any]) -> Any:
-        given = dict(zip(self.fields, numbers, strict=True))
-        return given.get(ZONE, self.zone)
+        return self.given(numbers).get(ZONE, self.zone)
 
     def check(self, numbers: Sequence[float]) -> None:
         """Raise ValueInvalid unless floats are a place."""
-        given = dict(zip(self.fields, numbers, strict=True))
+        given = self.given(numbers)
         if self.name == UTM:
-            zone = given[ZONE] if self.zone is None else self.zone
-            mercator.check_grid(zone, given["easting"], given["northing"])
-        elif self.name == LLA:
+            mercator.check_grid(given[ZONE] if self.zone is None else self.zone, given["easting"], given["northing"])
+        elif kernels(self.name).is_angular:
             earth.check_lla(*self.lla(numbers))
         if GRID in (self.axes, AXES in given and earth.AXES[int(given[AXES])]):
             lat, lon, _ = self.lla(numbers)
@@ -245,26 +240,30 @@ class Place(NamedTuple):
             if each.origin is not None:
                 each.origin.settle(x, y, z)
 
-    def numbers(self, x: Any, y: Any, z: Any) -> list[Any]:
-        """Return its numbers of a position in ECEF; NaN where there are none, and `check_result` says why."""
+    def numbers(self, x: Any, y: Any, z: Any, read: Spot | None = None) -> list[Any]:
+        """Return its numbers of a position in ECEF; NaN where there are none, and `check_result` says why.
+
+        read: the place that the position was read as, where nothing has moved it: that is not taken through ECEF
+        """
         xp = namespace((x, y, z))
+        lla: Components = ()
+        if read is not None and kernels(read.place.name).is_angular:
+            lat, lon, alt = read.place.lla(read.numbers)
+            lla = lat, earth.eastward(lon, xp), earth.with_latitude(x, y, z, alt, xp)
         found: list[Any] = []
-        place: Components = ()
         for each in (self, *self.more):
-            if each.name == ECEF:
-                found += [x, y, z]
-            elif each.origin is not None:
+            row = kernels(each.name)
+            if each.origin is not None:
                 each.origin.settle(x, y, z)
-                found += earth.seen_from(*each.origin.pose(each.name), x, y, z)
-            else:
-                lat, lon, alt = place = place or earth.lla(x, y, z, xp)
-                if each.name == LLA:
-                    found += place
-                    continue
-                zone = _held(each.zone, lat, lon, xp)
-                ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
-                easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
-                found += [zone, easting, northing, alt, *grid[: len(each.fields) - 4]]
+            if row.is_angular:
+                lla = lla or earth.lla(x, y, z, xp)
+            own = row.write(each, lla if row.is_angular else (x, y, z), xp)[: len(each.fields)]
+            if read is not None and (read.place.name, read.place.origin) == (each.name, each.origin):
+                as_read = read.place.given(read.numbers)
+                own = tuple(
+                    _as_read(as_read.get(field), number, xp) for field, number in zip(each.fields, own, strict=True)
+                )
+            found += own
         return found
 
     def local(self, x: Any, y: Any, z: Any, rotation: Components) -> Components:
@@ -282,7 +281,7 @@ class Place(NamedTuple):
     def check_result(self, x: float, y: float, z: float) -> None:
         """Raise ValueInvalid unless a position in ECEF can be written so."""
         for each in (self, *self.more):
-            if each.name in (LLA, UTM):
+            if kernels(each.name).is_angular:
                 earth.check_ecef(x, y, z)
             if each.name == UTM or each.axes == GRID:
                 lat, lon, _ = earth.lla(x, y, z, floats)
@@ -292,8 +291,7 @@ class Place(NamedTuple):
         """Return its numbers as the keys that a mapping has."""
         own = dict(zip(self.fields, numbers, strict=False))
         if self.name == UTM:
-            zone = own[ZONE]
-            own = {UTM: own | {ZONE: zone if zone == SAMPLE else mercator.ZONES[int(zone)]}}
+            own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else mercator.ZONES[int(own[ZONE])]}}
         elif self.name == ECEF:
             own = {ECEF: [*own.values()]}
         rest = numbers[len(self.fields) :]
@@ -301,6 +299,112 @@ class Place(NamedTuple):
             own |= each.entry(rest)
             rest = rest[each.size :]
         return own
+
+
+class Spot(NamedTuple):
+    """A position as it was read: how it is written, and its numbers."""
+
+    place: Place
+    numbers: Sequence[Any]
+
+
+class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot be added to
+    """The components of a result at the place that its row was read as: `read`."""
+
+    read: Spot
+
+    def __new__(cls, parts: Components, read: Spot) -> Self:
+        """Put the two together."""
+        made = super().__new__(cls, parts)
+        made.read = read
+        return made
+
+
+def spot_of(lla: Sequence[Any]) -> Spot:
+    """Return latitude, longitude and height as a position that was read."""
+    return Spot(Place(LLA, ("lat", "lon", "alt")), tuple(lla))
+
+
+class Kernels(NamedTuple):
+    """The arithmetic of a row of POSITIONS.
+
+    read: takes a place, its numbers by field and a namespace, and returns lat, lon and alt; or x, y, z in ECEF
+    write: takes the place, these three and a namespace, and returns its numbers
+    is_angular: these are lat, lon, alt, which take no way through ECEF
+    least: how many of the numbers there must be; axes: of rotations there, where nobody says
+    is_nested: a mapping has the numbers below its name
+    """
+
+    read: Callable[[Place, dict[str, Any], Namespace], Components]
+    write: Callable[[Place, Components, Namespace], Components]
+    is_angular: bool = True
+    least: int | None = None
+    axes: str = ENU
+    is_nested: bool = False
+
+
+def _read_lla(_: Place, given: dict[str, Any], _xp: Namespace) -> Components:
+    lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
+    return lat, lon, _height(given, lat)
+
+
+def _read_utm(place: Place, given: dict[str, Any], xp: Namespace) -> Components:
+    east = given["easting"]
+    zone = given[ZONE] if place.zone is None else place.zone + (east - east)
+    return *mercator.lat_lon(zone, east, given["northing"], xp), _height(given, east)
+
+
+def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
+    lat, lon, alt = lla
+    zone = _held(place.zone, lat, lon, xp)
+    ends = xp.where(abs(lat) > 79.5, _edged(lat, END, xp), lat)
+    easting, northing, *grid = mercator.utm(zone, ends, lon, xp)
+    return zone, easting, northing, alt, *grid
+
+
+def _read_local(place: Place, given: dict[str, Any], _: Namespace) -> Components:
+    """Return x, y, z of axes at the origin; what is not there is 0."""
+    zero = next(iter(given.values())) * 0.0
+    return rigid.apply(*_origin(place), *(given.get(name, zero) for name in POSITIONS[place.name].names))
+
+
+def _write_local(place: Place, xyz: Components, _: Namespace) -> Components:
+    return earth.seen_from(*_origin(place), *xyz)
+
+
+def _origin(place: Place) -> Rigid:
+    if place.origin is None:
+        raise ValueInvalid(f"{place.name} needs an origin")
+    return place.origin.pose(place.name)
+
+
+def _as_is(_: Place, three: Components, _xp: Namespace) -> Components:
+    return three
+
+
+LLA_KERNELS = Kernels(_read_lla, _as_is, least=2)
+UTM_KERNELS = Kernels(_read_utm, _write_utm, least=3, axes=GRID, is_nested=True)
+LOCAL_KERNELS = Kernels(_read_local, _write_local, is_angular=False)
+ECEF_KERNELS = Kernels(
+    lambda _, given, _xp: tuple(given[axis] for axis in "xyz"), _as_is, is_angular=False, axes=ECEF, is_nested=True
+)
+
+
+@cache
+def kernels(name: str) -> Kernels:
+    """Return the arithmetic of a row of POSITIONS."""
+    module, _, found = POSITIONS[name].kernels.partition(":")
+    return getattr(import_module(module), found)  # type: ignore[no-any-return]
+
+
+def _height(given: dict[str, Any], other: Any) -> Any:
+    """Return the height above the ellipsoid, 0 where none is given."""
+    return given["msl"] + given["undulation"] if "msl" in given else given.get("alt", other - other)
+
+
+def _as_read(own: Any, made: Any, xp: Namespace) -> Any:
+    """Return a number as it was read where it is the one that was computed, but for rounding."""
+    return made if own is None else xp.where(abs(own - made) <= ROUNDING, own, made)
 
 
 class Earth(NamedTuple):

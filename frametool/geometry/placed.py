@@ -25,13 +25,14 @@ def compose(a: Components, b: Components) -> Components:
         return rigid.compose(*a, *b)
     first, second = pose_of(a), pose_of(b)
     if SCALED in (len(a), len(b)):
-        _refuse_both(a, b)
+        if UNCERTAIN in (len(a), len(b)):
+            raise ValueInvalid(NOT_BOTH)
         s1, s2 = scale_of(a), scale_of(b)
         x, y, z = second[:3]
         return (*rigid.compose(*first, s1 * x, s1 * y, s1 * z, *second[3:]), s1 * s2)
     from frametool.geometry import uncertainty
 
-    beside = uncertainty.composed(first, covariance_of(a), second, covariance_of(b))
+    beside = uncertainty.propagate_compose(first, covariance_of(a), second, covariance_of(b))
     return (*rigid.compose(*first, *second), *(beside or ()))
 
 
@@ -46,7 +47,7 @@ def inverse(a: Components) -> Components:
         return (x, y, z, *rotation)
     from frametool.geometry import uncertainty
 
-    return (x, y, z, *rotation, *uncertainty.inverted(pose, a[EXACT:]))
+    return (x, y, z, *rotation, *uncertainty.propagate_inverse(pose, a[EXACT:]))
 
 
 def relative(a: Components, b: Components) -> Components:
@@ -55,12 +56,13 @@ def relative(a: Components, b: Components) -> Components:
     pose = rigid.relative(*first, *second)
     if len(a) == len(b) == EXACT:
         return pose
-    _refuse_scales(a, b)
+    if SCALED in (len(a), len(b)):
+        raise ValueInvalid(SIMILARITY)
     from frametool.geometry import uncertainty
 
     of_a = covariance_of(a)
-    back = rigid.inverse(*first)
-    beside = uncertainty.composed(back, of_a and uncertainty.inverted(first, of_a), second, covariance_of(b))
+    of_back = of_a and uncertainty.propagate_inverse(first, of_a)
+    beside = uncertainty.propagate_compose(rigid.inverse(*first), of_back, second, covariance_of(b))
     return (*pose, *(beside or ()))
 
 
@@ -78,13 +80,3 @@ def covariance_of(a: Components) -> Components | None:
 def scale_of(a: Components) -> Number:
     """Return the scale of a similarity; 1 of a pose."""
     return a[EXACT] if len(a) == SCALED else 1.0
-
-
-def _refuse_both(a: Components, b: Components) -> None:
-    if UNCERTAIN in (len(a), len(b)):
-        raise ValueInvalid(NOT_BOTH)
-
-
-def _refuse_scales(a: Components, b: Components) -> None:
-    if SCALED in (len(a), len(b)):
-        raise ValueInvalid(SIMILARITY)

@@ -90,11 +90,13 @@ class Representation:
     alone: columns that say the last number where the others are missing and 0
     batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
     overview: the units in which an overview shows it ("" for no unit)
-    is_place: it says a position on the Earth and no rotation; `geometry.place` has its arithmetic
+    is_place: it says a position on the Earth and no rotation: a row of POSITIONS
+    kernels: of a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
     __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "is_place", "label",
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "is_place",
+        "kernels", "label",
         "name", "names", "overview", "searched", "shape", "summary", "whole",
     )  # fmt: skip
 
@@ -104,7 +106,7 @@ class Representation:
         check: Check | None = None, kept: Callable[..., Components] | None = None,
         shape: str | dict[str, int] = LIST, names: str = "", label: str = "", axes: str = "",
         whole: Whole | None = None, searched: bool = True, alone: str = "", overview: tuple[str, ...] = (),
-        batch: BatchRule | None = None,
+        batch: BatchRule | None = None, kernels: str = "",
     ) -> None:  # fmt: skip
         """Describe a notation.
 
@@ -130,6 +132,7 @@ class Representation:
         self._kept = kept
         self.batch = batch
         self.is_place = forward is _no_rotation
+        self.kernels = kernels
 
     def __repr__(self) -> str:
         """Show the name."""
@@ -305,16 +308,23 @@ REPRESENTATIONS: dict[str, Representation] = {
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
         batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
     ),
+}  # fmt: skip
+PLACE = "frametool.geometry.place"
+POSITIONS = {
     "lla": Representation("lat lon alt", (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
-                          names="lat lon alt"),
-    "ecef": Representation("ecef_x ecef_y ecef_z", (), "the Earth's frame: x to lat 0 lon 0, z to the north pole"),
+                          names="lat lon alt", kernels=f"{PLACE}:LLA_KERNELS"),
+    "ecef": Representation("ecef_x ecef_y ecef_z", (), "the Earth's frame: x to lat 0 lon 0, z to the north pole",
+                           kernels=f"{PLACE}:ECEF_KERNELS"),
     "utm": Representation("utm_zone easting northing alt", (), "UTM, a zone as 32N or 32S and metres",
-                          names="zone easting northing alt"),
-    "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up"),
-    "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down"),
+                          names="zone easting northing alt", kernels=f"{PLACE}:UTM_KERNELS"),
+    "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up",
+                          kernels=f"{PLACE}:LOCAL_KERNELS"),
+    "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down",
+                          kernels=f"{PLACE}:LOCAL_KERNELS"),
 }  # fmt: skip
 EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
-ROTATIONS = {_name: _row for _name, _row in REPRESENTATIONS.items() if not _row.is_place}
+ROTATIONS = {**REPRESENTATIONS}
+REPRESENTATIONS |= POSITIONS
 for _name, _row in REPRESENTATIONS.items():
     _row.name = _name
 

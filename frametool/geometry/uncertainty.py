@@ -16,7 +16,7 @@ from frametool.geometry import quaternion
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from frametool.geometry.types import Components, Number, Rigid
+    from frametool.geometry.types import Array, Components, Number, Rigid
 
     Entries: TypeAlias = Sequence[Any]
     Rows: TypeAlias = list[list[Any]]
@@ -32,59 +32,78 @@ WIDE_RULE = "wide"
 FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent off above 0.2"
 
 
-def composed(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | None) -> Components | None:
-    """Return the covariance of a_from_c of those of a_from_b and b_from_c: [I, -[R t_b]x; 0, I] A [..]' + R B R'."""
+def propagate(jacobian: Rows, entries: Entries) -> Components:
+    """Return J A J'; floats give the same bits as a row of columns."""
+    import numpy as np
+
+    flat = [number for row in jacobian for number in row]
+    whole = np.stack(np.broadcast_arrays(*flat, *entries), axis=-1)
+    side = len(jacobian[0])
+    j, a = (part.reshape(*whole.shape[:-1], -1, side) for part in np.split(whole, [len(flat)], axis=-1))
+    found = _product(_product(j, a), np.swapaxes(j, -1, -2))
+    rows = found.tolist() if found.ndim == 2 else np.moveaxis(found, (-2, -1), (0, 1))
+    return symmetric([number for row in rows for number in row])
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Multiply matrices, each sum in its order: BLAS has another one on every processor."""
+    return sum(a[..., :, at, None] * b[..., None, at, :] for at in range(a.shape[-1]))  # type: ignore[return-value]
+
+
+def propagate_compose(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | None) -> Components | None:
+    """Return the covariance of a_from_c of those of a_from_b and b_from_c: J A J' + R B R', J the adjoint of R t_b."""
     arm = quaternion.rotate(*a[3:], *b[:3])
-    return added(of_a and levered(of_a, *arm), of_b and turned(of_b, *a[3:]))
+    return total(of_a and propagate(adjoint(*arm), of_a), of_b and rotate_covariance(of_b, *a[3:]))
 
 
-def inverted(pose: Rigid, entries: Entries) -> Components:
-    """Return the covariance of b_from_a of that of a_from_b: R' [I, [t]x; 0, I] A [..]' R."""
+def propagate_inverse(pose: Rigid, entries: Entries) -> Components:
+    """Return the covariance of b_from_a of that of a_from_b: J A J', J = [R', R'[t]x; 0, R']."""
     x, y, z, *rotation = pose
-    return turned(levered(entries, -x, -y, -z), *quaternion.conjugate(*rotation))
+    back = quaternion.conjugate(*rotation)
+    crossed = [quaternion.rotate(*back, *each) for each in ((x - x, z, -y), (-z, x - x, x), (y, -x, x - x))]
+    rows = _rows(*back)
+    upper = [row + list(beside) for row, beside in zip(rows, zip(*crossed, strict=True), strict=True)]
+    return propagate(upper + [[0.0] * 3 + row for row in rows], entries)
 
 
 def of_point(pose: Rigid, entries: Entries | None, point: Components, of_point: Entries | None) -> Components | None:
     """Return the 3 x 3 covariance of a moved point: [I, -[R p]x] A [..]' + R C R'."""
-    arm = quaternion.rotate(*pose[3:], *point)
-    moved = entries and blocks(levered(entries, *arm))[0]
-    return added(moved and symmetric(moved), of_point and turned(of_point, *pose[3:]))
+    jacobian = adjoint(*quaternion.rotate(*pose[3:], *point))[:3]
+    return total(entries and propagate(jacobian, entries), of_point and rotate_covariance(of_point, *pose[3:]))
 
 
 def of_vector(pose: Rigid, entries: Entries | None, vector: Components, of_vector: Entries | None) -> Components | None:
-    """Return the 3 x 3 covariance of a turned vector: [R v]x A_rr [R v]x' + R C R'."""
-    crossed = skew(*quaternion.rotate(*pose[3:], *vector))
-    moved = entries and symmetric(product(product(crossed, blocks(entries)[2]), transposed(crossed)))
-    return added(moved, of_vector and turned(of_vector, *pose[3:]))
+    """Return the 3 x 3 covariance of a turned vector: [0, -[R v]x] A [..]' + R C R'."""
+    jacobian = [[0.0] * 3 + row[3:] for row in adjoint(*quaternion.rotate(*pose[3:], *vector))[:3]]
+    return total(entries and propagate(jacobian, entries), of_vector and rotate_covariance(of_vector, *pose[3:]))
 
 
-def levered(entries: Entries, x: Number, y: Number, z: Number) -> Components:
-    """Return J A J' with J = [I, -[v]x; 0, I]: that of a point fixed to the frame, at v from its origin."""
-    placed, mixed, turning = blocks(entries)
-    arm = transposed(skew(x, y, z))  # -[v]x
-    across = plus(mixed, product(arm, turning))
-    whole = plus(plus(placed, product(arm, transposed(mixed))), product(across, transposed(arm)))
-    return of_blocks(whole, across, turning)
+def adjoint(x: Number, y: Number, z: Number) -> Rows:
+    """Return [I, -[v]x; 0, I]: what a pose's d does to a point fixed to the frame, at v from its origin."""
+    identity = [[float(i == j) for j in range(6)] for i in range(6)]
+    identity[0][4:], identity[1][3:], identity[2][3:5] = [z, -y], [-z, 0.0, x], [y, -x]
+    return identity
 
 
-def turned(entries: Entries, x: Number, y: Number, z: Number, w: Number) -> Components:
+def rotate_covariance(entries: Entries, x: Number, y: Number, z: Number, w: Number) -> Components:
     """Return each 3 x 3 block C as R C R'."""
-    rows = _rows(quaternion.to_matrix(x, y, z, w))
-    back = transposed(rows)
-    if len(entries) == POINT:
-        return symmetric(product(product(rows, _rows(entries)), back))
-    placed, mixed, turning = (product(product(rows, block), back) for block in blocks(entries))
-    return of_blocks(placed, mixed, turning)
+    rows, zeros = _rows(x, y, z, w), [0.0] * 3
+    whole = rows if len(entries) == POINT else [row + zeros for row in rows] + [zeros + row for row in rows]
+    return propagate(whole, entries)
 
 
-def moved(move: Callable[..., Components], pose: Rigid, entries: Entries) -> Components:
-    """Return that of a twist or wrench: A C A', where A is what `move` does by an exact pose."""
-    columns = [list(move(*pose, *[float(i == j) for j in range(6)])) for i in range(6)]
-    rows = [list(entries[6 * i : 6 * i + 6]) for i in range(6)]
-    return symmetric(product(product(transposed(columns), rows), columns))
+def _rows(x: Number, y: Number, z: Number, w: Number) -> Rows:
+    nine = quaternion.to_matrix(x, y, z, w)
+    return [list(nine[at : at + 3]) for at in (0, 3, 6)]
 
 
-def added(a: Entries | None, b: Entries | None) -> Components | None:
+def of_moved(move: Callable[..., Components], pose: Rigid, entries: Entries) -> Components:
+    """Return that of a twist or wrench that `move` moves by an exact pose."""
+    columns = [move(*pose, *[float(i == j) for j in range(6)]) for i in range(6)]
+    return propagate([list(row) for row in zip(*columns, strict=True)], entries)
+
+
+def total(a: Entries | None, b: Entries | None) -> Components | None:
     """Return the covariance of independent things together."""
     if a is None or b is None:
         only = b if a is None else a
@@ -92,56 +111,10 @@ def added(a: Entries | None, b: Entries | None) -> Components | None:
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
-def blocks(entries: Entries) -> tuple[Rows, Rows, Rows]:
-    """Return that of the position, of position and turn, and of the turn."""
-    rows = [list(entries[6 * i : 6 * i + 6]) for i in range(6)]
-    return [row[:3] for row in rows[:3]], [row[3:] for row in rows[:3]], [row[3:] for row in rows[3:]]
-
-
-def of_blocks(placed: Rows, mixed: Rows, turning: Rows) -> Components:
-    """Join three blocks; the fourth is the second one's transpose."""
-    upper = [[*a, *b] for a, b in zip(placed, mixed, strict=True)]
-    lower = [[*a, *b] for a, b in zip(transposed(mixed), turning, strict=True)]
-    return symmetric(upper + lower)
-
-
-def symmetric(rows: Sequence[Sequence[Any]]) -> Components:
-    """Return the entries of rows, those below the diagonal written from above it."""
-    size = range(len(rows))
-    return tuple(rows[min(i, j)][max(i, j)] for i in size for j in size)
-
-
-def skew(x: Number, y: Number, z: Number) -> Rows:
-    """Return [v]x: [v]x a = v x a."""
-    zero = x - x
-    return [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-
-
-def product(a: Rows, b: Rows) -> Rows:
-    """Multiply matrices, each sum in its order: `sum` compensates its rounding from Python 3.12 on."""
-    columns = transposed(b)
-    return [[_inner(row, column) for column in columns] for row in a]
-
-
-def _inner(row: Sequence[Any], column: Sequence[Any]) -> Any:
-    total = row[0] * column[0]
-    for x, y in zip(row[1:], column[1:], strict=True):
-        total = total + x * y
-    return total
-
-
-def plus(a: Rows, b: Rows) -> Rows:
-    """Add matrices."""
-    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
-
-
-def transposed(a: Rows) -> Rows:
-    """Swap rows and columns."""
-    return [list(column) for column in zip(*a, strict=True)]
-
-
-def _rows(nine: Entries) -> Rows:
-    return [list(nine[at : at + 3]) for at in (0, 3, 6)]
+def symmetric(entries: Entries) -> Components:
+    """Return the entries with those below the diagonal written from above it."""
+    side = round(len(entries) ** 0.5)
+    return tuple(entries[side * min(i, j) + max(i, j)] for i in range(side) for j in range(side))
 
 
 # --- what is a covariance, and which is too wide for the first order ---
@@ -173,69 +146,32 @@ def wrong_count(count: int, sizes: Sequence[int]) -> str:
 
 def check(entries: Sequence[float]) -> None:
     """Raise ValueInvalid unless these 36 or 9 numbers are a covariance: known, symmetric, not negative."""
-    size = 6 if len(entries) == 36 else 3
-    if entries[0] == UNKNOWN:
-        raise ValueInvalid("covariance[0] is -1: 'unknown' in ROS; leave the covariance out")
-    for i in range(size):
-        for j in range(i):
-            upper, lower = entries[size * j + i], entries[size * i + j]
-            both = entries[size * i + i] * entries[size * j + j]
-            if upper != lower and abs(upper - lower) > ASYMMETRY * abs(both) ** 0.5:
-                said = f"[{j}][{i}] is {short(upper)}, [{i}][{j}] is {short(lower)}"
-                raise ValueInvalid(f"covariance is not symmetric: {said}")
-    if not _is_positive(entries, size):
-        import numpy as np
-
-        least, *_, most = np.linalg.eigvalsh(np.reshape(entries, (size, size))).tolist()
-        if least < -NEGATIVE * abs(most):
-            raise ValueInvalid(f"covariance is not positive: its smallest eigenvalue is {short(least)}")
-
-
-def _is_positive(entries: Sequence[float], size: int) -> bool:
-    """Tell whether the factors of L D L' are all positive, or zero in a row of zeros; False says that one must look."""
-    rows = [list(entries[size * i : size * i + size]) for i in range(size)]
-    for k in range(size):
-        if rows[k][k] == 0.0 and not any(rows[i][k] for i in range(k, size)):
-            continue
-        if not rows[k][k] > 0.0:
-            return False
-        for i in range(k + 1, size):
-            factor = rows[i][k] / rows[k][k]
-            for j in range(k + 1, size):
-                rows[i][j] -= factor * rows[k][j]
-    return True
-
-
-def bad_rows(entries: Sequence[Any]) -> dict[int, str]:
-    """Return what is wrong with the rows of columns of a covariance, by row."""
     import numpy as np
 
-    size = 6 if len(entries) == 36 else 3
-    rows = [[np.asarray(entries[size * i + j]) for j in range(size)] for i in range(size)]
-    wrong = rows[0][0] == UNKNOWN
-    for i in range(size):
-        for j in range(i):
-            both = np.sqrt(abs(rows[i][i] * rows[j][j]))
-            wrong = wrong | (abs(rows[i][j] - rows[j][i]) > ASYMMETRY * both)
-    suspect = wrong
-    for k in range(size):  # as `_is_positive`, all rows at once
-        below = [rows[i][k] for i in range(k + 1, size)]
-        empty = (rows[k][k] == 0.0) & ~np.any([each != 0.0 for each in below], axis=0) if below else rows[k][k] == 0.0
-        suspect = suspect | ~((rows[k][k] > 0.0) | empty)
-        pivot = np.where(rows[k][k] > 0.0, rows[k][k], 1.0)
-        for i in range(k + 1, size):
-            factor = rows[i][k] / pivot
-            rows[i] = [*rows[i][: k + 1], *(rows[i][j] - factor * rows[k][j] for j in range(k + 1, size))]
-    doubtful = np.flatnonzero(suspect & ~wrong)
-    whole = np.stack([np.asarray(entry)[doubtful] for entry in entries], -1).reshape(-1, size, size)
-    values = np.linalg.eigvalsh(whole)
-    negative = doubtful[values[:, 0] < -NEGATIVE * abs(values[:, -1])]
+    if reason := problems(np.array([entries])).get(0):
+        raise ValueInvalid(reason)
+
+
+def problems(rows: Array) -> dict[int, str]:
+    """Return what is wrong with covariances (n, 36) or (n, 9), by row; one that is not finite is left to others."""
+    import numpy as np
+
+    side = round(rows.shape[1] ** 0.5)
+    whole = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, 0.0).reshape(-1, side, side)
+    roots = np.sqrt(abs(np.diagonal(whole, axis1=1, axis2=2)))
+    skewed: Any = abs(whole - whole.swapaxes(1, 2)) > ASYMMETRY * roots[:, :, None] * roots[:, None, :]
+    wrong: Any = skewed.any((1, 2)) | (whole[:, 0, 0] == UNKNOWN)
+    values = np.linalg.eigvalsh(np.where(wrong[:, None, None], 0.0, whole))
     found = {}
-    for row in (*np.flatnonzero(wrong).tolist(), *negative.tolist()):
-        try:
-            check([float(entry[row]) for entry in entries])
-        except ValueInvalid as error:
-            found[row] = str(error)
+    for row in np.flatnonzero(wrong | (values[:, 0] < -NEGATIVE * abs(values[:, -1]))).tolist():
+        if whole[row, 0, 0] == UNKNOWN:
+            found[row] = "covariance[0] is -1: 'unknown' in ROS; leave the covariance out"
+        elif wrong[row]:
+            i, j = next((i, j) for i, j in np.argwhere(skewed[row]).tolist() if j < i)
+            said = f"[{j}][{i}] is {short(whole[row, j, i])}, [{i}][{j}] is {short(whole[row, i, j])}"
+            found[row] = f"covariance is not symmetric: {said}"
+        else:
+            found[row] = f"covariance is not positive: its smallest eigenvalue is {short(values[row, 0])}"
     return found
 
 

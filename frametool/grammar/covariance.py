@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
 
 COVARIANCE, SIGMA = "covariance", "sigma"
-warn_if_wide, widest_turn = uncertainty.warn_if_wide, uncertainty.widest_turn
 LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and how many make a metre
 ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are degrees
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -39,6 +39,9 @@ PLACE_KEYS = frozenset((
 ))  # fmt: skip
 FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
 EARTH_FRAMES = representations.EARTH_FRAMES
+# the positions whose keys and columns are just their names and numbers: ours have readers of their own
+FLAT = {key: row.names for key, row in representations.POSITIONS.items() if not row.kernels.startswith("frametool")}
+FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 
 
 def in_nanoseconds(name: str) -> bool:
@@ -87,7 +90,7 @@ def _is_known(name: str) -> bool:
 
 def may_be_on_earth(name: str) -> bool:
     """Tell whether a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
-    return re.search(_EARTH, name) is not None
+    return re.search(_EARTH, name) is not None or name in FLAT_NAMES
 
 
 def may_be_uncertain(name: str) -> bool:

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import re
 from math import hypot, isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, placed, quaternion
-from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place
-from frametool.geometry.representations import HEADING, REPRESENTATIONS
+from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
+from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
-from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.names import EARTH_FRAMES, FLAT, FLAT_NAMES
 from frametool.grammar.readers import Misfit, NotARotation, Reading, kind, read_number, read_numbers, within
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.text.numbers import NotFinite, parse_angle, parse_number
@@ -46,7 +46,8 @@ NOT_READ = {  # key or column -> what to write instead
     LLA: "lla does not say which number is lat; write {lat: .., lon: .., alt: ..}",
     "mgrs": "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)",
 }
-EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | {"convergence_deg", "grid_scale", ECEF, AT, *HEADINGS}
+BESIDE = frozenset(("convergence_deg", "grid_scale"))
+EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | BESIDE | {ECEF, AT, *HEADINGS} | FLAT_NAMES
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 LEVEL = 1e-9  # of 1: what is less level points nowhere
 NEAR = 0.01  # metres: how far two positions of one entry may lie apart
@@ -61,13 +62,6 @@ COMPASS = re.compile(r"\s*(\d+(?:\.\d*)?)\s*([NSEWnsew])\s*")
 def not_on_ellipsoid(name: str) -> str:
     """Say that a height is not above the ellipsoid."""
     return f"{shown(name)} is above sea level, alt above the ellipsoid; give undulation (the geoid there) too, or alt"
-
-
-class Spot(NamedTuple):
-    """A position that was read: how it is written, and its numbers."""
-
-    place: Place
-    numbers: tuple[float, ...]
 
 
 def without_place(mapping: dict[str, Any]) -> dict[str, Any]:
@@ -106,7 +100,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     if needs_axes and not axes:
         raise Misfit(UNSAID)
     if not needs_axes:
-        return inner._replace(position=position, parent=inner.parent or ECEF)
+        return inner._replace(position=position, parent=inner.parent or ECEF, read=spots[0])
     place = place._replace(axes=axes)
     try:
         place.check(numbers)
@@ -114,6 +108,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
         raise Misfit(str(error), (next(iter(own)),)) from None
     made = placed.compose(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
+    found = found if inner.position else found._replace(read=spots[0])
     return found if rotation is not None or stands else found._replace(rotation=None)
 
 
@@ -134,6 +129,10 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
         found.append(_lla(own, reading))
     if LOCAL_KEYS.intersection(own):
         found.append(_local(own, reading))
+    for name, fields in FLAT.items():
+        if {*fields} <= own.keys():
+            numbers = tuple(_member(field, read_number, own[field]) for field in fields)
+            found.append(Spot(Place(name, fields), numbers))
     for spot in found:
         try:
             spot.place.check(spot.numbers)
@@ -225,7 +224,7 @@ def _utm(value: Any, reading: Reading) -> Spot:
         example = "{zone: 32N, easting: .., northing: .., alt: ..}"
         raise Misfit(f"expected {example}, found {kind(value)}")
     _refuse_not_read(value)
-    known = {*REPRESENTATIONS[UTM].names, "utm_zone", *GEOID, *SEA_LEVEL, "altitude", "height", "hae",
+    known = {*POSITIONS[UTM].names, "utm_zone", *GEOID, *SEA_LEVEL, "altitude", "height", "hae",
              "convergence_deg", "grid_scale"}  # fmt: skip
     if unknown := [key for key in value if key not in known]:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
@@ -251,7 +250,7 @@ def _utm(value: Any, reading: Reading) -> Spot:
         numbers.append(0.0)
     if zones[0] < 0.0 and 3.5e6 <= numbers[2] <= 4.5e6:
         reading.note(band_s(zones[0], numbers[2]), rule="band-s")
-    return Spot(Place(UTM, REPRESENTATIONS[UTM].names), tuple(numbers))
+    return Spot(Place(UTM, POSITIONS[UTM].names), tuple(numbers))
 
 
 def band_s(zone: float, northing: float) -> str:
@@ -281,14 +280,14 @@ def _local(own: dict[str, Any], reading: Reading) -> Spot:
     name = NED if "down" in own else ENU
     if "up" in own and "down" in own:
         raise Misfit("up and down are both there; keep one")
-    missing = [key for key in REPRESENTATIONS[name].names if key not in own]
+    missing = [key for key in POSITIONS[name].names if key not in own]
     if missing:
         raise Misfit(f"missing {' and '.join(missing)}; write east, north, up or north, east, down")
     origin = reading.earth.origin if reading.earth else None
     if origin is None:
         raise Misfit("east, north and up need an origin: --origin {lat: .., lon: ..}, or place the frame with at:")
-    numbers = tuple(_member(key, read_number, own[key]) for key in REPRESENTATIONS[name].names)
-    return Spot(Place(name, REPRESENTATIONS[name].names, name, None, origin), numbers)
+    numbers = tuple(_member(key, read_number, own[key]) for key in POSITIONS[name].names)
+    return Spot(Place(name, POSITIONS[name].names, name, None, origin), numbers)
 
 
 def _position(spot: Spot) -> tuple[float, float, float]:
@@ -320,7 +319,7 @@ def check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
     """Refuse a place on the Earth under another frame."""
     for key in ("parent", "frame"):
         value = mapping.get(key)
-        if value in REPRESENTATIONS and value == UTM:
+        if value == UTM:
             raise Misfit("utm is no rigid frame and no parent; place the frame: at: {utm: {..}}, axes: grid", (key,))
         if value not in (None, *EARTH_FRAMES):
             what = "at" if AT in own else next(name for name in own if name in EARTH_KEYS)
@@ -374,13 +373,19 @@ def check_in_ecef(parent: str | None, place: Place) -> None:
     raise ValueInvalid(NOT_IN_ECEF.format(names, found))
 
 
-def _numbers_of(frame: str | None, position: Sequence[float], place: Place) -> list[float]:
-    """Return the numbers of a position in ecef; raises ValueInvalid of another frame, or one that cannot be written."""
+def _numbers_of(
+    frame: str | None, position: Sequence[float], place: Place, read: Spot | None = None
+) -> list[float]:
+    """Return the numbers of a position in ecef; raises ValueInvalid of another frame, or one that cannot be written.
+
+    read: the place that it was read as, which counts if it still is there
+    """
     check_in_ecef(frame, place)
     x, y, z = position
     place.settle(x, y, z)
     place.check_result(x, y, z)
-    return [number + 0.0 for number in place.numbers(x, y, z)]
+    stays = read is not None and tuple(read.place.ecef(read.numbers)) == (x, y, z)
+    return [number + 0.0 for number in place.numbers(x, y, z, read if stays else None)]
 
 
 def _seen_there(pose: Pose, place: Place) -> Pose:
@@ -396,7 +401,7 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
     Raises ValueInvalid for a pose in another frame, and for a position that cannot be written so.
     """
-    entry = place.entry(_numbers_of(pose.parent, pose.components[:3], place))
+    entry = place.entry(_numbers_of(pose.parent, pose.components[:3], place, pose.read))
     if place.name == ECEF:
         entry = {"xyz": entry.pop(ECEF)} | entry
     axes = {} if pose.rotation is None or place.name == ECEF else {AXES_KEY: place.axes}
@@ -408,7 +413,7 @@ def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
     Raises as `placed_entry`.
     """
-    numbers = _numbers_of(pose.parent, pose.components[:3], place)
+    numbers = _numbers_of(pose.parent, pose.components[:3], place, pose.read)
     cells = {
         name: place.words[at][int(number)] if at in place.words else number
         for at, (name, number) in enumerate(zip(place.columns, numbers, strict=True))
@@ -430,7 +435,7 @@ def overview(pose: Pose) -> list[tuple[str, str]]:
         grid = f"{ZONES[int(zone)]} {easting:.4f} {northing:.4f} m  convergence {round(convergence, 6) + 0.0:.6f} deg"
         said.append(("utm", grid))
     if pose.rotation is not None:
-        qx, qy, qz, qw = Place(LLA, REPRESENTATIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
+        qx, qy, qz, qw = Place(LLA, POSITIONS[LLA].names, ENU).local(x, y, z, pose.rotation)
         east, north, _ = quaternion.rotate(qx, qy, qz, qw, 1.0, 0.0, 0.0)
         level = hypot(east, north)
         heading = round(floats.bearing(east, north, level, floats) * floats.RADIAN, 6) % 360.0 if level > LEVEL else 0.0
@@ -464,7 +469,7 @@ def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
 
     Nothing of a frame that is no place, and the pose as it is.
     """
-    place = Place(LLA, REPRESENTATIONS[LLA].names, ENU) if place is None else place
+    place = Place(LLA, POSITIONS[LLA].names, ENU) if place is None else place
     try:
         entry, local = placed_entry(pose, place._replace(more=()).with_grid(gridded=False))
     except ValueInvalid:
@@ -472,11 +477,13 @@ def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
     return ({}, pose) if place.name == ECEF else (entry.pop(UTM, {}) | entry, local)
 
 
-def point_entry(frame: str | None, point: Sequence[float], place: Place) -> dict[str, Any]:
+def point_entry(
+    frame: str | None, point: Sequence[float], place: Place, read: Spot | None = None
+) -> dict[str, Any]:
     """Return a point of ecef as a mapping has it: at a place, which says what it is given in, or with its frame.
 
     Raises ValueInvalid for a point of another frame, and for one that cannot be written so.
     """
-    entry = place.entry(_numbers_of(frame, point, place))
+    entry = place.entry(_numbers_of(frame, point, place, read))
     in_metres = entry.pop(ECEF, None)
     return ({"frame": frame, "point": in_metres} if in_metres else {}) | entry

@@ -40,6 +40,7 @@ from frametool.text.numbers import parse_length, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
+    from frametool.geometry.place import Spot
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Quaternion, Vector
@@ -67,6 +68,7 @@ class Pose(NamedTuple):
     """One record: the pose of `name` in `parent`, and its time; what was not given is None.
 
     covariance: its 36 entries, None where it is exact; scale: of a similarity p' = scale R p + t
+    read: the place on the Earth that its position was read as
     """
 
     position: Vector | None = None
@@ -76,6 +78,7 @@ class Pose(NamedTuple):
     stamp_ns: int | None = None
     covariance: Components | None = None
     scale: float = 1.0
+    read: Spot | None = None
 
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:

@@ -115,4 +115,4 @@ class MessageMover:
             entries = tuple(part.pose.covariance.tolist())
             if any(entries) and entries[0] != uncertainty.UNKNOWN:
                 uncertainty.taken(entries)
-                part.pose.covariance = np.array(uncertainty.turned(entries, *mover[3:])) + 0.0
+                part.pose.covariance = np.array(uncertainty.rotate_covariance(entries, *mover[3:])) + 0.0

@@ -300,5 +300,5 @@ class ArrayWriter(ColumnsWriter):
             columns = [columns[0] * 0.0] * 3 + columns
         nothing = columns[0] * 0.0  # nan in rows without a result; the last row of a matrix is four plain numbers
         with np.errstate(invalid="ignore"):
-            numbers = self.target.numbers(tuple(columns[: self.own]), arrays)
+            numbers = self.target.written(block.unmoved(tuple(columns[: self.own])), arrays)
         return [*(each + nothing if isinstance(each, float) else each for each in numbers), *columns[self.own :]]

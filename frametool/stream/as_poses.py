@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
-from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,7 +25,7 @@ from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
 from frametool.stream.header import listed
-from frametool.stream.row_layout import AS_READ, POINT, POSE, Shape, Target
+from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
@@ -125,7 +124,8 @@ class FormatConverter:
             return []
         from frametool.stream.earth_columns import zone_notes
 
-        numbers = place.numbers(*(np.ascontiguousarray(poses.numbers[there, at]) for at in range(3)))
+        x, y, z = (np.ascontiguousarray(poses.numbers[there, at]) for at in range(3))
+        numbers = place.numbers(x, y, z)
         return zone_notes(place, numbers, lambda row: int(poses.lines[there[row]]))
 
     def _settle(self, shape: Shape, plan: Plan, columns: str, line: int = 0) -> None:
@@ -147,14 +147,12 @@ class FormatConverter:
         request, unasked = settle_stamps(begun.table, request, self.source)
         rows = TablePoses(begun, self.form, request, self.source)
         self._settle(rows.shape, rows.plan, rows.columns, line=1)
-        count = 0
+        count = before = mended = 0
         yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
-        for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
-            before, mended = rows.rows, rows.mended
-            poses = rows.of_block(text)
+        for block, _, text in rows.blocks(begun):
+            poses = self._with_place(block, lambda size: [*rows.given[:size]])
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            poses = self._with_place(poses, lambda: [*rows.given])
             stamps = self._stamps(poses, form, count)
             count += len(poses.numbers)
             if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
@@ -166,6 +164,7 @@ class FormatConverter:
                     b"", rows.faults, rows.rows - before, text.count(b"\n"), rows.mended - mended, rows.notes, len(text)
                 ),
             )
+            before, mended = rows.rows, rows.mended
         if self.stamps:
             self.stamps.finish(count, self.source)
         if is_trajectory(self.form):
@@ -200,8 +199,7 @@ class FormatConverter:
         yield Step(rows.poses(opened.nothing()), Outcome(b""))
         for batch in opened.batches():
             poses = rows.poses(batch)
-            numbers = partial(_numbers_of, batch, rows.layout.places, poses.lines)
-            poses = self._with_place(poses, numbers)
+            poses = self._with_place(poses, partial(_numbers_of, batch, rows.layout.places, poses.lines))
             if not self.to_arrays and self.request.on_error != NULL:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
@@ -213,12 +211,13 @@ class FormatConverter:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.form} has no place for them")
 
-    def _with_place(self, poses: RowPoses, numbers: Callable[[], Sequence[Any]]) -> RowPoses:
+    def _with_place(self, poses: RowPoses, numbers: Callable[[int], Sequence[Any]]) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        if not is_recording(self.style.form) or self.shape.place is None:
+        if not (is_recording(self.style.form) or self.style.place) or self.shape.place is None:
             return poses
-        read = self.request.operation.place_as_read(self.shape, numbers())
-        return poses._replace(extras={**poses.extras, AS_READ: np.column_stack(read)}) if read else poses
+        operation = self.request.operation
+        read = operation.place_as_read(self.shape, numbers) if operation.keeps_frames else ()
+        return poses._replace(read=np.column_stack(read)) if read else poses
 
     # --- forms that list poses ---
 
@@ -241,26 +240,26 @@ class FormatConverter:
         rename = rename_of(request) or (lambda parent, name: (parent, name))
         for each in blocks(self.module.poses(file, options), form, file, options, named=False):
             block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
-            run = Run(plan, block, state)
-            good = run.rows.tolist()
+            done = Run(plan, block, state)
+            good = done.rows.tolist()
             images = [each.images[row] for row in good]
             extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
             if self.form == self.style.form:
                 extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
-            lines = np.array(each.lines, np.int64)[run.rows]
+            lines = np.array(each.lines, np.int64)[done.rows]
             own = each.names[0] is not None
             pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
-            stamps = None if own or block.times is None else block.times[run.rows]
-            poses = RowPoses(run.results, self._held(stamps, form), lines, parents, names, extras)
-            found = sorted(faults + run.faults())
-            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(run, block)))
+            stamps = None if own or block.times is None else block.times[done.rows]
+            poses = RowPoses(done.results, self._held(stamps, form), lines, parents, names, extras)
+            found = sorted(faults + done.faults())
+            yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block)))
             faults.clear()
 
 
-def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints) -> list[Floats]:
-    """Return some columns of a batch in some of its rows."""
-    return [batch.numbers(place).values[rows] for place in places]
+def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints, count: int) -> list[Floats]:
+    """Return the first columns of some in some rows of a batch."""
+    return [batch.numbers(place).values[rows] for place in places[:count]]
 
 
 def _none() -> RowPoses:

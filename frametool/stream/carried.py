@@ -41,7 +41,7 @@ def with_own(
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
         count = sum(shape.covariance)
         parts = [beside[at : at + size] for at in range(0, count, size)]
-        turned = [part if mover is None else uncertainty.turned(part, *mover[3:]) for part in parts]
+        turned = [part if mover is None else uncertainty.rotate_covariance(part, *mover[3:]) for part in parts]
         return pose, (*chain.from_iterable(turned), *beside[count:])
     if shape.inverse:
         back = inverse((*rigid.inverse(*pose), *given))
@@ -72,7 +72,7 @@ def along_ecef(shape: Shape, own: Components, beside: Components) -> tuple[Shape
         given = given if shape.kind == POSE else tuple(given[6 * i + j] for i in range(3) for j in range(3))
     turn = place._replace(level=False).turned(own[: place.size], IDENTITY) if place is not None else IDENTITY
     made = shape._replace(covariance=(len(given), *shape.covariance[1:]), sigma=())
-    return made, (*uncertainty.turned(given, *turn), *beside[size:])
+    return made, (*uncertainty.rotate_covariance(given, *turn), *beside[size:])
 
 
 def expanded(shape: Shape, numbers: Components) -> Components:
@@ -106,8 +106,9 @@ def move(shape: Shape, own: Components, beside: Components, mover: Components, *
         found = carry(pose, mover[EXACT:], own, beside[:size] or None)
         return (*moved, *(found or ()), *beside[size:])
     for size in shape.covariance:
-        by = MOVERS[kind] if kind in (TWIST, WRENCH) else None
-        own_covariance = beside[:size]
-        turned = uncertainty.moved(by, pose, own_covariance) if by else uncertainty.turned(own_covariance, *pose[3:])
+        if kind in (TWIST, WRENCH):
+            turned = uncertainty.of_moved(MOVERS[kind], pose, beside[:size])
+        else:
+            turned = uncertainty.rotate_covariance(beside[:size], *pose[3:])
         moved, beside = (*moved, *turned), beside[size:]
     return (*moved, *beside)

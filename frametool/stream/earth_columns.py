@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, ValueInvalid, shown, warn
 from frametool.geometry.earth import AXES as AXES_AT
-from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place
-from frametool.geometry.representations import HEADING, REPRESENTATIONS, Notation
+from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, UNSAID, UTM, ZONE, Earth, Place, kernels
+from frametool.geometry.representations import HEADING, POSITIONS, Notation
 from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 from frametool.geometry.transverse_mercator import zone_number
-from frametool.grammar.names import FIX, PARENT_COLUMNS, may_be_on_earth
+from frametool.grammar.names import FIX, FLAT, PARENT_COLUMNS, may_be_on_earth, may_be_uncertain
 from frametool.grammar.place import (
     GEOID,
     NO_ALT,
@@ -30,8 +30,8 @@ from frametool.grammar.place import (
     not_on_ellipsoid,
 )
 from frametool.stream.faults import ZONES, Misused, RowNote
-from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, places_named
-from frametool.stream.row_layout import POINT, VECTOR
+from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
+from frametool.stream.row_layout import POINT, VECTOR, place_of
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 
     Reader: TypeAlias = Callable[[str], float]
 
-ECEF_COLUMNS = REPRESENTATIONS[ECEF].columns
+ECEF_COLUMNS = POSITIONS[ECEF].columns
 STATUS, DATUM, EPSG, PARENT = "status", "datum", "epsg", "parent"
 OTHERS = (*SEA_LEVEL, "easting", "northing", "east", "north", "up", "down", *ECEF_COLUMNS, ZONE, "heading", AXES,
           STATUS, DATUM, EPSG, PARENT)  # fmt: skip
-FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for name in OTHERS}
+FIELDS = SAME | GEOID | {"utm_zone": ZONE} | {name: name for names in (OTHERS, *FLAT.values()) for name in names}
 PATTERN = re.compile(
     rf"[#% ]*((?:.*[._/])??)({'|'.join(sorted(FIELDS, key=len, reverse=True))})"
     r"(?:[_ ]?(deg|rad|e7|m|mm|cm|ft))?\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*",
@@ -84,7 +84,7 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
     found = [
         (prefix, columns)
         for prefix, spots in groups.items()
-        for kind in ((given,) if given else (LLA, ECEF, UTM, ENU, NED))
+        for kind in ((given,) if given else POSITIONS)
         if (columns := _position(kind, spots, groups, earth)) is not None
     ]
     if not found:
@@ -106,6 +106,9 @@ def _position(
         return _columns(kind, axes, spots, earth) if len(axes) == 3 else None
     if kind in LOCAL:
         return _local(kind, spots, earth)
+    if kind in FLAT:
+        there = [(name, spots[name]) for name in FLAT[kind] if name in spots]
+        return _columns(kind, there, spots, earth) if len(there) == len(FLAT[kind]) else None
     fields: list[tuple[str, NamedColumn]] = [(name, spots[name]) for name in ("lat", "lon") if name in spots]
     if kind == UTM:
         zone = spots.get(ZONE) or groups.get("utm_", {}).get(ZONE) or groups.get("", {}).get(ZONE)
@@ -124,7 +127,7 @@ def _position(
 
 def _local(kind: str, spots: dict[str, NamedColumn], earth: Earth) -> Columns | None:
     """Return the columns of local axes, where an origin says of which; without one they are other data."""
-    wanted = REPRESENTATIONS[kind].names
+    wanted = POSITIONS[kind].names
     if earth.origin is None or wanted[2] not in spots:
         return None
     there = [(name, spots[name]) for name in wanted if name in spots]
@@ -187,11 +190,9 @@ def chosen(places: Sequence[int], names: Sequence[str], kind: str, earth: Earth)
 
     Raises ValueInvalid for a count that it does not have.
     """
-    fields = REPRESENTATIONS[kind].names
-    least = {LLA: 2, UTM: 3}.get(kind, 3)
-    if kind == UTM and earth.zone is not None:
-        fields, least = fields[1:], 2
-    if not least <= len(places) <= len(fields):
+    fields = POSITIONS[kind].names[-_count(kind, earth) :]
+    least = kernels(kind).least or len(fields)
+    if not least - (kind == UTM and earth.zone is not None) <= len(places) <= len(fields):
         raise ValueInvalid(f"{kind} has {len(fields)} numbers ({' '.join(fields)}); found {len(places)}")
     spots = [NamedColumn(place, names[at], "") for at, place in enumerate(places)]
     return _columns(kind, [*zip(fields, spots, strict=False)], {}, earth)
@@ -223,8 +224,8 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
         found = find(names, earth, given)
         if found is None and (place := Place.of_xyz(given, earth)) and (positions := find_positions(header)):
             found = PoseColumns(positions[0]._replace(unit=place), None)
-        if found is None and not given and (half := _half(names)):
-            raise ValueInvalid(half)  # noqa: TRY301 - so that it gets its place as others do
+        if problem := _problem(found, names, request):
+            raise ValueInvalid(problem)  # noqa: TRY301 - so that it gets its place as others do
     except ValueInvalid as error:
         raise FormatError(str(error), source=source, line=1) from None
     if found is None or found.position is None:
@@ -238,6 +239,21 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     if found.rotation is None and (name := unsaid_heading(names)) and not turned:
         warn(f"{source}: {shown(name)} has no unit and stays data; name it heading_deg")
     return PoseColumns(found.position, found.rotation or next(iter(turned), None))
+
+
+def _problem(found: PoseColumns | None, names: Sequence[str], request: Request) -> str:
+    """Say why what --from asks for, or a place that is there by half, cannot be read; "" where all is well."""
+    given = request.given_place
+    if found is None:
+        row = POSITIONS.get(given)
+        missing = row and f"no columns of {given} ({' '.join(row.columns)}) among: {listed(names)}"
+        return f"{missing}; name them with --columns" if missing else _half(names)
+    place = place_of(found.position.unit) if found.position else None
+    is_held = request.earth is not None and request.earth.zone is not None
+    asked = [each.name for each in (request.place, *request.place.more)] if request.place else []
+    if is_held and given == UTM and place and ZONE in place.fields and UTM not in asked:
+        return "--zone has no effect: each row says its zone"
+    return ""
 
 
 def _half(names: Iterable[str]) -> str:
@@ -261,9 +277,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
     numbers = {name: at for at, name in reversed([*enumerate(names or ())])}
     places = [at for word in spec.split(",") for at in places_named(word.strip(), numbers, width)]
     called = names or [f"column {at + 1}" for at in range(width)]
-    most = len(REPRESENTATIONS[request.given_place].names) - (
-        request.given_place == UTM and request.earth is not None and request.earth.zone is not None
-    )
+    most = _count(request.given_place, request.earth or Earth())
     try:
         position = chosen(places[:most], called, request.given_place, request.earth or Earth())
     except ValueInvalid as error:
@@ -278,9 +292,12 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 def of_width(width: int, request: Request) -> str:
     """Say which columns of a table without names are a place: all of them, or those behind a stamp."""
-    fields = len(REPRESENTATIONS[request.given_place].names)
-    fields -= request.given_place == UTM and request.earth is not None and request.earth.zone is not None
-    return f"2-{width}" if width == fields + 1 else f"1-{width}"
+    return f"2-{width}" if width == _count(request.given_place, request.earth or Earth()) + 1 else f"1-{width}"
+
+
+def _count(kind: str, earth: Earth) -> int:
+    """Count the numbers of a position, of UTM without the zone where that is held."""
+    return len(POSITIONS[kind].names) - (kind == UTM and earth.zone is not None)
 
 
 def of_fix(names: Sequence[str]) -> tuple[int, ...]:
@@ -357,7 +374,9 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
     return [RowNote(line_of(row), "band-s", band_s(float(zone[row]), float(northing[row])), ZONE) for row in rows]
 
 
-def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tuple[Request, tuple[Shape, ...]]:
+def check_rows(
+    request: Request, shapes: tuple[Shape, ...], names: Sequence[str], source: str
+) -> tuple[Request, tuple[Shape, ...]]:
     """Check what rows on the Earth need: axes for rotations, a height; a heading is one in those axes.
 
     Raises FormatError for a rotation whose axes nobody says.
@@ -377,6 +396,9 @@ def check_rows(request: Request, shapes: tuple[Shape, ...], source: str) -> tupl
         bare = shape.notation is None and all(form.representation.name == "quaternion" for form in request.notations)
         request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
     if shape.notation is None and not (request.operation.inverse or request.operation.similar):
+        has_idle_axes = request.earth and request.earth.axes and request.operation.keeps_frames
+        if has_idle_axes and not (request.all_numbers or any(map(may_be_uncertain, names))):
+            raise Misused("--local-axes has no effect: the rows have no rotation")
         return request, shapes
     if shape.notation is None or not (place.axes or AXES in place.fields):
         raise FormatError(UNSAID, source=source, line=1)

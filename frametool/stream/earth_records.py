@@ -16,7 +16,7 @@ from frametool.geometry import uncertainty
 from frametool.geometry.place import ENU, LLA, UNSAID, Place
 from frametool.geometry.representations import notation
 from frametool.grammar.covariance import check, entries_of
-from frametool.grammar.names import EARTH_FRAMES, FIX
+from frametool.grammar.names import EARTH_FRAMES, FIX, FLAT_NAMES
 from frametool.grammar.place import AT, EARTH_KEYS, SAME, check_parent, placed_by, without_place
 from frametool.grammar.pose import COVARIANCE_KEYS, LEFT_OUT, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Reading, within
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 FIX_TYPE, NO_FIX = "position_covariance_type", "-1"
 STAYS = ("{} stay data: x, y, z are the position; to read the place, leave these out")
-WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "north")
+WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "north", *FLAT_NAMES)
 
 
 def is_on_earth(value: dict[str, Any]) -> bool:
@@ -122,6 +122,8 @@ def _read(value: dict[str, Any], inner: Pose, used: Sequence[str], reading: Read
     beside = covariance or _beside(pose, reading, request, is_point=is_point)
     if beside:
         shape = shape._replace(covariance=(len(beside),), rewritten=True)
+    if pose.read and is_point and operation.keeps_frames and not beside:
+        shape, numbers = Shape(POINT, pose.read.place), tuple(pose.read.numbers)
     keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
     keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if is_fix else []
     return Placed(shape, (*numbers, *beside), tuple(keys))
@@ -157,4 +159,4 @@ def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, re
     within((FIX,), check, entries)
     level = Pose(rotation=(0.0, 0.0, 0.0, 1.0))
     at = placed_by(mapping | {AXES_KEY: ENU}, level, Reading(reading.source))
-    return tuple(uncertainty.turned(tuple(entries), *at.components[3:]))
+    return tuple(uncertainty.rotate_covariance(tuple(entries), *at.components[3:]))

@@ -165,8 +165,9 @@ class Run:
             return self.block.values
         words = self.plan.words
         numbers, bad = parse_floats(self.block.numbers)
-        odd = [divmod(place, numbers.shape[1]) for place in bad.tolist()]
-        odd = [each for each in odd if each[1] not in words]
+        if not (len(bad) or words):
+            return numbers
+        odd = [each for place in bad.tolist() if (each := divmod(place, numbers.shape[1]))[1] not in words]
         odd += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
         known: dict[tuple[int, str], float] = {}
         for row, column in odd:
@@ -200,7 +201,7 @@ class Run:
                     for row, column in np.argwhere((own < 0.0 if shape.sigma else own <= 0.0).T).tolist():
                         self._blame(row, self.plan.names[at + column], what.format(own[column, row]))
                 else:
-                    for row, reason in uncertainty.bad_rows([*own]).items():
+                    for row, reason in uncertainty.problems(own.T).items():
                         self._blame(row, self.plan.names[at], reason)
                 at += size
             first += shape.size
@@ -242,13 +243,12 @@ class Run:
             return [None] * shapes
         if plan.timed is not None and self.count:
             frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
-            edges = plan.edges or [None] * shapes
             if block.times is not None:
                 return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
-            each = slice(None, len(block.stamps))  # the rows of a table have one stamp for all their points
-            movers = [
+            edges = (plan.edges or [None] * shapes)[: len(block.stamps)]
+            movers = [  # the rows of a table have one stamp for all their points
                 by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
-                for stamps, names, edge in zip(block.stamps, frames, edges[each], strict=True)
+                for stamps, names, edge in zip(block.stamps, frames, edges, strict=True)
             ]
             return movers * (shapes // len(movers))
         if plan.edge_of is not None and self.count:
@@ -259,21 +259,21 @@ class Run:
         """Apply the operation to each point or pose of the rows."""
         shapes, operation = self.plan.shapes, self.plan.operation
         if operation.of == PAIR or not shapes:
-            things = self._things(columns)
-            poses = [thing_pose(shape, own[: shape.own_size], rotation) for shape, own, rotation in things]
+            poses = [thing_pose(shape, own[: shape.own_size], turn) for shape, own, turn in self._things(columns)]
             return [operation.pose(poses or [NOWHERE], movers[0], arrays)]
         needs_time = operation.formula is not None and operation.formula.needs_time
         times = [self._times(at) for at in range(len(shapes))] if needs_time else []
-        return [
-            self._constant_too(
-                operation.result(
-                    shape, numbers, mover, arrays, rotation=rotation,
-                    compared=lambda pose: self._with_before(pose, state), seconds=lambda: self._seconds(state),
-                    times_ns=times[at] if times else None,
-                )
-            )
-            for at, (mover, (shape, numbers, rotation)) in enumerate(zip(movers, self._things(columns), strict=False))
-        ]  # fmt: skip
+        found = []
+        for at, (mover, (shape, numbers, rotation)) in enumerate(zip(movers, self._things(columns), strict=False)):
+            parts = operation.result(
+                shape, numbers, mover, arrays, rotation=rotation,
+                compared=lambda pose: self._with_before(pose, state), seconds=lambda: self._seconds(state),
+                times_ns=times[at] if times else None,
+            )  # fmt: skip
+            if operation.formula is not None:  # what an expression makes of no row is that of each
+                parts = tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
+            found.append(parts)
+        return found
 
     def _things(self, columns: list[Floats]) -> Iterator[tuple[Shape, Components, Callable[[Components], Components]]]:
         """Yield each shape of the rows with its columns, and what reads and checks its rotation."""
@@ -281,10 +281,6 @@ class Run:
         for shape in self.plan.shapes:
             yield shape, tuple(columns[first : first + shape.size]), partial(self._rotation, shape, first)
             first += shape.size
-
-    def _constant_too(self, parts: Components) -> Components:
-        """Repeat what an expression makes of no row as often as there are rows."""
-        return tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
 
     def _times(self, at: int) -> Ints:
         """Read the stamps of the rows."""
@@ -303,12 +299,11 @@ class Run:
         operation = self.plan.operation
         for at, (shape, columns, _) in enumerate(self._things(self.columns)):
             own = tuple(float(column[row]) for column in columns)
-            rotation = partial(_checked, shape)
             times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
             try:
                 operation.result(
                     shape, own, None, floats, times_ns=times, compared=lambda pose: [pose], seconds=float,
-                    rotation=rotation,
+                    rotation=partial(_checked, shape),
                 )  # fmt: skip
             except FrametoolError as error:
                 return error
@@ -413,8 +408,7 @@ class Run:
             for name, number in target.left_out(parts, arrays):
                 for row in np.flatnonzero(abs(number) > FLAT).tolist():
                     self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
-            flags = target.locked(parts)
-            if flags is not None:
+            if (flags := target.locked(parts)) is not None:
                 locked |= flags
         results = np.empty((self.count, len(numbers)))
         for column, number in enumerate(numbers):
@@ -457,10 +451,9 @@ class Run:
 
     def first_fault(self) -> int | None:
         """Return the place of the first bad row, if the run stops there."""
-        if self.plan.on_error != STOP:
+        if self.plan.on_error != STOP or not (self.reasons or self.block.broken):
             return None
-        bad = [int(self.block.places[row]) for row in self.reasons]
-        return min([*bad, *(each.place for each in self.block.broken)], default=None)
+        return int(min([*self.block.places[[*self.reasons]].tolist(), *(each.place for each in self.block.broken)]))
 
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before place `end`: results, rows without one, and what passes."""

@@ -52,6 +52,7 @@ class Columns(NamedTuple):
     kind: twist or wrench, of six columns
     wrong: what is wrong with the names, an error where the columns are used
     staying: how many of the last ones are read and stay as they are: the status of a fix
+    spots: place and unit for each word that was looked for, None where it has no column
     """
 
     places: tuple[int, ...]
@@ -66,11 +67,17 @@ class Columns(NamedTuple):
     kind: str = ""
     wrong: str = ""
     staying: int = 0
+    spots: tuple[Spot | None, ...] = ()
 
     @property
     def shown(self) -> str:
         """Name the columns."""
         return " ".join(self.names)
+
+    @property
+    def spread(self) -> int:
+        """Count the other columns between the first and the last."""
+        return max(self.places) - min(self.places) - len(self.places)
 
 
 class PoseColumns(NamedTuple):
@@ -80,37 +87,17 @@ class PoseColumns(NamedTuple):
     rotation: Columns | None
 
 
-class Match(NamedTuple):
-    """The columns found for the words of a base: the place and the unit of each, None where one is missing."""
-
-    spots: tuple[Spot | None, ...]
-    prefix: str
-    suffix: str
-
-    @property
-    def places(self) -> tuple[int, ...]:
-        """Return the places of the columns that are there."""
-        return tuple(spot[0] for spot in self.spots if spot is not None)
-
-    @property
-    def units(self) -> list[str]:
-        """Return the units of the columns that are there."""
-        return [spot[1] for spot in self.spots if spot is not None]
-
-    def place(self, at: int) -> int:
-        """Return the place of one word's column; -1 where it is missing."""
-        spot = self.spots[at]
-        return -1 if spot is None else spot[0]
-
-
 class Header:
-    """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit."""
+    """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit.
+
+    found: by word and affixes the first column of each unit
+    """
 
     def __init__(self, names: Sequence[str]) -> None:
         """Look for the columns of all representations and positions in the names."""
         self.names = names
-        self.repeated = {name for name, count in Counter(names).items() if count > 1}
-        self.found: dict[str, dict[tuple[str, str], list[Spot]]] = {word: {} for word in WORDS}
+        self.count = Counter(names)
+        self.found: dict[str, dict[tuple[str, str], dict[str, Spot]]] = {}
         self.affixes: dict[tuple[str, str], tuple[str, str]] = {}
         for place, name in enumerate(names):
             self._take_apart(place, name.lstrip("# ") if place == 0 else name)
@@ -129,48 +116,39 @@ class Header:
                 key = folded[: token.start()], folded[behind:]
                 self.affixes.setdefault(key, (bare[: token.start()], bare[behind:]))
                 unit = bracket[1] if bracket else (said[1] or said[2]) if said else "rad" * word.startswith("rvec_")
-                self.found[COLUMN_WORDS.get(word, word)].setdefault(key, []).append((place, unit))
+                by_key = self.found.setdefault(COLUMN_WORDS.get(word, word), {})
+                by_key.setdefault(key, {}).setdefault(unit, (place, unit))
 
-    def match(self, base: Sequence[str], alike: Sequence[int] = ()) -> Iterator[Match]:
-        """Yield the columns that have all words of a base under common affixes.
+    def match(self, base: Sequence[str], alike: Sequence[int] = (), *, partly: bool = False) -> Iterator[Columns]:
+        """Yield the columns that have all words of a base under common affixes; `partly` those that have just some.
 
         alike: which of the words have a unit; columns of one unit belong together, and those of several only where
         each word has one column.
         """
-        for key, spots in self._keyed(base):
-            if not all(spots):
-                continue
-            same = [
-                unit for _, unit in (spots[alike[0]] if alike else [])
-                if all(any(each[1] == unit for each in spots[at]) for at in alike)
-            ]  # fmt: skip
-            for unit in dict.fromkeys(same) or ("",):
-                chosen = [next((each for each in spot if each[1] == unit), spot[0]) for spot in spots]
-                yield Match(tuple(chosen), *self.affixes[key])
-
-    def match_partly(self, base: Sequence[str]) -> Iterator[Match]:
-        """Yield the columns that have some words of a base, and not all, under common affixes."""
-        for key, spots in self._keyed(base):
-            if not all(spots):
-                yield Match(tuple(spot[0] if spot else None for spot in spots), *self.affixes[key])
-
-    def _keyed(self, base: Sequence[str]) -> Iterator[tuple[tuple[str, str], list[list[Spot]]]]:
-        """Yield the affixes under which a word of a base was found, with the columns of each word."""
-        keys = {key: spots[0][0] for word in reversed(base) for key, spots in self.found[word].items()}
+        keys: dict[tuple[str, str], int] = {}
+        for word in reversed(base):
+            for key, spots in self.found.get(word, {}).items():
+                keys[key] = next(iter(spots.values()))[0]
         for key in sorted(keys, key=keys.__getitem__):
-            yield key, [self.found[word].get(key, []) for word in base]
+            words = [self.found.get(word, {}).get(key, {}) for word in base]
+            if all(words) == partly:
+                continue
+            units = [unit for unit in (words[alike[0]] if alike else ()) if all(unit in words[at] for at in alike)]
+            for unit in units or ("",):
+                yield self.columns([spots.get(unit) or next(iter(spots.values()), None) for spots in words], key)
 
-    def is_plain(self, match: Match) -> bool:
+    def columns(self, spots: Sequence[Spot | None], key: tuple[str, str] = ("", "")) -> Columns:
+        """Name the columns that were found for some words under some affixes."""
+        places = tuple(spot[0] for spot in spots if spot)
+        names = tuple(self.names[place] for place in places)
+        twice = next((name for name in names if self.count[name] > 1), "")
+        wrong = f"column {twice} stands twice; choose by number with --columns" if twice else ""
+        return Columns(places, names, *self.affixes.get(key, key), wrong=wrong, spots=tuple(spots))
+
+    def is_plain(self, match: Columns) -> bool:
         """Tell whether a column has the affixes of a position or none: `yaw`, `pose.yaw`, and not `yaw_rate`."""
         key = match.prefix.lower(), match.suffix.lower()
-        return key == ("", "") or any(key in self.found[base[0]] for base in POSITIONS)
-
-    def columns(self, match: Match) -> Columns:
-        """Name the columns of a match."""
-        names = tuple(self.names[place] for place in match.places)
-        twice = [name for name in names if name in self.repeated]
-        wrong = f"column {twice[0]} stands twice; choose by number with --columns" if twice else ""
-        return Columns(match.places, names, match.prefix, match.suffix, wrong=wrong)
+        return key == ("", "") or any(key in self.found.get(base[0], ()) for base in POSITIONS)
 
 
 WORDS = {word for row in ROTATIONS.values() for word in (*row.columns, *row.names, *row.alone) if word}.union(
@@ -183,7 +161,7 @@ for _word in sorted(WORDS.union(COLUMN_WORDS)):
 
 def has_pose_column(names: Iterable[str]) -> bool:
     """Tell whether one of some names is that of a column of a pose or a point."""
-    return any(Header(list(names)).found.values())
+    return bool(Header(list(names)).found)
 
 
 def find_positions(header: Header) -> list[Columns]:
@@ -196,24 +174,25 @@ def find_positions(header: Header) -> list[Columns]:
     found: list[Columns] = []
     for base in POSITIONS:
         for match in header.match(base, range(3)):
+            units = {spot[1] for spot in match.spots if spot}
+            if (match.prefix, match.suffix) in named or not units.isdisjoint((*ANGLES, "s")):
+                continue
             in_rotation = set.intersection(*(turns.get(place, set()) for place in match.places))
-            if in_rotation or (match.prefix, match.suffix) in named or not {*ANGLES, "s"}.isdisjoint(match.units):
+            if in_rotation or match.prefix.lower().endswith(TURNED):
                 continue
-            if match.prefix.lower().endswith(TURNED) or match.places in [each.places for each in found]:
-                continue
-            found.append(_position(header, match))
-    telling = [each for each in found if any(word in each.prefix.lower() for word in TELLING)]
-    return telling or found
+            if match.places not in [each.places for each in found]:
+                found.append(_position(match))
+    return [each for each in found if any(word in each.prefix.lower() for word in TELLING)] or found
 
 
-def _position(header: Header, match: Match) -> Columns:
+def _position(columns: Columns) -> Columns:
     """Read the units of a position's columns, of which one may be absent."""
-    columns = header.columns(match)
-    units = [1.0 if spot is None else LENGTHS.get(spot[1], 0.0) for spot in match.spots]
+    units = [1.0 if spot is None else LENGTHS.get(spot[1], 0.0) for spot in columns.spots]
     if 0.0 in units:
-        place, unit = next(spot for spot in match.spots if spot and spot[1] not in LENGTHS)
+        spot = next(spot for spot in columns.spots if spot and spot[1] not in LENGTHS)
+        name = columns.names[columns.places.index(spot[0])]
         known = ", ".join(filter(None, LENGTHS))
-        wrong = f"column {shown(header.names[place])}: unknown unit {shown(unit)} of a length; known are {known}"
+        wrong = f"column {shown(name)}: unknown unit {shown(spot[1])} of a length; known are {known}"
         return columns._replace(unit=1.0, wrong=wrong)
     x, y, z = units
     return columns._replace(unit=x if x == y == z else (x, y, z))
@@ -222,27 +201,30 @@ def _position(header: Header, match: Match) -> Columns:
 def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> list[Columns]:
     """Return every set of columns that can be a rotation, of the given notation if there is one."""
     header = names if isinstance(names, Header) else Header(names)
-    rows = _searched(given)
-    found = [each for row in rows for each in _of_representation(row, header, given)]
-    found += [
-        _rotation(header, match, row, given)
-        for row in rows if row.shape == NAMED
-        for match in _named_maps(header, bare=given is not None)
-    ]  # fmt: skip
-    found = [*{frozenset(each.places): each for each in found}.values()]  # qvec_w .. are found by either of two names
-    return _without_strays(found) or [each for row in rows for each in _standing_alone(row, header, given)]
+    rows = SEARCHED if given is None else _searched(given)
+    found: dict[frozenset[int], Columns] = {}  # qvec_w .. are found by either of two names
+    for row in rows:
+        maps = _named_maps(header, bare=given is not None) if row.shape == NAMED else ()
+        for each in (*_of_representation(row, header, given), *(_rotation(match, row, given) for match in maps)):
+            found[frozenset(each.places)] = each
+    best: dict[int, int] = {}  # where several share a column, an axis beside an angle and an angle_deg, the nearest
+    for each in found.values():
+        for place in each.places:
+            best[place] = min(best.get(place, each.spread), each.spread)
+    nearest = [each for each in found.values() if each.spread <= min(map(best.__getitem__, each.places))]
+    return nearest or [each for row in rows for each in _standing_alone(row, header, given)]
 
 
-def _searched(given: Notation | None) -> list[Representation]:
-    """Return the representations whose columns are looked for; of those that share their columns the first."""
-    rows = [row for row in ROTATIONS.values() if row.searched]
-    if given is not None:
-        same = [row for row in rows if set(row.columns) == set(given.representation.columns)]
-        return same[:1] or [given.representation]
-    return [row for at, row in enumerate(rows) if set(row.columns) not in [set(each.columns) for each in rows[:at]]]
+def _searched(given: Notation) -> list[Representation]:
+    """Return the representations whose columns are looked for, of those that share their columns the first."""
+    same = [row for row in ROTATIONS.values() if row.searched and {*row.columns} == {*given.representation.columns}]
+    return same[:1] or [given.representation]
 
 
-def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Match]:
+SEARCHED = [*{frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}.values()][::-1]
+
+
+def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Columns]:
     """Yield the columns called as the keys of a map, x y z w: with affixes, or alone, or where they may be `bare`."""
     for row in ROTATIONS.values():
         for match in header.match(row.names) if row.shape == NAMED else ():
@@ -250,55 +232,42 @@ def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Match]:
                 yield match
 
 
-def _without_strays(found: list[Columns]) -> list[Columns]:
-    """Where several share columns (an axis beside an angle and an angle_deg), keep those that stand side by side."""
-    rivals: dict[int, list[Columns]] = {}
-    for each in found:
-        for place in each.places:
-            rivals.setdefault(place, []).append(each)
-    best = {place: min(map(_spread, several)) for place, several in rivals.items()}
-    return [each for each in found if all(_spread(each) <= best[place] for place in each.places)]
-
-
-def _spread(columns: Columns) -> int:
-    return max(columns.places) - min(columns.places) - len(columns.places)
-
-
 def _of_representation(row: Representation, header: Header, given: Notation | None) -> Iterator[Columns]:
     """Find a representation's columns: those of a rotation, or of a whole pose."""
     for match in header.match(row.columns, row.angles):
-        yield _rotation(header, match, row, given)
+        yield _rotation(match, row, given)
     for match in header.match(row.whole.columns) if row.whole else ():
-        yield _rotation(header, match, row, given)._replace(whole=True, unit=1.0)
+        yield _rotation(match, row, given)._replace(whole=True, unit=1.0)
 
 
 def _standing_alone(row: Representation, header: Header, given: Notation | None) -> Iterator[Columns]:
     """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
-    others = {(match.prefix, match.suffix) for match in header.match_partly(row.columns) if any(match.spots[:-1])}
-    for word in row.alone:
-        for match in header.match((word,), (0,)):
+    alone = [match for word in row.alone for match in header.match((word,), (0,))]
+    if alone:
+        beside = [each for each in header.match(row.columns, partly=True) if any(each.spots[:-1])]
+        others = {(each.prefix, each.suffix) for each in beside}
+        for match in alone:
             if (match.prefix, match.suffix) not in others and header.is_plain(match):
                 spots = (*[None] * (len(row.columns) - 1), *match.spots)
-                yield _rotation(header, match._replace(spots=spots), row, given)
+                yield _rotation(match._replace(spots=spots), row, given)
 
 
-def _rotation(header: Header, match: Match, row: Representation, given: Notation | None) -> Columns:
+def _rotation(columns: Columns, row: Representation, given: Notation | None) -> Columns:
     """Read the units of a rotation's columns: those of angles, each as its name says."""
-    columns = header.columns(match)
     said: list[bool | None] = []
-    for at, spot in enumerate(match.spots):
+    for at, spot in enumerate(columns.spots):
         unit = spot[1].lower() if spot else ""
         angle = at in row.angles
         if unit not in NO_UNIT and not (angle and unit in ANGLES):
             kind = "of an angle; known are deg, rad" if angle else "of a number that has none"
-            name = shown(header.names[match.place(at)])
-            columns = columns._replace(wrong=f"column {name}: unknown unit {shown(unit)} {kind}")
+            name = columns.names[columns.places.index(spot[0])] if spot else ""
+            columns = columns._replace(wrong=f"column {shown(name)}: unknown unit {shown(unit)} {kind}")
         said.append(ANGLES.get(unit) if angle else None)
-    units = {said[at] for at in row.angles if match.spots[at]}
+    units = {said[at] for at in row.angles if columns.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{given.axes}" if given is not None and given.axes else ""
     notation = given if given is not None and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
-    absent = tuple(at for at, spot in enumerate(match.spots) if spot is None)
+    absent = tuple(at for at, spot in enumerate(columns.spots) if spot is None)
     return columns._replace(notation=notation, degrees=tuple(said), absent=absent)
 
 
@@ -324,7 +293,7 @@ def plain_pose(names: Sequence[str]) -> PoseColumns:
     """
     header = Header(names)
     bare = ("", "")
-    header.found = {word: {bare: spots[bare]} if bare in spots else {} for word, spots in header.found.items()}
+    header.found = {word: {bare: spots[bare]} for word, spots in header.found.items() if bare in spots}
     positions, rotations = find_positions(header), find_rotations(header, None)
     if len(rotations) > 1 or len(positions) > 1:
         what = "rotation" if len(rotations) > 1 else "position"
@@ -372,26 +341,28 @@ def _half_rotation(header: Header, given: Notation | None) -> str:
     """Say what is missing of a rotation that is there by half, or goes by other names; "" where there is none."""
     for row in ROTATIONS.values() if given is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
-            return f"columns {header.columns(match).shown} may be {row.name}; then add --from {row.spelling}"
+            return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
     if given is None and (match := next(_named_maps(header, bare=True), None)):
-        shown = header.columns(match).shown
-        return f"{shown} may be a quaternion or a point and a number; add --from xyzw, or --columns with the three"
+        may_be = f"{match.shown} may be a quaternion or a point and a number"
+        return f"{may_be}; add --from xyzw, or --columns with the three"
     for match in header.match(XYZ) if given is None else ():
         if match.prefix.lower().endswith("rot_"):
-            shown, axes = header.columns(match).shown, "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
-            return f"columns {shown} do not say what they are; {axes}"
-    for row in _searched(given):
-        for match in header.match_partly(row.columns):
+            axes = "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
+            return f"columns {match.shown} do not say what they are; {axes}"
+    for row in SEARCHED if given is None else _searched(given):
+        for match in header.match(row.columns, partly=True):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
                 absent = [word for word, spot in zip(row.columns, match.spots, strict=True) if spot is None]
                 missing = ", ".join(f"{match.prefix}{word}{match.suffix}" for word in absent)
-                there = header.columns(match).shown
-                return f"half a rotation: {there} without {missing}; add what is missing, or choose with --columns"
+                half = f"half a rotation: {match.shown} without {missing}"
+                return f"{half}; add what is missing, or choose with --columns"
     return _other_names(header) if given is None else ""
 
 
 def _other_names(header: Header) -> str:
     """Recognise four columns that are a quaternion under names nobody has agreed upon: `ox oy oz ow`, `q0 .. q3`."""
+    if len(header.names) < 4:
+        return ""
     folded = {name.lower(): name for name in reversed(header.names)}
     stems = [name[:-1] for name in folded if name[-1:] == "w" and len(name) > 1] + ["q", "q_"]
     for stem in stems:
@@ -411,11 +382,11 @@ def _half_position(header: Header, rotation: Columns) -> Columns | None:
     """Return x, y beside a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
     affixes = ((rotation.prefix, rotation.suffix), ("", ""))
     for base in POSITIONS:
-        for match in header.match_partly(base):
+        for match in header.match(base, partly=True):
             if len(match.places) < len(base) - 1 or (match.prefix, match.suffix) not in affixes:
                 continue
             at = match.spots.index(None)
-            columns = _position(header, match)._replace(absent=(at,))
+            columns = _position(match)._replace(absent=(at,))
             if rotation.absent and base[at] == base[-1]:
                 return columns
             missing = f"half a position: {columns.shown} without {match.prefix}{base[at]}{match.suffix}"
@@ -451,6 +422,8 @@ def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
     """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where told so."""
+    if len(names) < 6:
+        return None
     folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
     for each in LETTERS if kind == "" else (kind,):
         for base in [six_names(each), *(base.split() for base in LETTERS.get(each, ()) * bool(kind))]:
@@ -519,8 +492,8 @@ def named_pose(
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])
     if len(match.spots) == len(XYZ):
-        return PoseColumns(_position(header, match), rotation)
-    return PoseColumns(_position(header, match._replace(spots=(*match.spots, None)))._replace(absent=(2,)), rotation)
+        return PoseColumns(_position(match), rotation)
+    return PoseColumns(_position(match._replace(spots=(*match.spots, None), absent=(2,))), rotation)
 
 
 def wholes_of(given: Notation | None) -> list[Notation]:
@@ -530,11 +503,11 @@ def wholes_of(given: Notation | None) -> list[Notation]:
     return [parse_notation(row.name) for row in ROTATIONS.values() if row.whole]
 
 
-def _chosen(header: Header, places: Sequence[int]) -> Match:
+def _chosen(header: Header, places: Sequence[int]) -> Columns:
     """Take columns as they were chosen, with the units that their names say."""
     bare = [header.names[place] for place in places]
     units = [bracket[1] if (bracket := re.search(BRACKETS, name)) else _unit_at_end(name) for name in bare]
-    return Match(tuple(zip(places, units, strict=True)), "", "")
+    return header.columns([*zip(places, units, strict=True)])
 
 
 def _unit_at_end(name: str) -> str:
@@ -552,14 +525,14 @@ def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | No
         return 0, None
     for form in wholes_of(given):
         if form.representation.whole and len(places) == len(form.representation.whole.columns):
-            found = _rotation(header, _chosen(header, places), form.representation, given)
+            found = _rotation(_chosen(header, places), form.representation, given)
             return len(places), found._replace(whole=True, unit=1.0, notation=form)
     if given is None:
         raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
     if len(places) not in given.counts:
         raise Misused(f"--columns: {given.counted}; found {len(places)}")
     size = len(given.representation.columns)
-    return size, _rotation(header, _chosen(header, places[-size:]), given.representation, given)
+    return size, _rotation(_chosen(header, places[-size:]), given.representation, given)
 
 
 def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> Columns | None:

@@ -210,8 +210,11 @@ def joint_poses(stream: BinaryIO, rows: JointRows, bad: BadRows, *, numbered: bo
         try:
             if isinstance(message, FormatError):
                 raise message
-            state = _state(message.value, numbered=numbered)
-            yield Result(Pose.of(_pose(state, rows), rows.tip, rows.base), _stamp(state))
+            value: Any = message.value
+            state = joint_state.of_numbered(value) if numbered else joint_state.of_row(joint_state.unquoted(value))
+            stamp_ns = joint_state.stamp_of_state(state)
+            stamp = {} if stamp_ns is None else {"stamp_ns": stamp_ns}
+            yield Result(Pose.of(_pose(state, rows), rows.tip, rows.base), stamp)
         except (FormatError, ValueInvalid) as error:
             line = error.line if isinstance(error, FormatError) else getattr(message, "line", 0)
             reason = error.message if isinstance(error, FormatError) else str(error)
@@ -223,17 +226,6 @@ def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[Messag
     if numbered:
         return read_messages(stream, name, "csv1", Tally())
     return (Message(text, Source(name, text), line, cells=True) for line, text in line_texts(stream, name, Tally()))
-
-
-def _state(value: Any, *, numbered: bool) -> dict[str, Any]:
-    if numbered:
-        return joint_state.of_numbered(value)
-    return joint_state.of_row(joint_state.unquoted(value))
-
-
-def _stamp(state: dict[str, Any]) -> dict[str, Any]:
-    stamp_ns = joint_state.stamp_of_state(state)
-    return {} if stamp_ns is None else {"stamp_ns": stamp_ns}
 
 
 def _pose(state: dict[str, Any], rows: JointRows) -> Any:

@@ -168,8 +168,10 @@ def _grouped(columns: Sequence[Column]) -> list[list[Column]]:
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
     """Raise Misused if a new column would be called as one that stays, or as another new one."""
-    kept = [names[column.place] for column in columns if not isinstance(column, ADDED)]
     new = [column.name for column in columns if isinstance(column, ADDED)]
+    if not new:
+        return
+    kept = [names[column.place] for column in columns if not isinstance(column, ADDED)]
     if twice := sorted({name for name in new if new.count(name) > 1}):
         if {"x", "y", "z"} <= {*twice}:
             hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"

@@ -21,10 +21,10 @@ from frametool.formats.load import EdgePlace, close_all, lines_of
 from frametool.formats.trees.tree_reader import read_edges, shown_keys
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.grammar.covariance import AXES, columns, find_columns, in_unit, is_sigma, of_sigmas
+from frametool.grammar.covariance import AXES, columns, is_sigma
 from frametool.grammar.names import NAME_KEYS, STAMP_KEYS
 from frametool.grammar.pose import COVARIANCE_KEYS, Pose, inverted, read_angle_unit
-from frametool.grammar.readers import Misfit, Reading, kind, read_number, tell, within
+from frametool.grammar.readers import Misfit, Reading, kind, tell, within
 from frametool.stream.record import INNER, KNOWN, find_records, placed, value_at
 from frametool.stream.record_values import pose_of, stamp_of
 from frametool.stream.request import COMBINED, Operation, Request
@@ -204,10 +204,9 @@ def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
     rows = TablePoses(begun, file.form, request, file.name)
     if rows.shape.notation is None:
         raise FormatError(f"no rotation among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
-    line, bare = 1 + begun.lines, file.tally.names.bare
+    bare = file.tally.names.bare
     has_place = rows.shape.whole or rows.shape.unit is not None
-    for text in filter(None, (begun.rest, *begun.blocks)):
-        block = rows.of_block(text)
+    for block, line, _ in rows.blocks(begun):
         for below, column, reason, *_ in rows.faults:
             raise FormatError(f"{column}{': ' * bool(column)}{reason}", source=file.name, line=line + below)
         results = results_of(block, columns() if rows.shape.covariance else (), placed=has_place)
@@ -222,7 +221,6 @@ def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
             made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
             written = None if inverse else _written(rows.shape, given)
             yield MeasuredRow(made._replace(written=written), line + at, cells.get("stamp_ns"))
-        line += text.count(b"\n")
     file.tally.rough += [1] * rows.mended
     file.tell()
 
@@ -295,7 +293,6 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
         if key not in OURS and not is_sigma(key) and (hint := did_you_mean(key, MISSPELT, cutoff=0.75)):
             raise Misfit(f"unknown key {shown(key)}{hint}", (*path, key), key=True)
     plain = {key: each for key, each in row.items() if key not in (CHILD, "id", "children")}
-    plain = within(path, _with_columns, plain, request)
     for record in find_records(plain, request, reading, path):
         if not record.values:
             raise Misfit(f"no pose; {LIKE}", path)
@@ -305,21 +302,6 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
         made = _made(pose, reading.bare(pose.parent or ""), reading.bare(child), label)
         own = record.values[: record.shape.own_size]
         yield record, made._replace(written=None if record.shape.inverse else _written(record.shape, own))
-
-
-def _with_columns(row: dict[str, Any], request: Request) -> dict[str, Any]:
-    """Return a row with the covariance that its keys say which are called as columns: sigma_x, c11."""
-    names = [key for key in row if is_sigma(key) or key in columns()]
-    places, sigma = find_columns(names, 36)
-    if not places:
-        return row
-    numbers = [within((name,), read_number, row.pop(name)) for name in names]
-    if sigma:
-        units = [(at, unit or "deg" * (request.degrees and axis > 2)) for axis, (at, unit) in enumerate(sigma)]
-        numbers = [*of_sigmas([in_unit(numbers[places[at]], unit) if at >= 0 else 0.0 for at, unit in units])]
-    if not COVARIANCE_KEYS.isdisjoint(row):
-        raise Misfit("sigma and covariance in one row; keep one")
-    return row | {"covariance": [repr(number) for number in numbers]}
 
 
 def _one_child(child: Any, name: str | None) -> str:

@@ -403,7 +403,7 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, sou
     elif entry.target.place is not None:
         from frametool.grammar.place import point_entry
 
-        named = point_entry(entry.parent, made.parts[:3], entry.target.place)
+        named = point_entry(entry.parent, made.parts[:3], entry.target.place, getattr(made.parts, "read", None))
     else:
         named[kind] = numbers
     if is_recording(form) and request.operation.keeps_frames:

@@ -12,7 +12,7 @@ from frametool.geometry import arrays, earth, quaternion
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.recordings.made import KINDS, MessageTemplate, check_stamps, serialised
 from frametool.recordings.write import RecordingFile
-from frametool.stream.row_layout import AS_READ, POINT, POSE
+from frametool.stream.row_layout import POINT, POSE
 from frametool.stream.row_poses import plain_cells
 from frametool.stream.writers import refuse_scale_in
 
@@ -83,7 +83,7 @@ class RecordingWriter:
         check_stamps(stamps, self.style.form)
         if not self.kinds:
             self.kinds = ("fix" if {*block.parents} <= {*EARTH_FRAMES} else "point",)
-        used = (AS_READ, NAME) if "fix" in self.kinds else ()
+        used = (NAME,) if "fix" in self.kinds else ()
         self.dropped |= dict.fromkeys(name for name in block.extras if name not in used)
         refuse_scale_in(self.style.form, self.dropped)
         frames = self._frames(block)
@@ -158,8 +158,8 @@ class RecordingWriter:
             others = listing(each or "no frame" for each in block.parents if each not in EARTH_FRAMES)
             raise ValueInvalid(f"a fix is a place on the Earth: of rows in ecef, found {others}")
         self.dropped |= dict.fromkeys(["rotation"] * (self.kind == POSE))
-        if (read := block.extras.get(AS_READ)) is not None:
-            return np.array([*read], np.float64) + 0.0
+        if block.read is not None:
+            return block.read + 0.0
         x, y, z = (np.ascontiguousarray(column) for column in block.numbers.T[:3])
         return np.column_stack(earth.lla(x, y, z, arrays)) + 0.0
 

@@ -158,11 +158,16 @@ class Operation(NamedTuple):
         changed = self.left or self.right or self.of or self.moves or self.mirrors
         return not (changed or self.inverse)
 
-    def place_as_read(self, shape: Shape, numbers: Sequence[Any]) -> Components:
-        """Return lat, lon and alt of a row's numbers where these say them and nothing changes them; () elsewhere."""
+    def place_as_read(self, shape: Shape, numbers: Callable[[int], Sequence[Any]]) -> Components:
+        """Return lat, lon and alt of rows that say them where nothing changes them; () elsewhere.
+
+        numbers: returns so many of the first numbers of the rows
+        """
         place = shape.place
-        is_kept = place is not None and place.name == "lla" and self.keeps_frames
-        return place.lla(numbers[: place.size]) if place is not None and is_kept else ()
+        if place is None or place.name != "lla" or not self.keeps_frames:
+            return ()
+        fields = tuple(field for field in place.fields if field[:3] in ("lat", "lon", "alt", "msl", "und"))
+        return place._replace(fields=fields).lla(numbers(len(fields)))
 
     @property
     def keeps_frames(self) -> bool:
@@ -221,7 +226,7 @@ class Operation(NamedTuple):
         if self.formula is not None:
             return self.formula.result(shape.kind, own, beside, times_ns, xp)
         if shape.kind != POSE:
-            return self.move(shape, own, beside, edge)
+            return self._with_place(shape, numbers, self.move(shape, own, beside, edge))
         if shape.covariance:
             from frametool.stream.carried import with_own
 
@@ -230,7 +235,15 @@ class Operation(NamedTuple):
         if self.velocity:
             last = EXACT + len(RELATIVE_EXTRAS)
             found = (*self.with_velocity(found[:last], seconds(), xp), *found[last:])
-        return (*found, *beside)
+        return self._with_place(shape, numbers, (*found, *beside))
+
+    def _with_place(self, shape: Shape, numbers: Components, found: Components) -> Components:
+        """Add to a result on the Earth that nothing moves the numbers that it was read as."""
+        if shape.place is None or not self.keeps_frames:
+            return found
+        from frametool.geometry.place import Spot, Unmoved
+
+        return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
 
     def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
         """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""

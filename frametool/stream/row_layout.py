@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
-    from frametool.geometry.place import Place
+    from frametool.geometry.place import Place, Spot
     from frametool.geometry.representations import Notation, Whole
     from frametool.geometry.types import Components, Namespace, Quaternion, Rigid
 
@@ -224,14 +224,10 @@ class Target(NamedTuple):
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
         """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
         own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
-        if self.scaled:
-            return [*self.numbers(parts[:own], xp, parts[-1]), *parts[own:-1]]
-        return [*self.numbers(parts[:own], xp), *parts[own:]]
-
-    def numbers(self, parts: Components, xp: Namespace, scale: Any = None) -> list[Any]:
-        """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
-        full = self._full(parts, xp, scale)
-        return [number for place, number in enumerate(full) if place not in self.absent] if self.absent else full
+        full = self._full(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
+        if self.absent:
+            full = [number for place, number in enumerate(full) if place not in self.absent]
+        return [*full, *parts[own : len(parts) - self.scaled]]
 
     def left_out(self, parts: Components, xp: Namespace) -> list[tuple[str, Any]]:
         """Return the numbers of a result without a column, by name; a row where one is above FLAT is bad."""
@@ -240,14 +236,16 @@ class Target(NamedTuple):
         full, names = self._full(parts, xp), [*self.position_columns, *self.names]
         return [(names[place], full[place]) for place in self.absent]
 
-    def _full(self, parts: Components, xp: Namespace, scale: Any = None) -> list[Any]:
+    def _full(self, parts: Components, xp: Namespace, scale: Any = None, read: Spot | None = None) -> list[Any]:
+        """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
         if self.plain:
             return list(parts)
         position: list[Any] = []
         if self.unit == 1.0:
             position = list(parts[:3])
         elif (place := self.place) is not None:
-            position = place.numbers(*parts[:3])
+            x, y, z = parts[:3]
+            position = place.numbers(x, y, z, read)
         elif self.unit is not None:
             position = [part * unit for part, unit in zip(parts[:3], _each(self.unit), strict=True)]
         if len(parts) == 3 or not self.notations:

@@ -6,6 +6,8 @@ Also turns single results into such blocks and back, and columns of texts into s
 from __future__ import annotations
 
 import re
+from importlib import import_module
+from itertools import chain
 from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -21,7 +23,7 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault
 from frametool.stream.header import listed
 from frametool.stream.layout import NAMED, Kept
-from frametool.stream.row_layout import PARTS, POSE, Shape
+from frametool.stream.row_layout import AS_READ, PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
@@ -32,11 +34,12 @@ from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from frametool.geometry.place import Place
+    from frametool.geometry.place import Place, Spot
+    from frametool.geometry.types import Components
     from frametool.stream.faults import RowNote
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
@@ -57,6 +60,7 @@ class RowPoses(NamedTuple):
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
     given: the frames that the rows of the input are given in
+    read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
     """
 
     numbers: Floats
@@ -66,6 +70,25 @@ class RowPoses(NamedTuple):
     names: Sequence[str | None]
     extras: Mapping[str, Cells]
     given: Sequence[str | None] = ()
+    read: Floats | None = None
+
+    def for_each(self, names: Sequence[str | None]) -> Sequence[str | None]:
+        """Return parents or names, one a row."""
+        return names if len(names) == len(self.numbers) else [*names] * len(self.numbers)
+
+    def spot(self, row: int) -> Spot | None:
+        """Return the place that a row was read as."""
+        return None if self.read is None else _place().spot_of(self.read[row].tolist())
+
+    def unmoved(self, parts: Components) -> Components:
+        """Return the components of the rows with what they were read as, if it is known."""
+        if self.read is None:
+            return parts
+        return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))  # type: ignore[no-any-return]
+
+
+def _place() -> Any:
+    return import_module("frametool.geometry.place")  # few rows are on the Earth
 
 
 class TablePoses:
@@ -113,6 +136,13 @@ class TablePoses:
     def columns(self) -> str:
         """List the columns there are."""
         return listed(self.table.names or ("columns without names",))
+
+    def blocks(self, begun: Begun) -> Iterator[tuple[RowPoses, int, bytes]]:
+        """Yield the poses of all blocks of a table, each with the line, from 1, at which it begins, and its text."""
+        line = 1 + begun.lines
+        for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
+            yield self.of_block(text), line, text
+            line += text.count(b"\n")
 
     def of_block(self, text: bytes) -> RowPoses:
         """Return the poses of a block, and leave what is wrong with other rows in `faults`."""
@@ -199,6 +229,7 @@ def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
         numbers=block.numbers[rows],
         stamps_ns=None if block.stamps_ns is None else block.stamps_ns[rows],
         lines=block.lines[rows],
+        read=None if block.read is None else block.read[rows],
         parents=parents,
         names=names,
         extras={name: cells_at(each, rows) for name, each in block.extras.items()},
@@ -265,12 +296,14 @@ def _block(
     """Return results as a block, with what else each of them says."""
     stamps = [other.get("stamp_ns") for other in others]
     is_stamped = bool(stamps) and all(type(stamp) is int for stamp in stamps)
-    used = {"stamp_ns"} if is_stamped else set[str]()
+    read = [other[AS_READ] for other in others if AS_READ in other]
+    used = (AS_READ, "stamp_ns" if is_stamped else AS_READ)
     keys = dict.fromkeys(key for other in others for key in other if key not in used)
     parents, names = (each[:1] if len(set(each)) == 1 else each for each in (parents, names))
     return RowPoses(
         numbers, np.array(stamps, np.int64) if is_stamped else None, np.arange(len(numbers)), parents, names,
         {key: objects([other.get(key) for other in others]) for key in keys},
+        read=np.array(read, np.float64) if read and len(read) == len(others) else None,
     )  # fmt: skip
 
 
@@ -289,8 +322,7 @@ def _written(value: float) -> str:
 
 def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -> list[Result]:
     """Return a block as results, one a pose."""
-    size = len(block.numbers)
-    names, parents = (each if len(each) == size else list(each) * size for each in (block.names, block.parents))
+    names, parents = map(block.for_each, (block.names, block.parents))
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
@@ -303,6 +335,7 @@ def results_of(block: RowPoses, extras: Sequence[str], *, placed: bool = True) -
         if stamps is not None:
             said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
         said |= {name: texts[at] for name, texts in others.items()}
+        pose = pose._replace(read=block.spot(at))
         made.append((NoResult if numbers is null else Result)(pose if placed else pose._replace(position=None), said))
     return made
 
@@ -311,8 +344,7 @@ def points_of(
     block: RowPoses, kind: str, extras: Sequence[str] = (), place: Place | None = None
 ) -> list[dict[str, Any]]:
     """Return a block of points or vectors as mappings, one each, or of points on the Earth at a place."""
-    size = len(block.numbers)
-    frames = block.parents if len(block.parents) == size else list(block.parents) * size
+    frames = block.for_each(block.parents)
     others = {name: plain_cells(cells) for name, cells in block.extras.items()}
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     made = []
@@ -323,7 +355,7 @@ def points_of(
         if place is not None and not is_null:
             from frametool.grammar.place import point_entry
 
-            own, named = point_entry(frames[at], numbers[:size], place), {}
+            own, named = point_entry(frames[at], numbers[:size], place, block.spot(at)), {}
         else:
             own = spelled(kind, None if is_null else numbers[:size])
         own |= with_entries(dict(zip(extras, [None] * len(extras) if is_null else numbers[size:], strict=True)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import starmap
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import warn
@@ -19,9 +20,8 @@ if TYPE_CHECKING:
 
 def notes_of(run: Run, block: Block) -> list[RowNote]:
     """Return what is worth telling about the rows of a block, by line."""
-    notes = [run.note_of_degrees(*each) for each in run.doubted[:1]]
+    notes = [*run.rounded, *starmap(run.note_of_degrees, run.doubted[:1])]
     notes += [RowNote.of_lost_name(block.line_of(row), name) for row, name in block.lost]
-    notes += run.rounded
     if run.plan.shapes and run.plan.shapes[0].notation is UPPER_ROWS and run.off > PROJECTED_IN_SILENCE:
         notes.append(RowNote(block.line_of(0), "projected", projection(run.off)))
     return sorted(notes)

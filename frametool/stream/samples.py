@@ -27,8 +27,7 @@ from frametool.stream.record import placed, value_at
 from frametool.stream.record_values import documents, pose_of
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import plain_cells
-from frametool.stream.run import Outcome, run
-from frametool.stream.trajectories import TREE
+from frametool.stream.trajectories import TREE, gathered
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -199,34 +198,24 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Poin
     if {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
         raise FormatError(f"no points in it: {FORMATS[form].summary}", source=file.name)
     converter = FormatConverter(form, Request(Operation(moves=True)), Style("json"), file.name, answers)
-    numbers: list[Any] = []
     beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
-    lines: list[int] = []
-    frames: set[str | None] = set()
-
-    def gathered() -> Iterator[Outcome]:
-        first = int(converter.is_table)
-        for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
-            if size := len(poses.numbers):
-                if poses.numbers.shape[1] < 3 or not converter.placed:
-                    raise FormatError("no positions in it: rotations alone are no points", source=file.name)
-                numbers.append(poses.numbers[:, :3])
-                lines.extend((poses.lines + first).tolist())
-                frames.update(poses.parents)
-                given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in beside}
-                if poses.names[0] is not None:
-                    given[IDS[1]] = [*poses.names] if len(poses.names) == size else [*poses.names] * size
-                for key, cells in beside.items():
-                    cells.extend(given.get(key, [None] * size))
-            first += outcome.lines
-            yield outcome
-
-    run(gathered(), lambda _: None, bad, lambda *_: None)
-    if not numbers:
+    blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
+    if not blocks:
         raise FormatError("no points in it", source=file.name)
+    if blocks[0][0].numbers.shape[1] < 3 or not converter.placed:
+        raise FormatError("no positions in it: rotations alone are no points", source=file.name)
+    for poses, _ in blocks:
+        size = len(poses.numbers)
+        given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in beside}
+        if poses.names[0] is not None:
+            given[IDS[1]] = [*poses.for_each(poses.names)]
+        for key, cells in beside.items():
+            cells.extend(given.get(key, [None] * size))
     on_lines = "arrays" not in FORMATS[form].reads
+    lines = np.concatenate([each for _, each in blocks]).tolist()
     places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in enumerate(lines, 1)]
-    return _points(file.name, np.concatenate(numbers), beside, places, frames)
+    numbers = np.concatenate([poses.numbers[:, :3] for poses, _ in blocks])
+    return _points(file.name, numbers, beside, places, {name for poses, _ in blocks for name in poses.parents})
 
 
 def _of_documents(file: InputFile) -> Points:

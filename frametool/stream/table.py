@@ -78,9 +78,11 @@ class Naming:
     def of_block(self, cells: Cells) -> BlockNames:
         """Read the names of a block's rows and name the results."""
         if self.places == (None, None):
+            if not self.layout.frames:
+                return BlockNames()
             columns = [_coded(cells, place) for place in self.layout.frames]
             texts = [[column.texts[code] for code in column.codes.tolist()] for column in columns]
-            return BlockNames(["\0".join(names) for names in zip(*texts, strict=True)] if texts else ())
+            return BlockNames(["\0".join(names) for names in zip(*texts, strict=True)])
         parents, names = (_coded(cells, place) for place in self.places)
         size = len(names.texts)
         found, of_row = np.unique(parents.codes * size + names.codes, return_inverse=True)
@@ -307,7 +309,7 @@ def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[T
     if delimiter and torn_record(line, delimiter) is not None:
         raise FormatError(UNCLOSED, source=source, line=1)
     cells = cells_of(line, delimiter)
-    named = _named_comment(comments, delimiter, len(cells)) if header else None
+    named = _named_comment(comments, delimiter, len(cells)) if header and comments else None
     if not cells and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
     numeric = [_is_number(_unquoted(cell)) for cell in cells]
@@ -455,18 +457,13 @@ def _as_slice(places: Sequence[int]) -> slice | list[int]:
 
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
     """Return the span from one cell to another in every row, with what stands before or after as told."""
-    starts = {
-        "cell": lambda: cells.starts[:, first],
-        "line": lambda: cells.line_starts[cells.rows],
-        "gap": lambda: cells.ends[:, first - 1],
-        "end": lambda: cells.ends[:, first],
-    }[begin]()
-    ends = {
-        "cell": lambda: cells.ends[:, last],
-        "line": lambda: cells.line_ends[cells.rows],
-        "gap": lambda: cells.starts[:, last + 1],
-    }[end]()
-    return Spans(cells.data, starts, ends)
+    if begin == "line":
+        starts = cells.line_starts[cells.rows]
+    else:
+        starts = cells.starts[:, first] if begin == "cell" else cells.ends[:, first - (begin == "gap")]
+    if end == "line":
+        return Spans(cells.data, starts, cells.line_ends[cells.rows])
+    return Spans(cells.data, starts, cells.ends[:, last] if end == "cell" else cells.starts[:, last + 1])
 
 
 def _line_counter(cells: Cells) -> Callable[[int], int]:

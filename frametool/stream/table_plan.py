@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frametool.geometry.representations import Notation
-    from frametool.stream.header import Columns
     from frametool.stream.layout import Column, Layout
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
@@ -60,13 +59,13 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     if on_earth:
         from frametool.stream.earth_columns import check_rows, readers_of
 
-        request, shapes = check_rows(request, shapes, source)
+        request, shapes = check_rows(request, shapes, table.names or (), source)
     if request.place is not None and (request.operation.moves or not on_earth):
         from frametool.stream.earth_columns import refuse_elsewhere
 
         refuse_elsewhere(table, request, source)
     beside: tuple[int, ...] = ()
-    if any(may_be_uncertain(name) for name in table.names or ()):
+    if any(map(may_be_uncertain, table.names or ())):
         from frametool.stream.beside import covariance_columns
 
         beside, shapes = covariance_columns(table, request, shapes, source)
@@ -90,7 +89,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
-    poses = [_written(pose) for pose in poses]
+    poses = [_written(pose) for pose in poses] if on_earth else poses
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if beside and not request.keep:
         from frametool.stream.beside import with_entries_at
@@ -214,7 +213,8 @@ def _without_position(pose: PoseColumns, request: Request, table: Table, source:
             line=1,
         )
     leaves_plane = pose.position and not pose.position.wrong and pose.position.absent and request.notations
-    stays = not (_is_whole(request.notations) or pose.rotation.whole or leaves_plane)
+    is_whole = len(request.notations) == 1 and request.notations[0].representation.whole is not None
+    stays = not (is_whole or pose.rotation.whole or leaves_plane)
     return PoseColumns(None, pose.rotation) if stays else pose
 
 
@@ -224,11 +224,6 @@ def _written(pose: PoseColumns) -> PoseColumns:
     if position is None or not position.staying:
         return pose
     return pose._replace(position=position._replace(places=position.places[: -position.staying]))
-
-
-def _is_whole(notations: Sequence[Notation]) -> bool:
-    """Tell whether a result is written as the numbers of a whole pose."""
-    return len(notations) == 1 and notations[0].representation.whole is not None
 
 
 def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
@@ -379,7 +374,8 @@ def _new_columns(
     if rotation and alone and _same(pose, target) and rotation.whole == target.whole:
         turned = list(rotation.names)
     else:
-        turned = _affixed(target.names, rotation, request, len(poses))
+        prefix, suffix = (rotation.prefix, rotation.suffix) if rotation and alone else (request.prefix, "")
+        turned = [prefix + name + suffix for name in target.names]
     moved = [request.prefix + name for name in target.position_columns]
     if target.plain and pose.position:
         moved = [request.prefix + name for name in pose.position.names]
@@ -397,10 +393,3 @@ def _new_columns(
         axes = [Fixed(target.place.axes, request.prefix + AXES_KEY)]
     beside = [column for column, (_, name) in zip(new[last:], named[last:], strict=True) if name not in turned]
     return [[*new[:first], *axes], new[first:last], beside]
-
-
-def _affixed(names: Sequence[str], columns: Columns | None, request: Request, poses: int) -> list[str]:
-    """Add to new names the affixes of those they come from, or the prefix asked for."""
-    if request.prefix or columns is None or poses > 1:
-        return [request.prefix + name for name in names]
-    return [columns.prefix + name + columns.suffix for name in names]

@@ -7,7 +7,7 @@ parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that stand still
 
 from __future__ import annotations
 
-from itertools import chain, groupby
+from itertools import groupby
 from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
@@ -46,13 +46,12 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     rows = TablePoses(begun, file.form, request, file.name)
     _check(rows, form, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
-    line, count = 1 + begun.lines, 0
-    for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
-        block = rows.of_block(text)
+    count = 0
+    for block, line, _ in rows.blocks(begun):
         for fault in rows.faults:
             options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
         yield from _pieces(block, _times(block, stamps, form, count), line, form, options)
-        line, count = line + text.count(b"\n"), count + len(block.numbers)
+        count += len(block.numbers)
     if stamps:
         stamps.finish(count, file.name)
     _tell(rows, form, options, count)
@@ -90,10 +89,10 @@ def _pieces(
     poses = list(zip(*(column.tolist() for column in columns), strict=True))
     lines = (block.lines + line).tolist()
     world, body = options.answers.names(*form.frames)
-    count = len(poses)
-    parents, names = _spread(block.parents, count, world), _spread(block.names, count, body)
+    parents = [name or world for name in block.for_each(block.parents)]
+    names = [name or body for name in block.for_each(block.names)]
     bare = options.tally.names.bare
-    for (parent, name), group in groupby(range(count), key=lambda at: (bare(parents[at]), bare(names[at]))):
+    for (parent, name), group in groupby(range(len(poses)), key=lambda at: (bare(parents[at]), bare(names[at]))):
         some = list(group)
         part = slice(some[0], some[-1] + 1)
         if times is not None:
@@ -101,12 +100,6 @@ def _pieces(
         else:
             yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
     options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or form.axes)
-
-
-def _spread(names: Sequence[str | None], count: int, otherwise: str) -> list[str]:
-    """Return a name for each row."""
-    given = [name or otherwise for name in names]
-    return given if len(given) == count else given * count
 
 
 def _tell(rows: TablePoses, form: Poses, options: Options, count: int) -> None:

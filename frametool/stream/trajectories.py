@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.grammar.edges import Report
+    from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
+    from frametool.text.spans import Ints
 
 POSITION = 3  # numbers
 TREE = rb"""(?m)^\s*(?:---\s*)?\{?\s*["']?(?:frames|transforms|angles)["']?\s*:"""  # keys of a tree, not of a record
@@ -199,6 +201,22 @@ def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, form: str | None =
     return sorted(found)
 
 
+def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows) -> list[tuple[RowPoses, Ints]]:
+    """Return the results of all blocks that have some, and the lines of their rows; bad rows go to `bad`."""
+    found: list[tuple[RowPoses, Ints]] = []
+
+    def outcomes() -> Iterator[Outcome]:
+        line = int(converter.is_table)  # what lists poses says itself where they stand
+        for poses, outcome in converter.steps(stream):
+            if len(poses.numbers):
+                found.append((poses, poses.lines + line))
+            line += outcome.lines
+            yield outcome
+
+    run(outcomes(), lambda _: None, bad, lambda *_: None)
+    return found
+
+
 def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
     row = FORMATS[form].poses
@@ -206,36 +224,24 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     own = answers if counts or form == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(form, request, Style("tum"), file.name, own)
-    numbers: list[Any] = []
-    stamps: list[Any] = []
-    lines: list[Any] = []
-    before = [int(converter.is_table)]  # what lists poses says itself where they stand
-    named: set[tuple[str | None, str | None]] = set()
-
-    def gathered() -> Iterator[Outcome]:
-        for poses, outcome in converter.steps(cast("BufferedReader", file.stream)):
-            before.append(before[-1] + outcome.lines)
-            if len(poses.numbers):
-                lines.append(poses.lines + before[-2])
-                numbers.append(poses.numbers)
-                stamps.append(poses.stamps_ns)
-                named.update(zip(_all(poses.parents, poses.names), _all(poses.names, poses.parents), strict=True))
-            yield outcome
-
-    run(gathered(), lambda _: None, bad, lambda *_: None)
-    if not numbers:
+    blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
+    if not blocks:
         raise FormatError("no poses in it", source=file.name)
+    named = {
+        pair for each, _ in blocks for pair in zip(each.for_each(each.parents), each.for_each(each.names), strict=True)
+    }
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
         raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
-    columns = np.concatenate(numbers)
+    columns = np.concatenate([poses.numbers for poses, _ in blocks])
     if columns.shape[1] not in (POSITION, 7):
         raise FormatError("rotations without positions are no trajectory", source=file.name)
     world, body = own.names(WORLD, BODY)
     parent, name = named.pop()
-    times: Any = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
+    stamps: Any = [poses.stamps_ns for poses, _ in blocks]
+    times = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
-    at = None if "arrays" in FORMATS[form].reads else np.concatenate(lines)
+    at = None if "arrays" in FORMATS[form].reads else np.concatenate([lines for _, lines in blocks])
     return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
 
 
@@ -259,10 +265,6 @@ def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request) -> Tra
     return Trajectory(
         times, columns[:, :POSITION], columns[:, POSITION:] if has_turns else None, parent or WORLD, name or BODY
     )
-
-
-def _all(names: Sequence[str | None], others: Sequence[str | None]) -> Sequence[str | None]:
-    return names if len(names) == len(others) else [*names] * len(others)
 
 
 def _of_tree(

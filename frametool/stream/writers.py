@@ -262,7 +262,7 @@ class TextWriter:
 
     def _filled(self, rows: RowForm, block: RowPoses) -> bytes:
         """Fill the numbers of a block into the rows that were learned."""
-        written = self.target.written(self._own(tuple(block.numbers.T)), arrays)
+        written = self.target.written(block.unmoved(self._own(tuple(block.numbers.T))), arrays)
         values = np.empty((len(block.numbers), len(self.order)))
         for at, place in enumerate(self.order):
             values[:, at] = written[place]

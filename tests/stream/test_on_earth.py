@@ -230,8 +230,7 @@ def test_goldens_of_utm(what: str, run: Callable[..., Any]) -> None:
         argument = json.dumps({"lat": lat, "lon": lon, "alt": 0.0})
         found = json.loads(run("convert", argument, "--to", "utm", "-f", "json", *held).out)["utm"]
         assert found["zone"] == zone
-        # 5e-9 m of the mapping, and 2e-9 m, one rounding of each number in ECEF, which lies between
-        assert [found["easting"], found["northing"]] == pytest.approx([easting, northing], abs=7e-9)
+        assert [found["easting"], found["northing"]] == pytest.approx([easting, northing], abs=5e-9)
         assert found["convergence_deg"] == pytest.approx(convergence, abs=1e-12)
         assert found["grid_scale"] == pytest.approx(scale, abs=1e-14)
         back = json.loads(run("convert", json.dumps({"utm": found}), "--to", "lla", "-f", "json").out)
@@ -587,3 +586,19 @@ def test_rows_of_lookups_say_places_in_json_too(run: Callable[..., Any]) -> None
     done = run(*asked, files={"site.yaml": site, "rows.csv": "t,f\n1,map\n"})
     row = json.loads(done.out)
     assert (row["parent"], row["axes"], row["f"], round(row["lat"], 9)) == ("ecef", "enu", "map", 48.1)
+
+
+def test_what_has_no_effect_is_an_error(run: Callable[..., Any]) -> None:
+    grid, places = "691607,5334760,5\n", "lat,lon,alt\n48.1,11.5,5\n"
+    for arguments, text, told in (
+        (("--from", "utm", "--zone", "32N", "--to", "lla"), f"utm_zone,easting,northing,alt\n33N,{grid}", "--zone has no effect"),
+        (("--from", "utm", "--zone", "32N", "--to", "lla"), f"e,n,h\n{grid}", "no columns of utm"),
+        (("--from", "lla", "--to", "ecef"), f"x,y,z\n{grid}", "no columns of lla"),
+        (("--to", "lla", "--local-axes", "ned"), places, "--local-axes has no effect"),
+        (("--to", "lla", "--origin", "first"), places, "--origin first has no effect"),
+    ):
+        done = run("convert", *arguments, stdin=text)
+        assert done.status != 0
+        assert told in done.err
+    done = run("convert", "--from", "utm", "--zone", "32N", "--to", "lla", stdin=f"x,y,z\n{grid}")
+    assert done.out == run("convert", "--from", "utm", "--zone", "32N", "--to", "lla", stdin=f"easting,northing,alt\n{grid}").out
