@@ -30,7 +30,8 @@ from frametool.errors import (
 )
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import BAG, CHOICES, FORMATS, readers
-from frametool.frames.lookups import FrameTree, two_covariances
+from frametool.frames import topology
+from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, at_other_times, stop
@@ -303,8 +304,8 @@ class Assembly:
         """Keep the covariance of an edge; raises BadTopology with both places where it is not the one said before."""
         first = self._first[child][2]
         if place.edge.covariance != first.edge.covariance:
-            error = two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
-            raise place.error(f"{error}: {first.seen_from(place)} and {place.seen_from(place)}", BadTopology)
+            error = topology.two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
+            raise self._placed(error, parent, child, place)
         if place.edge.covariance is not None:
             self.covariances[child] = place.edge.covariance
 
@@ -423,7 +424,7 @@ class Assembly:
 
         for each in self._replaced:
             if each.child in standing:
-                raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
+                raise self._placed(topology.two_poses(each.child, each.parent), each.parent, each.child, each.later)
         most += len(self._replaced) == most + 1
         for each in self._replaced[:most]:
             places = f"{each.earlier.seen_from(each.later)} and {each.later.seen_from(each.later)}"
@@ -447,18 +448,13 @@ class Assembly:
 
     def _placed(self, error: BadTopology, parent: str, child: str, place: EdgePlace) -> FormatError:
         """Make the error for a place; where it contradicts what was said before, both places are named."""
-        message = str(error)
         known = self._first.get(child)
-        if error.rule not in ("cycle", "self") and known is not None and known[2] is not place:
-            first, second = known[2].seen_from(place), place.seen_from(place)
-            if known[0] != parent:
-                parents = f"{shown(known[0])} ({first}) and {shown(parent)} ({second})"
-                message = f"frame {shown(child)} has two parents: {parents}"
-            elif error.rule == "two-poses":
-                message = f"frame {shown(child)} has two different poses in {shown(parent)}: {first} and {second}"
-            else:
-                message = f"{error}: {first} and {second}"
-        return place.error(message, BadTopology)
+        if error.rule in ("cycle", "self") or known is None or known[2] is place:
+            return place.error(str(error), BadTopology)
+        places = known[2].seen_from(place), place.seen_from(place)
+        if known[0] != parent and error.rule != "two-covariances":
+            return place.error(str(topology.two_parents(child, known[0], parent, places)), BadTopology)
+        return place.error(f"{error}: {' and '.join(places)}", BadTopology)
 
 
 class EdgePlace(NamedTuple):

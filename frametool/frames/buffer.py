@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from frametool.errors import BadTopology, ValueInvalid, shown, warn
-from frametool.frames.lookups import Frames, taken, two_covariances
-from frametool.frames.path import cycle_message
-from frametool.frames.refusals import check_age, check_edge, check_same
+from frametool.errors import ValueInvalid, shown, warn
+from frametool.frames import topology
+from frametool.frames.lookups import Frames, taken
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
 from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
 
@@ -58,7 +57,7 @@ class TransformBuffer(Frames):
             raise ValueInvalid(f"insert takes one transform, found {len(transform)}; insert them one by one")
         parent, child, found = self.called(parent), self.called(child), taken(covariance)
         if found and (known := self.covariances.get(child, found)) != found:
-            raise two_covariances(parent, child, known, found)
+            raise topology.two_covariances(parent, child, known, found)
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
             warn(f"frame {shown(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
         if found:
@@ -90,7 +89,7 @@ class TransformBuffer(Frames):
                 return False
             if track.add_if_new(stamp_ns, components):
                 return False
-        check_edge(parent, child, components)
+        topology.check_edge(parent, child, components)
         standing = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
         return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
@@ -116,7 +115,7 @@ class TransformBuffer(Frames):
         """Add what may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
         if track is not None and track.standing != standing:
-            raise BadTopology(f"frame {shown(child)} both stands still and moves", rule="static-and-moving")
+            raise topology.static_and_moving(child)
         replaced = False
         if track is None:
             self._refuse_cycle(parent, child, stamp_ns, standing=standing)
@@ -125,7 +124,7 @@ class TransformBuffer(Frames):
             else:
                 track = self._put(MovingTrack(child, stamp_ns, parent, components))
         elif track.standing:
-            check_same(track, parent, components)
+            topology.check_same(child, (track.parent, track.components), (parent, components))
         else:
             replaced = self._move(track, parent, components, stamp_ns)
         self._frames[parent] = None
@@ -135,7 +134,7 @@ class TransformBuffer(Frames):
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:
         """Add a further sample of a frame that moves; returns whether it replaced another one."""
         if self.keep_ns is not None:
-            check_age(track, stamp_ns, self.keep_ns)
+            _check_age(track, stamp_ns, self.keep_ns)
         if known := track.samples_at(stamp_ns):
             self._varies = self._varies or parent != known[-1][0]
             self._queries.clear()
@@ -161,7 +160,7 @@ class TransformBuffer(Frames):
         while (track := self._tracks.get(line[-1])) is not None and _holds(track, at_ns):
             line.append(track.parent)
             if line[-1] == child:
-                raise BadTopology(cycle_message([*line, parent]), rule="cycle")
+                raise topology.cycle([*line, parent])
             if len(line) > len(self._tracks):
                 return  # round in a circle of others, whose edges held at different times when they came
 
@@ -174,6 +173,16 @@ class TransformBuffer(Frames):
         """Return how many frames and samples there are."""
         samples = sum(track.count for track in self._tracks.values())
         return f"TransformBuffer({len(self._frames)} frames, {samples} samples)"
+
+
+def _check_age(track: MovingTrack, stamp_ns: int, keep_ns: int) -> None:
+    """Refuse a sample older than what a buffer keeps."""
+    newest = track.last_ns
+    if newest - keep_ns > stamp_ns:
+        raise ValueInvalid(
+            f"a sample of {shown(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
+            f"{format_stamp(keep_ns)} s before its newest at {format_stamp(newest)}",
+        )
 
 
 def _holds(track: Track, at_ns: int | None) -> bool:

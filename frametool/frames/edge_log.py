@@ -11,9 +11,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
-from frametool.frames.path import edges_between
 from frametool.frames.refusals import seconds
 from frametool.frames.stamps import BILLION
+from frametool.frames.topology import edges_between
 from frametool.geometry import floats, rigid
 
 if TYPE_CHECKING:

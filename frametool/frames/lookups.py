@@ -11,10 +11,12 @@ from itertools import chain, repeat
 from math import ceil, floor
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, shown, warn
-from frametool.frames.path import Query, cycle_message, edges_between, to_root
-from frametool.frames.refusals import check_same, left_out, no_data
+from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, warn
+from frametool.frames import topology
+from frametool.frames.path import Query
+from frametool.frames.refusals import left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
+from frametool.frames.topology import Groups, edges_between, to_root
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
 from frametool.geometry.representations import EARTH_FRAMES
@@ -387,7 +389,7 @@ class FrameTree(Frames):
     def __init__(self, name: str = "") -> None:
         """Create an empty tree; `name` says in error messages where the frames come from."""
         super().__init__(name)
-        self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
+        self.groups = Groups()  # of frames that hang together
 
     def add(self, parent: str, child: str, transform: Transform, covariance: Any = None) -> None:
         """Hang a frame under a parent; `transform` is parent_from_child, the pose of the child in its parent.
@@ -400,7 +402,7 @@ class FrameTree(Frames):
         parent, child = self.called(parent), self.called(child)
         known, found = self._tracks.get(child), taken(covariance)
         if known is not None and known.parent == parent and self.covariances.get(child) != found:
-            raise two_covariances(parent, child, self.covariances.get(child), found)
+            raise topology.two_covariances(parent, child, self.covariances.get(child), found)
         self.add_components(parent, child, transform.components)
         if found:
             self.covariances[child] = found
@@ -409,26 +411,24 @@ class FrameTree(Frames):
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._tracks.get(child)
         if known is not None and known.standing:
-            check_same(known, parent, components)
+            topology.check_same(child, (known.parent, known.components), (parent, components))
             return
         if parent == child:
-            raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")
-        if child in self._frames and self._root_of(parent) == child:
-            raise BadTopology(cycle_message([*to_root(parent, self.parent), parent]), rule="cycle")
+            raise topology.own_parent(child)
+        if child in self._frames and self.groups.of(parent) == self.groups.of(child):
+            raise topology.cycle([*to_root(parent, self.parent), parent])
         self._frames[parent] = None
         self._put(StandingTrack(child, parent, components))
-        self._upward[child] = parent
+        self.groups.join(child, parent)
 
-    def _root_of(self, frame: str) -> str:
-        """Find a frame's root, halving the way for the next search."""
-        upward = self._upward
-        while (above := upward.get(frame)) is not None:
-            further = upward.get(above)
-            if further is None:
-                return above
-            upward[frame] = further
-            frame = further
-        return frame
+    def reroot(self, frame: str) -> None:
+        """Turn the edges above a frame round, so that all of its tree hangs from it."""
+        way = []
+        while (track := self._tracks.pop(frame, None)) is not None:
+            way.append(track)
+            frame = track.parent
+        for track in way:
+            self._put(StandingTrack(track.parent, track.child, rigid.inverse(*track.components)))
 
     def __repr__(self) -> str:
         """Return how many frames there are and which roots."""
@@ -464,8 +464,3 @@ def taken(covariance: Any) -> Components | None:
 
     return uncertainty.taken(covariance)
 
-
-def two_covariances(parent: str, child: str, one: Components | None, other: Components | None) -> BadTopology:
-    """Make the error for an edge that is said to be uncertain in two ways."""
-    what = "two different covariances" if one and other else "a covariance in one place and none in another"
-    return BadTopology(f"frame {shown(child)} in {shown(parent)} has {what}", rule="two-covariances")

@@ -11,8 +11,8 @@ from frametool.errors import BadTopology, FormatError, Unanswered, first_of, sho
 from frametool.formats.detect import by_sign
 from frametool.formats.load import refuse_unknown_joints
 from frametool.formats.trees.tree_reader import read_edges, without_slashes
+from frametool.frames import topology
 from frametool.frames.edge_log import EdgeLog
-from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.names import may_be_on_earth
@@ -52,6 +52,10 @@ class Statement(NamedTuple):
     def finding(self, rule: str, message: str) -> Finding:
         """Make a finding for this place."""
         return Finding(rule, message, self.source, self.line, self.column)
+
+    def broken(self, error: BadTopology, places: str = "") -> Finding:
+        """Make the finding of edges that make no tree."""
+        return self.finding(error.rule, error.message + places)
 
 
 def read_all(recording: Recording, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
@@ -249,7 +253,7 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
     children: dict[str, Child] = {}
     for number, seen in enumerate(everything):
         if seen.parent == seen.child:
-            yield seen.finding("self", f"frame {shown(seen.child)} is its own parent")
+            yield seen.broken(topology.own_parent(seen.child))
             continue
         child = children.get(seen.child)
         if child is None:
@@ -270,16 +274,15 @@ def _child(child: Child) -> Iterator[Finding]:
     moves = len(child.stamps) > 1
     if child.stands is not None and moves:
         moving = next(each for each in (first, child.newest) if each.stamp_ns is not None)
-        yield moving.finding("static-and-moving", f"{frame} moves, but stands still in {_at(child.stands)}")
+        told = f" moves, but stands still in {_at(child.stands)}"
+        yield moving.broken(topology.static_and_moving(first.child, told))
     elif moves:
         yield from _moving(child, frame)
         yield from _steps(child)
     elif other := child.other_parent:
-        parents = f"{shown(first.parent)} ({_at(first)}) and {shown(other.parent)} ({_at(other)})"
-        yield other.finding("two-parents", f"{frame} has two parents: {parents}")
+        yield other.broken(topology.two_parents(first.child, first.parent, other.parent, (_at(first), _at(other))))
     elif other := child.other_pose:
-        message = f"{frame} has two different poses in {shown(first.parent)}: {_at(first)} and {_at(other)}"
-        yield other.finding("two-poses", message)
+        yield other.broken(topology.two_poses(first.child, first.parent), f": {_at(first)} and {_at(other)}")
 
 
 def _moving(child: Child, frame: str) -> Iterator[Finding]:
@@ -335,7 +338,7 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
             circle = line[line.index(frame) :]
             _, last = max(children[each].since for each in circle)
             at = circle.index(last.parent)
-            yield last.finding("cycle", cycle_message([*circle[at:], *circle[:at], last.parent]))
+            yield last.broken(topology.cycle([*circle[at:], *circle[:at], last.parent]))
 
 
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:

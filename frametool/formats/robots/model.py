@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeAlias
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
-from frametool.frames.path import edges_between
+from frametool.frames.topology import edges_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.floats import DEGREE, RADIAN
 from frametool.geometry.representations import notation

@@ -23,6 +23,7 @@ from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quate
 from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
 from frametool.formats.unsupported import UNSUPPORTED
+from frametool.frames.topology import two_parents
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
@@ -253,9 +254,8 @@ def robot_of(file: Recording) -> tuple[Robot, Posture]:
     links: dict[str, Link] = {}
     for link in described.links:
         if link.child in links:
-            parents = f"{shown(links[link.child].parent)} and {shown(link.parent)}"
-            problem = f"frame {shown(link.child)} has two parents: {parents}"
-            raise BadTopology(problem, source=file.name, line=link.line, rule="two-parents")
+            error = two_parents(link.child, str(links[link.child].parent), str(link.parent))
+            raise BadTopology(error.message, source=file.name, line=link.line, rule=error.rule)
         links[link.child] = link
     file.tell()
     return Robot(file.name, links, described.frames), described.posture
