@@ -22,6 +22,7 @@ from frametool.errors import (
     BadAnswer,
     BadTopology,
     FileProblem,
+    Finding,
     FormatError,
     ValueInvalid,
     alternatives,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.edges import Remark, Report
+    from frametool.grammar.edges import Report
 
 
 class Recording(InputFile):
@@ -153,7 +154,7 @@ class Recording(InputFile):
 
     def tell(self) -> None:
         """Warn of what was odd in the file, once it was read."""
-        found: dict[str | Remark, list[Remark]] = {}
+        found: dict[str | Finding, list[Finding]] = {}
         for told in self.tally.told():
             found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
         for first, *others in found.values():

@@ -7,7 +7,7 @@ from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import BadTopology, FormatError, Unanswered, first_of, shown
+from frametool.errors import BadTopology, Finding, FormatError, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
 from frametool.formats.load import refuse_unknown_joints
 from frametool.formats.trees.tree_reader import read_edges, without_slashes
@@ -16,8 +16,7 @@ from frametool.frames.edge_log import EdgeLog
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.names import may_be_on_earth
-from frametool.grammar.readers import Misfit, Note, Reading
-from frametool.lint.findings import Finding
+from frametool.grammar.readers import Misfit, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -67,7 +66,7 @@ def read_all(recording: Recording, find: Find, *, normalize: bool = False) -> It
 
 def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Iterator[Statement]:
     def report(error: FormatError) -> None:
-        find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
+        find(error.finding)
 
     in_documents = []
     try:
@@ -89,7 +88,7 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
     for note in recording.tally.told():
-        find(Finding(note.rule, note.message, recording.name, note.line, 1))
+        find(note._replace(source=recording.name, column=1))
 
 
 def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
@@ -107,20 +106,20 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     try:
         documents = parse_documents(source.text, source.name)
     except FormatError as error:
-        find(Finding("syntax", error.message, source.name, error.line, error.column))
+        find(error.finding)
         return
-    notes: list[Note] = []
+    notes: list[Finding] = []
     edges = []
     for document in documents:
         edges += _read_document(document, Reading(source, normalize=normalize), notes)
     places = locate_many(source.text, [*(note.path for note in notes), *(edge.path for edge, _ in edges)])
     for note, (line, column) in zip(notes, places, strict=False):
-        find(Finding(note.rule, note.message, source.name, line, column))
+        find(note._replace(source=source.name, line=line, column=column))
     for (edge, w_first), place in zip(edges, places[len(notes) :], strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, reading: Reading, notes: list[Note]) -> list[tuple[Edge, bool]]:
+def _read_document(document: Document, reading: Reading, notes: list[Finding]) -> list[tuple[Edge, bool]]:
     """Return the edges of a document, each with whether it looks written w first; collect its notes."""
     reading.faults = []
     edges = []
@@ -132,7 +131,7 @@ def _read_document(document: Document, reading: Reading, notes: list[Note]) -> l
                 edges.append((edge._replace(path=(document.index, *edge.path)), w_first))
     except Misfit as misfit:
         reading.faults.append(misfit)
-    faults = (Note(misfit.rule or "syntax", str(misfit), misfit.path) for misfit in reading.faults)
+    faults = (Finding(misfit.rule or "syntax", str(misfit), path=misfit.path) for misfit in reading.faults)
     notes += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
     return edges
 

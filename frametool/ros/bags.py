@@ -13,7 +13,6 @@ from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInva
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge
-from frametool.grammar.readers import Note
 from frametool.ros.message_bytes import RawTransform
 from frametool.ros.messages import POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components
@@ -86,7 +85,7 @@ def check_files(path: str, tally: Tally) -> None:
         if file.suffix == ".db3":
             _check_database(file)
         elif file.suffix == ".mcap" and _tail(file)[:8] == bytes(8):
-            tally.note(Note("odd", NO_SUMMARY.format(file.name), ()), 1)
+            tally.note(NO_SUMMARY.format(file.name), 1)
 
 
 def _tail(file: Path) -> bytes:

@@ -329,7 +329,7 @@ def _read(
         found = messages.read_transform(transform, reading)
     parent, child, position, rotation, stamp_ns = found
     for note in reading.notes:
-        options.tally.note(note, line)
+        options.tally.note(note.message, line, note.rule)
     return parent, child, (*position, *rotation), stamp_ns
 
 

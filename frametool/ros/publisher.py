@@ -115,7 +115,7 @@ def read_edge(
         return None
     parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
     for note in reading.notes:
-        options.tally.note(note, line)
+        options.tally.note(note.message, line, note.rule)
     return Edge(parent, child, pose.components, line=line)
 
 

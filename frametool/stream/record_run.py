@@ -33,8 +33,9 @@ from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misuse
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.errors import Finding
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
+    from frametool.grammar.edges import EdgeColumns, Report, Samples
     from frametool.ros.message_chunks import Channel
     from frametool.ros.record_changes import Change
     from frametool.ros.record_copy import Advance, CopiedRecording
@@ -229,7 +230,7 @@ class RecordRun:
         if not (self.added or self.rewritten or self.moved or self.request.window):
             yield f"nothing is changed: {_count(sum(self.contents.counts.values()))} copied"
 
-    def remarks(self) -> Iterator[Remark]:
+    def remarks(self) -> Iterator[Finding]:
         """Yield what was odd in messages that were moved."""
         if self.mover is not None:
             yield from self.mover.tally.told()

@@ -61,7 +61,7 @@ def read_quaternion(
     except ValueInvalid as error:
         raise xml.error(element, str(error), attribute, rule=error.rule) from None
     for note in reading.notes:
-        options.tally.note(note, element.line)
+        options.tally.note(note.message, element.line, note.rule)
     return rotation
 
 

@@ -37,7 +37,7 @@ from frametool.formats.table import FORMATS, readers
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge, Options, Tally
-from frametool.grammar.readers import Misfit, Note, as_mapping, kind
+from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import joint_state, messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.text.csv_line import split_line
@@ -235,11 +235,11 @@ class Posture:
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
                 beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]
                 if beyond:
-                    tally.note(Note("limit", _about_limits(joint, beyond, len(values)), ()), joint.line)
+                    tally.note(_about_limits(joint, beyond, len(values)), joint.line, "limit")
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
             if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
-                tally.note(Note("odd", f"{far}; poses between go the shorter way", ()), joint.line)
+                tally.note(f"{far}; poses between go the shorter way", joint.line)
 
     def _about(self) -> str:
         """Say how many joints stand where nobody said."""

@@ -30,7 +30,6 @@ from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import Note
 from frametool.grammar.result import Style, rotation_numbers
 from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
@@ -98,7 +97,7 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
     if len(roots := robot.roots) > 1:
         named = first_of(roots, 5, quote=bare)
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
-        options.tally.note(Note("several-roots", message, ()), robot.frames[roots[1]])
+        options.tally.note(message, robot.frames[roots[1]], "several-roots")
     return robot
 
 
@@ -174,7 +173,7 @@ class _Reader:
         rotation = IDENTITY[3:]
         if beyond := next((each for each in (roll, pitch, yaw) if abs(each) > TURN), None):
             message = f"rpy {beyond:g} is more than a full turn in radians; degrees?"
-            self.options.tally.note(Note("degrees", message, ()), element.line)
+            self.options.tally.note(message, element.line, "degrees")
         if roll or pitch or yaw:
             rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
         if "quat_xyzw" not in element.attributes:
@@ -209,7 +208,7 @@ class _Reader:
         (lower,), (upper,) = self.xml.numbers(element, "lower", 1, "0"), self.xml.numbers(element, "upper", 1, "0")
         if lower > upper:
             message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
-            self.options.tally.note(Note("limit", message, ()), element.line)
+            self.options.tally.note(message, element.line, "limit")
         return lower, upper
 
     def _mimic(self, name: str, kind: str, element: Element) -> Mimic:
