@@ -55,7 +55,7 @@ class TransformBuffer(Frames):
         components = transform.components
         if type(components[6]) is not float and transform.shape:
             raise ValueInvalid(f"insert takes one transform, found {len(transform)}; insert them one by one")
-        parent, child, found = self.called(parent), self.called(child), taken(covariance)
+        parent, child, found = self.resolve_name(parent), self.resolve_name(child), taken(covariance)
         if found and (known := self.covariances.get(child, found)) != found:
             raise topology.two_covariances(parent, child, known, found)
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):

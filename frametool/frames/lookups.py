@@ -19,7 +19,6 @@ from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.topology import Groups, edges_between, to_root
 from frametool.frames.track import StandingTrack
 from frametool.geometry import rigid
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 
@@ -70,11 +69,9 @@ class Frames:
         """Return every frame, in the order of first mention."""
         return tuple(self._frames)
 
-    def called(self, frame: str) -> str:
+    def resolve_name(self, frame: str) -> str:
         """Return what a frame is called here: the Earth's, `ecef` or `earth`, is one by either name."""
-        if frame in EARTH_FRAMES and frame not in self._frames:
-            return next((other for other in EARTH_FRAMES if other in self._frames), frame)
-        return frame
+        return topology.resolve_name(frame, self._frames)
 
     @property
     def roots(self) -> tuple[str, ...]:
@@ -100,7 +97,7 @@ class Frames:
 
     def track(self, frame: str) -> Track | None:
         """Return what is known about a frame over time; None for a root."""
-        return self._tracks.get(frame) or self._tracks.get(self.called(frame))
+        return self._tracks.get(frame) or self._tracks.get(self.resolve_name(frame))
 
     def tracks(self) -> Iterator[Track]:
         """Walk what is known about each frame that has a parent, in the order of first mention."""
@@ -264,7 +261,7 @@ class Frames:
         if at_ns is None and self._varies:
             at_ns = self.latest(target, source)
         down, up = self.between(target, source, at_ns)
-        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else self.called(source)
+        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else self.resolve_name(source)
         return [*reversed(down), str(top), *reversed(up)]
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
@@ -335,7 +332,7 @@ class Frames:
     def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
         """Name the edges between two frames that both exist, as `edges_between` does."""
         self.require(target, source)
-        target, source = self.called(target), self.called(source)
+        target, source = self.resolve_name(target), self.resolve_name(source)
         try:
             parent_of = partial(self.parent, at_ns=at_ns) if self._varies else self.parent
             return edges_between(target, source, parent_of)
@@ -355,7 +352,7 @@ class Frames:
     def require(self, *frames: str) -> None:
         """Raise UnknownFrame unless all frames are there."""
         for frame in frames:
-            if self.called(frame) not in self._frames:
+            if self.resolve_name(frame) not in self._frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
@@ -399,7 +396,7 @@ class FrameTree(Frames):
         Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
         ValueInvalid for numbers that are no covariance.
         """
-        parent, child = self.called(parent), self.called(child)
+        parent, child = self.resolve_name(parent), self.resolve_name(child)
         known, found = self._tracks.get(child), taken(covariance)
         if known is not None and known.parent == parent and self.covariances.get(child) != found:
             raise topology.two_covariances(parent, child, self.covariances.get(child), found)

@@ -8,10 +8,11 @@ from __future__ import annotations
 from math import isfinite
 
 from frametool.errors import BadTopology, NotConnected, ValueInvalid, bare, shown
+from frametool.geometry.representations import EARTH_FRAMES
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Container, Sequence
 
     from frametool.geometry.types import Components, Rigid
 
@@ -42,6 +43,13 @@ class Groups:
         if frame != other:
             self._up[frame] = other
         return frame != other
+
+
+def resolve_name(frame: str, known: Container[str]) -> str:
+    """Return the name of a frame among those known: the Earth's has two, `ecef` and `earth`."""
+    if frame in EARTH_FRAMES and frame not in known:
+        return next((other for other in EARTH_FRAMES if other in known), frame)
+    return frame
 
 
 def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:

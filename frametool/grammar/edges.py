@@ -155,6 +155,11 @@ class Tally:
         else:
             self.notes.setdefault(message, Finding(rule, message, line=line))
 
+    def note_all(self, notes: Iterable[Finding], line: int) -> None:
+        """Keep what was noted while one line was read."""
+        for note in notes:
+            self.note(note.message, line, note.rule)
+
     def note_each(self, message: str, line: int, rule: str = "odd") -> None:
         """Keep a sentence about one line, also where it was said of other lines."""
         self.notes.setdefault(f"{line}: {message}", Finding(rule, message, line=line))

@@ -31,7 +31,7 @@ class MessageMover:
         normalize: take any non-zero quaternion
         """
         frames.require(into)
-        self.frames, self.into = frames, frames.called(into)
+        self.frames, self.into = frames, frames.resolve_name(into)
         self.ros1, self.normalize = ros1, normalize
         self.tally = Tally()  # of names with a leading slash, and rough quaternions
         self.header: MessageHeader | None = None  # of the message that was moved last, as far as it was read

@@ -114,8 +114,7 @@ def read_edge(
         options.report(FormatError(str(error), source=file.name, line=line, column=column, rule=error.rule))
         return None
     parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
-    for note in reading.notes:
-        options.tally.note(note.message, line, note.rule)
+    options.tally.note_all(reading.notes, line)
     return Edge(parent, child, pose.components, line=line)
 
 

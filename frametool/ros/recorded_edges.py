@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, bare, first_of, shown
-from frametool.frames.topology import static_and_moving, to_root, two_parents
+from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Names, Topics
 from frametool.ros.message_bytes import Transforms
 
@@ -139,7 +138,7 @@ class RecordedEdges:
         """
         found = EdgePlan([], [], [])
         for track in tree.tracks():
-            child, parent = (self._called(frame) for frame in (track.child, track.parent))
+            child, parent = (resolve_name(frame, self._topic_of) for frame in (track.child, track.parent))
             if not track.standing:
                 raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds what stands still")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
@@ -153,12 +152,6 @@ class RecordedEdges:
             raise BadTopology(self._others(found.replaced, tree.name), rule="two-poses")
         self._refuse_cycles(found.added)
         return found
-
-    def _called(self, frame: str) -> str:
-        """Return the name of a frame here: the Earth's has two."""
-        if frame in EARTH_FRAMES and frame not in self._topic_of:
-            return next((other for other in EARTH_FRAMES if other in self._topic_of), frame)
-        return frame
 
     def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
         """Raise BadTopology for a frame with another parent, one that moves, and one that comes from two robots."""

@@ -60,8 +60,7 @@ def read_quaternion(
         rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
     except ValueInvalid as error:
         raise xml.error(element, str(error), attribute, rule=error.rule) from None
-    for note in reading.notes:
-        options.tally.note(note.message, element.line, note.rule)
+    options.tally.note_all(reading.notes, element.line)
     return rotation
 
 

@@ -34,6 +34,7 @@ from frametool.errors import (
 from frametool.formats.detect import detect
 from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.table import FORMATS, readers
+from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge, Options, Tally
@@ -435,7 +436,7 @@ class JointFile:
         from frametool.grammar.names import STAMP_KEYS
 
         times = [key for key in STAMP_KEYS if key in mapping and key not in self.joints]
-        stamp_ns = _time(mapping, times[0]) if times else None
+        stamp_ns = read_time(mapping, times[0], " like 12.5") if times else None
         keys = [key for key in mapping if key not in times]
         if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
             path, mapping = (*path, keys[0]), mapping[keys[0]]
@@ -502,16 +503,6 @@ class JointFile:
                     yield Setting(joint, value, stamp_ns if stamp else None, refuse, source)
             except ValueInvalid as error:
                 raise refuse(f"{at}: {error}", ()) from None
-
-
-def _time(mapping: dict[str, Any], key: str) -> int:
-    text = mapping[key]
-    if type(text) is not str:
-        raise Misfit(f"expected a time like 12.5, found {kind(text)}", (key,))
-    try:
-        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
-    except ValueInvalid as error:
-        raise Misfit(str(error), (key,)) from None
 
 
 def _finite(value: Any, path: Path) -> JointValue:

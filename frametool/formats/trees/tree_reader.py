@@ -301,13 +301,18 @@ def stamp_of(entry: dict[str, Any]) -> int | None:
     keys = [key for key in ("stamp", "stamp_ns") if key in entry]
     if len(keys) > 1:
         raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
-    text = entry[keys[0]]
+    return read_time(entry, keys[0])
+
+
+def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
+    """Read the time under a key: seconds, or nanoseconds where the key ends so; raises Misfit."""
+    text = entry[key]
     if type(text) is not str:
-        raise Misfit(f"expected a time, found {kind(text)}", (keys[0],))
+        raise Misfit(f"expected a time{example}, found {kind(text)}", (key,))
     try:
-        return parse_stamp(text if keys[0] == "stamp" else f"{text}ns")
+        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
     except ValueInvalid as error:
-        raise Misfit(str(error), (keys[0],)) from None
+        raise Misfit(str(error), (key,)) from None
 
 
 def named(fields: dict[str, Any], key: str) -> str:
