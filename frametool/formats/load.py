@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Report
 
 
-class Recording(InputFile):
+class FrameFile(InputFile):
     """A file of frames and its form."""
 
     def __init__(
@@ -83,7 +83,7 @@ class Recording(InputFile):
         self.answers = answers
 
     @classmethod
-    def inline(cls, source: Source) -> Recording:
+    def inline(cls, source: Source) -> FrameFile:
         """Take a tree that is written on the command line or was read already."""
         made = cls(source.name, BytesIO(), "yaml")
         made.text = source.text
@@ -161,9 +161,9 @@ class Recording(InputFile):
             warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
 
 
-def opened_together(files: Iterable[Recording]) -> list[Recording]:
+def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
     """Return files that are opened one after the other; where one cannot be, the others are closed again."""
-    found: list[Recording] = []
+    found: list[FrameFile] = []
     try:
         found.extend(files)
     except BaseException:
@@ -174,14 +174,14 @@ def opened_together(files: Iterable[Recording]) -> list[Recording]:
     return found
 
 
-def close_all(files: Iterable[Source | Recording]) -> None:
+def close_all(files: Iterable[Source | FrameFile]) -> None:
     """Let go of files, those among them that were not read."""
     for file in files:
-        if isinstance(file, Recording):
+        if isinstance(file, FrameFile):
             file.close()
 
 
-def refuse_unknown_joints(files: Sequence[Recording]) -> None:
+def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
     """Raise the error for a joint that options or files told of and that none of the files has, once all were read."""
     told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
     robots = [file.tally for file in files if file.tally.has_joints]
@@ -225,11 +225,11 @@ class Replaced(NamedTuple):
     later: EdgePlace
 
 
-class Assembly:
+class TreeBuilder:
     """What has been read so far, and where the first word on each frame stood."""
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
-        """Create an empty assembly; `name` says in messages where they come from."""
+        """Create an empty builder; `name` says in messages where they come from."""
         self.name = name
         self.rules = rules or Rules()
         self.earth, self._one_earth = self.rules.earth, False  # its name, and whether an edge to itself was told
@@ -329,7 +329,7 @@ class Assembly:
         for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
             self.add(parent, child, pose, stamp_ns, placed.place(at))
 
-    def add_columns(self, file: Recording, columns: EdgeColumns) -> None:
+    def add_columns(self, file: FrameFile, columns: EdgeColumns) -> None:
         """Add edges: what only goes on with its frame comes in whole, frame by frame, the rest one by one."""
         pairs = [*zip(columns.parents, columns.children, strict=True)]
         rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
@@ -348,7 +348,7 @@ class Assembly:
     def _goes_on(self, parent: str, child: str) -> bool:
         """Tell whether a frame is known to move, now in this parent."""
         track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
-        return track is not None and not track.standing and track.parent == parent
+        return track is not None and not track.is_static and track.parent == parent
 
     def _takes_whole(self, samples: Samples) -> bool:
         """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
@@ -375,10 +375,10 @@ class Assembly:
         made: FrameTree | TransformBuffer = self.tree
         if self.buffer is not None:
             made = self.buffer
-            single = (track.child for track in made.tracks() if not track.standing and track.child not in self._moves)
+            single = (track.child for track in made.tracks() if not track.is_static and track.child not in self._moves)
             standing = set() if self.rules.moving else set(single)
             for child in standing:
-                made.make_stand(child)
+                made.make_static(child)
             self._tell_replaced(standing)
             tree = self._standing_tree(made)
             made = made if made.moves else tree
@@ -405,7 +405,7 @@ class Assembly:
     ) -> None:
         """Add a sample, or a standing edge beside samples."""
         track = buffer.track(child)
-        settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
+        settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
         if track is not None and settled and (track.parent, track.components) == (parent, components):
             return  # said again, once with and once without a stamp
         self._first.setdefault(child, (parent, components, place))
@@ -440,7 +440,7 @@ class Assembly:
         for frame in buffer.frames:
             tree.add_root(frame)
         for track in buffer.tracks():
-            if track.standing:
+            if track.is_static:
                 try:
                     tree.add_components(track.parent, track.child, track.components)
                 except BadTopology as error:
@@ -461,7 +461,7 @@ class Assembly:
 class EdgePlace(NamedTuple):
     """Where an edge was read."""
 
-    file: Recording
+    file: FrameFile
     edge: Edge
 
     def error(self, message: str, kind: type[FormatError]) -> FormatError:
@@ -479,7 +479,7 @@ class EdgePlace(NamedTuple):
 class SamplesOfFile(NamedTuple):
     """Poses of one frame, and the file they were read from."""
 
-    file: Recording
+    file: FrameFile
     samples: Samples
 
     def place(self, at: int) -> EdgePlace:
@@ -520,7 +520,7 @@ def load(
     for ask, choices in CHOICES.items():
         if (answer := answers.get(ask)) and answer not in choices:
             raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
-    files = opened_together(Recording(path, form=format, topics=chosen, answers=known) for path in paths)
+    files = opened_together(FrameFile(path, form=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
         if getattr(known, ask) and not any(ask in file.asks for file in files):
             names = " and ".join(dict.fromkeys(file.form for file in files))
@@ -529,24 +529,24 @@ def load(
 
 
 def load_sources(
-    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, EdgePlace] | None = None
+    sources: Sequence[Source | FrameFile], rules: Rules | None = None, places: dict[str, EdgePlace] | None = None
 ) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts and files; otherwise as `load`.
 
     places: is filled with where each frame was first said to hang from its parent
     """
-    assembly = Assembly(", ".join(source.name for source in sources), rules)
+    builder = TreeBuilder(", ".join(source.name for source in sources), rules)
     try:
         with paused_collector():
-            files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+            files = [FrameFile.inline(source) if isinstance(source, Source) else source for source in sources]
             for file in files:
-                _add(assembly, file)
+                _add(builder, file)
             refuse_unknown_joints(files)
-            tree = assembly.finish()
+            tree = builder.finish()
     finally:
         close_all(sources)
     if places is not None:
-        places |= assembly.places
+        places |= builder.places
     return tree
 
 
@@ -560,18 +560,18 @@ def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
     return [(each.file.name, lines.get(id(each), each.edge.line)) for each in places]
 
 
-def _add(assembly: Assembly, file: Recording) -> None:
+def _add(builder: TreeBuilder, file: FrameFile) -> None:
     piece = None
-    rules = assembly.rules
+    rules = builder.rules
     for piece in file.pieces(normalize=rules.normalize):
-        if isinstance(piece, Samples) and not assembly.renames(piece.parent, piece.child):
-            assembly.add_samples(SamplesOfFile(file, piece))
-        elif isinstance(piece, EdgeColumns) and not assembly.renames(*dict.fromkeys((*piece.parents, *piece.children))):
-            assembly.add_columns(file, piece)
+        if isinstance(piece, Samples) and not builder.renames(piece.parent, piece.child):
+            builder.add_samples(SamplesOfFile(file, piece))
+        elif isinstance(piece, EdgeColumns) and not builder.renames(*dict.fromkeys((*piece.parents, *piece.children))):
+            builder.add_columns(file, piece)
         else:
             for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
-                assembly.add_edge(edge, EdgePlace(file, edge))
+                builder.add_edge(edge, EdgePlace(file, edge))
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
-    assembly.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
-    assembly.drawn |= file.tally.drawn
+    builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
+    builder.drawn |= file.tally.drawn

@@ -9,7 +9,7 @@ from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames import topology
 from frametool.frames.lookups import Frames, taken
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
-from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
+from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StaticTransform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,7 +73,7 @@ class TransformBuffer(Frames):
         """
         track = self._tracks.get(child)
         if (
-            self.keep_ns is None and track is not None and type(stamp_ns) is int and not static and not track.standing
+            self.keep_ns is None and track is not None and type(stamp_ns) is int and not static and not track.is_static
             and track.parent == parent and -FURTHEST_NS < stamp_ns < FURTHEST_NS
             and -1e300 < sum(components) < 1e300  # finite
         ):  # fmt: skip
@@ -103,7 +103,7 @@ class TransformBuffer(Frames):
         self.insert_components(parent, child, components[0], stamps_ns[0])
         track = self._tracks[child]
         within = stamps_ns[0] > -FURTHEST_NS and stamps_ns[-1] < FURTHEST_NS
-        if self.keep_ns is not None or track.standing or not within or not all(map(isfinite, map(sum, components))):
+        if self.keep_ns is not None or track.is_static or not within or not all(map(isfinite, map(sum, components))):
             for stamp_ns, each in zip(stamps_ns[1:], components[1:], strict=True):
                 self.insert_components(parent, child, each, stamp_ns)
         else:
@@ -114,16 +114,16 @@ class TransformBuffer(Frames):
     ) -> bool:  # fmt: skip
         """Add what may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
-        if track is not None and track.standing != standing:
+        if track is not None and track.is_static != standing:
             raise topology.static_and_moving(child)
         replaced = False
         if track is None:
             self._refuse_cycle(parent, child, stamp_ns, standing=standing)
             if standing:
-                track = self._put(StandingTrack(child, parent, components))
+                track = self._put(StaticTransform(child, parent, components))
             else:
                 track = self._put(MovingTrack(child, stamp_ns, parent, components))
-        elif track.standing:
+        elif track.is_static:
             topology.check_same(child, (track.parent, track.components), (parent, components))
         else:
             replaced = self._move(track, parent, components, stamp_ns)
@@ -164,10 +164,10 @@ class TransformBuffer(Frames):
             if len(line) > len(self._tracks):
                 return  # round in a circle of others, whose edges held at different times when they came
 
-    def make_stand(self, frame: str) -> None:
+    def make_static(self, frame: str) -> None:
         """Take the newest sample of a moving frame for its pose at all times."""
         moved = self._tracks[frame]
-        self._put(StandingTrack(frame, moved.parent, moved.components))
+        self._put(StaticTransform(frame, moved.parent, moved.components))
 
     def __repr__(self) -> str:
         """Return how many frames and samples there are."""
@@ -187,6 +187,6 @@ def _check_age(track: MovingTrack, stamp_ns: int, keep_ns: int) -> None:
 
 def _holds(track: Track, at_ns: int | None) -> bool:
     """Return whether an edge under its newest parent has data at a time; None asks for standing ones."""
-    if track.standing:
+    if track.is_static:
         return True
     return at_ns is not None and track.covers(at_ns) and track.parent_at(at_ns) == track.parent

@@ -17,7 +17,7 @@ from frametool.frames.path import Query
 from frametool.frames.refusals import left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.topology import Groups, edges_between, to_root
-from frametool.frames.track import StandingTrack
+from frametool.frames.track import StaticTransform
 from frametool.geometry import rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
@@ -81,7 +81,7 @@ class Frames:
     @property
     def moves(self) -> bool:
         """Return whether any frame moves."""
-        return any(not track.standing for track in self._tracks.values())
+        return any(not track.is_static for track in self._tracks.values())
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
         """Return a frame's parent at a time, or the newest; None for a root or where it is not known."""
@@ -112,7 +112,7 @@ class Frames:
             pose, parent = track.at(at_ns), track.parent_at(at_ns)
             if pose is not None and parent is not None:
                 tree.add_components(parent, track.child, pose)
-            elif not track.standing:
+            elif not track.is_static:
                 warn(left_out(track, at_ns))
         tree.covariances = {child: each for child, each in self.covariances.items() if tree.track(child)}
         tree.drawn = self.drawn
@@ -152,7 +152,7 @@ class Frames:
         """
         newest = self.query(target, source, None).latest()
         own = self._tracks.get(source) if target == source else None
-        return newest if own is None or own.standing else own.last_ns
+        return newest if own is None or own.is_static else own.last_ns
 
     def lookup_across(
         self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str,
@@ -295,7 +295,7 @@ class Frames:
         """List the stamps, sorted, at which a frame whose parent changes gets another one, or begins, or has ended."""
         stamps: set[int] = set()
         for track in self._tracks.values() if self._varies else ():
-            if not track.standing and (track.varies or self._loops):
+            if not track.is_static and (track.varies or self._loops):
                 stamps.update(track.changes())
                 stamps.update((track.first_ns, track.last_ns + 1))
         return sorted(stamps)
@@ -407,7 +407,7 @@ class FrameTree(Frames):
     def add_components(self, parent: str, child: str, components: Rigid) -> None:
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._tracks.get(child)
-        if known is not None and known.standing:
+        if known is not None and known.is_static:
             topology.check_same(child, (known.parent, known.components), (parent, components))
             return
         if parent == child:
@@ -415,7 +415,7 @@ class FrameTree(Frames):
         if child in self._frames and self.groups.of(parent) == self.groups.of(child):
             raise topology.cycle([*to_root(parent, self.parent), parent])
         self._frames[parent] = None
-        self._put(StandingTrack(child, parent, components))
+        self._put(StaticTransform(child, parent, components))
         self.groups.join(child, parent)
 
     def reroot(self, frame: str) -> None:
@@ -425,7 +425,7 @@ class FrameTree(Frames):
             way.append(track)
             frame = track.parent
         for track in way:
-            self._put(StandingTrack(track.parent, track.child, rigid.inverse(*track.components)))
+            self._put(StaticTransform(track.parent, track.child, rigid.inverse(*track.components)))
 
     def __repr__(self) -> str:
         """Return how many frames there are and which roots."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from operator import attrgetter
 
-from frametool.frames.track import StandingTrack
+from frametool.frames.track import StaticTransform
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
@@ -66,7 +66,7 @@ class Query:
 
     def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
         """Compose what stands still; both branches come topmost edge first."""
-        self.moving = [track for track in (*to_target, *to_source) if not track.standing]
+        self.moving = [track for track in (*to_target, *to_source) if not track.is_static]
         self.far = bool(to_target) and to_target[0].parent in EARTH_FRAMES
         self.fixed: Rigid | None = None
         self.to_target: Sequence[Track] = ()
@@ -107,9 +107,9 @@ def _folded(tracks: Sequence[Track]) -> list[Track]:
     """Compose neighbours that stand still."""
     pieces: list[Track] = []
     for track in tracks:
-        if pieces and track.standing and pieces[-1].standing:
+        if pieces and track.is_static and pieces[-1].is_static:
             pose = rigid.compose(*pieces[-1].components, *track.components)
-            pieces[-1] = StandingTrack(track.child, pieces[-1].parent, pose)
+            pieces[-1] = StaticTransform(track.child, pieces[-1].parent, pose)
         else:
             pieces.append(track)
     return pieces

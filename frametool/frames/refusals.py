@@ -22,7 +22,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
 
     path: the edges between the two frames, from the target to the source.
     """
-    moving = [track for track in path if not track.standing]
+    moving = [track for track in path if not track.is_static]
     worst = max(moving, key=lambda track: gap(track, at_ns))
     first, last = worst.span
     short = gap(worst, at_ns)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.document import Document
     from frametool.documents.source import Source
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge
@@ -57,14 +57,14 @@ class Statement(NamedTuple):
         return self.finding(error.rule, error.message + places)
 
 
-def read_all(recording: Recording, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
+def read_all(recording: FrameFile, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
     """Read everything that can be read of a file, and report what cannot."""
     if not recording.holds_samples:
         return _read_tree(recording.source, find, normalize=normalize)
     return _read_recording(recording, find, normalize=normalize)
 
 
-def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Iterator[Statement]:
+def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
     def report(error: FormatError) -> None:
         find(error.finding)
 
@@ -147,7 +147,7 @@ FLICKER = 3  # so many changes of parent are no picking up and putting down
 
 
 def check(
-    files: Sequence[Recording], *, normalize: bool = False, tree: FrameTree | None = None, others: bool = False
+    files: Sequence[FrameFile], *, normalize: bool = False, tree: FrameTree | None = None, others: bool = False
 ) -> list[Finding]:
     """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines.
 
@@ -192,7 +192,7 @@ def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
 
 
 def _statements(
-    files: Sequence[Recording], findings: list[Finding], *, normalize: bool, others: bool
+    files: Sequence[FrameFile], findings: list[Finding], *, normalize: bool, others: bool
 ) -> Iterator[Statement]:
     """Read all files; what cannot be read is found at once."""
     for file in files:

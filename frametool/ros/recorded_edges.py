@@ -139,7 +139,7 @@ class RecordedEdges:
         found = EdgePlan([], [], [])
         for track in tree.tracks():
             child, parent = (resolve_name(frame, self._topic_of) for frame in (track.child, track.parent))
-            if not track.standing:
+            if not track.is_static:
                 raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds what stands still")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
             if known is None:

@@ -17,7 +17,7 @@ from frametool.errors import (
     shown,
     warn,
 )
-from frametool.formats.load import Recording, Rules, load_sources
+from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
 from frametool.ros.bags import TYPES, recorded_edge
@@ -246,7 +246,7 @@ class RecordRun:
         return ROWS_SKIPPED
 
 
-class TransformsOfCopy(Recording):
+class TransformsOfCopy(FrameFile):
     """The transforms of a recording as its copy has them: some of its edges are replaced, and others are added."""
 
     def __init__(self, recording: CopiedRecording, topics: set[str], more: Sequence[AddedEdge]) -> None:

@@ -67,7 +67,7 @@ class Ground(NamedTuple):
 def _ground(tree: Frames) -> Ground | None:
     """Return the ground below the first frame on the Earth, one that stands still if there is any."""
     earth = tree.resolve_name(EARTH)
-    there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.standing)
+    there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.is_static)
     if not there or earth not in tree.roots:
         return None
     x, y, z = there[0].components[:3]
@@ -123,7 +123,7 @@ class FrameScene:
             tree = _on(tree, self.ground)
         tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
-        self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.standing}
+        self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.is_static}
         self.names, self._roots = _in_order(tree, {name: _first_parent(tree, name) for name in tree.frames})
         self.target, self.source, self.path_only = target, source, path_only
         if self.tracks and at_ns is None:
@@ -223,7 +223,7 @@ def can_be_drawn(point: Sequence[float]) -> bool:
 
 def _first_parent(tree: Frames, name: str) -> str | None:
     track = tree.track(name)
-    if track is None or track.standing:
+    if track is None or track.is_static:
         return tree.parent(name)
     return track.parent_near(track.first_ns)
 

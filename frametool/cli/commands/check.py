@@ -23,7 +23,7 @@ from frametool.lint.tree_diff import Tolerance, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
@@ -110,7 +110,7 @@ def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:
     return findings
 
 
-def _read(files: Sequence[Recording], *, normalize: bool) -> list[Measurement]:
+def _read(files: Sequence[FrameFile], *, normalize: bool) -> list[Measurement]:
     from frametool.stream.measurements import read_measurements
 
     rows = read_measurements(files, normalize=normalize)
@@ -119,7 +119,7 @@ def _read(files: Sequence[Recording], *, normalize: bool) -> list[Measurement]:
 
 
 def _with_loops(
-    files: Sequence[Recording], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
+    files: Sequence[FrameFile], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
 ) -> list[Finding]:
     """Return what is wrong with files, then the measurements that do not agree; tell what was not compared."""
     if not rows:

@@ -8,7 +8,7 @@ joint has no single one.  A link is where its joints put it; `Robot.fk` and the 
     robot = frametool.load_robot("arm.urdf")
     base_from_tip = robot.fk("base", "tip", {"shoulder": 0.3, "elbow": numpy.linspace(0.0, 1.0, 1000)})
 
-Knows neither files of values nor times: those are `frametool.formats.robots.posture`.
+Knows neither files of values nor times: those are `frametool.formats.robots.joints`.
 """
 
 from __future__ import annotations

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
+from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
-from frametool.formats.robots.posture import Posture
 from frametool.frames.topology import Groups
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
@@ -540,7 +540,7 @@ class _SdfTree:
             scope = scope.scope
         return scope
 
-    def _posture(self) -> Posture:
+    def _posture(self) -> JointState:
         """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""
         places = {motion.name: joint.frame.holder for joint in self.joints.all for motion in joint.motions}
         moving = [motion for joint in self.joints.all for motion in joint.motions]
@@ -548,4 +548,4 @@ class _SdfTree:
         answers = self.options.answers
         values = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
         options = self.options._replace(answers=answers._replace(joints=values))
-        return Posture(moving, options, lambda joint, problem: places[joint.name].error(problem), fixed=fixed)
+        return JointState(moving, options, lambda joint, problem: places[joint.name].error(problem), fixed=fixed)

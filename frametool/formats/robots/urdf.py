@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.documents.source import UTF16, InputFile, paused_collector
 from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
 from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
-from frametool.formats.load import Recording, refuse_unknown_joints
+from frametool.formats.load import FrameFile, refuse_unknown_joints
+from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
-from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
 from frametool.formats.unsupported import UNSUPPORTED
 from frametool.frames.topology import two_parents
@@ -57,7 +57,7 @@ class RobotDescription(NamedTuple):
 
     frames: dict[str, int]
     links: list[Link]
-    posture: Posture
+    posture: JointState
 
     @property
     def roots(self) -> list[str]:
@@ -91,7 +91,7 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
         except FormatError as error:
             options.report(error)
     links = list(reader.connected())
-    robot = RobotDescription(reader.frames, links, Posture.of(links, options, reader.fail))
+    robot = RobotDescription(reader.frames, links, JointState.of(links, options, reader.fail))
     if not robot.frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
@@ -235,10 +235,10 @@ def load_robot(path: str | PathLike[str]) -> Robot:
 
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
-    return robot_of(Recording(path))[0]
+    return robot_of(FrameFile(path))[0]
 
 
-def robot_of(file: Recording) -> tuple[Robot, Posture]:
+def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
     """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
     if file.form != "urdf":
         file.close()
@@ -268,7 +268,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
     Raises ValueInvalid for what URDF cannot hold: frames that move, several roots, names that XML has no letters for.
     """
-    if moving := [track.child for track in tree.tracks() if not track.standing]:
+    if moving := [track.child for track in tree.tracks() if not track.is_static]:
         raise ValueInvalid(f"URDF holds no motion, but these frames move: {listing(moving)}; give --at TIME")
     if len(tree.roots) > 1:
         message = "URDF holds one tree, and this has the roots"

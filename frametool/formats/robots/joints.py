@@ -58,7 +58,7 @@ HALF_TURN = 3.141592653589793
 STATES = "--joint NAME=VALUE"
 
 
-class Posture:
+class JointState:
     """The values of all joints of a robot: one each, or samples over time.
 
     still, moving: values by name, or by name and stamp
@@ -90,7 +90,7 @@ class Posture:
         options.tally.about = options.tally.about or self._about()
 
     @classmethod
-    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> Posture:
+    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> JointState:
         """Find out where the joints of some links stand."""
         joints = (joint for link in links for joint in link.joints)
         fail = fail or (lambda joint, problem: FormatError(problem, line=joint.line))
@@ -151,7 +151,7 @@ class Posture:
             for name, values in found.items():
                 self._take(name, values)
 
-    def _read(self, setting: Setting) -> Value:
+    def _read(self, setting: JointSample) -> Value:
         normalize = self._options.normalize
         try:
             return read_value(self.joints[setting.joint], setting.value, setting.source, normalize=normalize)
@@ -349,7 +349,7 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
 DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
 
-class Setting(NamedTuple):
+class JointSample(NamedTuple):
     """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place."""
 
     joint: str
@@ -371,7 +371,7 @@ class JointFile:
         self.tally = Tally()
         self.file = InputFile(self.path)
 
-    def settings(self) -> Iterator[Setting]:
+    def settings(self) -> Iterator[JointSample]:
         """Yield what it says, in order, and close it.
 
         Raises FormatError.
@@ -383,7 +383,7 @@ class JointFile:
         for told in self.tally.told():
             warn(f"{self.file.name}:{told.line}: {told.message}")
 
-    def _settings(self) -> Iterator[Setting]:
+    def _settings(self) -> Iterator[JointSample]:
         head = self.file.head()
         name = self.file.name
         form = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
@@ -401,7 +401,7 @@ class JointFile:
 
     def _messages(
         self, messages: Iterable[Message | FormatError], state_of: Callable[[Any], Any] | None = None
-    ) -> Iterator[Setting]:
+    ) -> Iterator[JointSample]:
         """Yield what documents or rows say; `state_of` makes a JointState of a row."""
         for message in messages:
             if isinstance(message, FormatError):
@@ -411,7 +411,7 @@ class JointFile:
             except Misfit as misfit:
                 raise message.error(misfit) from None
 
-    def _values(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
+    def _values(self, value: Any, path: Path, message: Message) -> Iterator[JointSample]:
         """Yield the settings of a plain value: a JointState, a map, or a list of either."""
         if type(value) is list:
             for index, each in enumerate(value):
@@ -427,11 +427,11 @@ class JointFile:
                 stamp_ns = joint_state.stamp_of_state(mapping)
                 for joint, position, place in joint_state.positions(mapping):
                     refuse = partial(_refused, message, (*path, *place))
-                    yield Setting(joint, _finite(position, place), stamp_ns, refuse, message.source)
+                    yield JointSample(joint, _finite(position, place), stamp_ns, refuse, message.source)
             except Misfit as misfit:
                 raise misfit.below(*path) from None
 
-    def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
+    def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[JointSample]:
         """Yield what a map says, or the one map in it, as under `joints:`."""
         from frametool.grammar.names import STAMP_KEYS
 
@@ -442,9 +442,9 @@ class JointFile:
             path, mapping = (*path, keys[0]), mapping[keys[0]]
             keys = list(mapping)
         for key in keys:
-            yield Setting(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
+            yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
 
-    def _table(self, form: str, head: str) -> Iterator[Setting]:
+    def _table(self, form: str, head: str) -> Iterator[JointSample]:
         """Yield the settings of a table: a column a joint, or what the echo tools write."""
         first = next((line for line in head.split("\n") if line.strip()), "")
         name = self.file.name
@@ -463,7 +463,7 @@ class JointFile:
             return [cell.text for cell in split_line(line)]
         return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(form))]
 
-    def _columns(self, form: str) -> Iterator[Setting]:
+    def _columns(self, form: str) -> Iterator[JointSample]:
         """Yield the settings of a table whose header names joints."""
         rows = line_texts(self.file.stream, self.file.name, self.tally)
         number, header = next(rows, (1, ""))
@@ -500,7 +500,7 @@ class JointFile:
                 for place, joint, degrees, per_metre in columns:
                     at = names[place]
                     value = JointValue(parse_number(cells[place]) / per_metre, degrees)
-                    yield Setting(joint, value, stamp_ns if stamp else None, refuse, source)
+                    yield JointSample(joint, value, stamp_ns if stamp else None, refuse, source)
             except ValueInvalid as error:
                 raise refuse(f"{at}: {error}", ()) from None
 
