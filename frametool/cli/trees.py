@@ -282,7 +282,7 @@ def opened(
         )
         for each in arguments
     )
-    lacking = [file for file in found if "frames" in file.asks]
+    lacking = [file for file in found if "frames" in file.required_options]
     if len(named) not in (0, 1, len(lacking), files):
         close_all(found)
         raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
@@ -290,7 +290,7 @@ def opened(
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:
             say(f"note: --frames {','.join(names)} changes nothing: {file.name} names its own frames")
-    chosen.inputs = (*chosen.inputs, *((file.form, file.asks) for file in found))
+    chosen.inputs = (*chosen.inputs, *((file.form, file.required_options) for file in found))
     return found
 
 

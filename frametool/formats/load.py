@@ -95,13 +95,13 @@ class FrameFile(InputFile):
         return "records" not in FORMATS[self.form].reads
 
     @property
-    def asks(self) -> tuple[str, ...]:
+    def required_options(self) -> tuple[str, ...]:
         """Name what the file leaves open; of a table frames too where no columns name them, of poses in recordings."""
         row = FORMATS[self.form]
         if self.form in ("csv", "tsv", "semicolon"):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
-            return row.asks[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
-        return (*row.asks, *["frames"] * bool(self.topics.chosen))
+            return row.required_options[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
+        return (*row.required_options, *["frames"] * bool(self.topics.chosen))
 
     @property
     def described(self) -> str:
@@ -116,7 +116,7 @@ class FrameFile(InputFile):
     @property
     def stated(self) -> str:
         """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
-        states, about = FORMATS[self.form].states, self.tally.about
+        states, about = FORMATS[self.form].conventions, self.tally.about
         said = f"{self.described}{', ' if about else ''}{about}" if states or about else ""
         return f"{said}; {states}" if states else said
 
@@ -522,7 +522,7 @@ def load(
             raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
     files = opened_together(FrameFile(path, form=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
-        if getattr(known, ask) and not any(ask in file.asks for file in files):
+        if getattr(known, ask) and not any(ask in file.required_options for file in files):
             names = " and ".join(dict.fromkeys(file.form for file in files))
             warn(f"{ask} changes nothing: {names} does not leave that open")
     return load_sources(files, rules)
