@@ -18,6 +18,7 @@ The library raises; only the edge of the command line turns an error into a line
 from __future__ import annotations
 
 from contextlib import contextmanager
+from typing import NamedTuple
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -80,6 +81,21 @@ class ValueInvalid(FrametoolError, ValueError):
         self.rule = rule or self.rule
 
 
+class Finding(NamedTuple):
+    """A sentence with a place: what is wrong or odd, and the rule of `check` that says so.
+
+    line, column: from 1, 0 where they say nothing
+    path: in a document, the way to it
+    """
+
+    rule: str
+    message: str
+    source: str = ""
+    line: int = 0
+    column: int = 0
+    path: tuple[str | int, ...] = ()
+
+
 class FormatError(FrametoolError, ValueError):
     """Report text that cannot be read; say where: `source:line:column`, both counted from 1."""
 
@@ -99,6 +115,11 @@ class FormatError(FrametoolError, ValueError):
         """Return `source:line:column: message`, leaving out what is not known."""
         place = ":".join(str(part) for part in self.details().values())
         return f"{place}: {self.message}" if place else self.message
+
+    @property
+    def finding(self) -> Finding:
+        """Return it as `check` lists it."""
+        return Finding(self.rule or "syntax", self.message, self.source, self.line, self.column)
 
     def details(self) -> dict[str, object]:
         """Return the place as far as it is known."""

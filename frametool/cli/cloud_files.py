@@ -236,5 +236,5 @@ def is_bag(path: str) -> bool:
         head = file.read(_HEAD)
     if not head:
         return by_suffix(path, bags) is not None
-    magics: list[Any] = [what for name in bags for kind, what in FORMATS[name].signs if kind == "magic"]
+    magics: list[Any] = [what for name in bags for kind, what in FORMATS[name].magic if kind == "magic"]
     return any(re.match(magic, head, re.DOTALL) for magic in magics)

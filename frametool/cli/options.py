@@ -419,7 +419,7 @@ def refuse_not_needed(forms: Collection[str], *asked: str) -> None:
     """Refuse options that answer what none of these forms leaves open: they would change nothing."""
     for ask in asked:
         chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
-        if chosen and not any(ask in FORMATS[form].asks for form in forms):
+        if chosen and not any(ask in FORMATS[form].required_options for form in forms):
             option = "--from" if ask == "order" else f"--{ask.replace('_', '-')}"
             known = " and ".join(dict.fromkeys(forms))
             raise click.UsageError(f"{option} changes nothing: {known} does not leave that open")

@@ -242,7 +242,7 @@ class Output:
             self.poses(sample_results(tree))
             return
         if self.style.form != "text":
-            if loses := FORMATS[self.style.form].loses:
+            if loses := FORMATS[self.style.form].not_stored:
                 say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return

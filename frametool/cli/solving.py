@@ -68,7 +68,7 @@ def _fixed_edges(
     from frametool.formats.load import Rules
 
     tree = load_tree(files[0], files[1:], Rules(normalize=normalize))
-    if moving := next((track.child for track in tree.tracks() if not track.standing), None):
+    if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
         raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; what is fixed stands still (tree --at TIME)")
     if not {*tree.frames} & {*measured}:
         known = alternatives(one := tree.frames[0], measured, "frames")

@@ -238,14 +238,14 @@ class Stream:
         if form in RECORDS and (output.told or form) != form and request.gathered is None:
             return self._run_as_values(stream, form, request, output)
         way = self._way(form, request, output)
-        keeps = ("camera_axes",) if way == self._as_text else FORMATS[form].asks
-        asked = tuple(ask for ask in FORMATS[form].asks if ask in keeps)
+        keeps = ("camera_axes",) if way == self._as_text else FORMATS[form].required_options
+        asked = tuple(ask for ask in FORMATS[form].required_options if ask in keeps)
         settings().inputs = (*settings().inputs, (form, asked))
         outcomes, about = way(stream, form, request, output)
         if request.gathered is not None:
             outcomes = request.gathered.placing(outcomes, self.policy(self.name, _counted(form)).place)
         status = self._write(outcomes, output, gathers=request.gathered is not None, counted=_counted(form))
-        if about is not None and (states := FORMATS[form].states) and not self.options["quiet"]:
+        if about is not None and (states := FORMATS[form].conventions) and not self.options["quiet"]:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from frametool.documents.source import FileState
-    from frametool.formats.load import EdgePlace, Recording, Rules
+    from frametool.formats.load import EdgePlace, FrameFile, Rules
     from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
@@ -118,7 +118,7 @@ def load_sides(
 
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
-    every: list[Recording] = []
+    every: list[FrameFile] = []
 
     def side(
         arguments: Sequence[str], behind: int, earth: str
@@ -138,7 +138,7 @@ def load_sides(
 
 
 def _loaded(
-    files: Sequence[Recording], rules: Rules | None, places: dict[str, EdgePlace] | None = None
+    files: Sequence[FrameFile], rules: Rules | None, places: dict[str, EdgePlace] | None = None
 ) -> FrameTree | TransformBuffer:
     """Merge files that are open, and say what they were taken for."""
     from frametool.formats.load import load_sources  # not every command that may read trees does
@@ -205,7 +205,7 @@ class CarriedSigmas:
 OPEN_IN_TREES = ("frames", "direction", "dh", "stamps", "order")  # what forms of files of frames may leave open
 
 
-def refuse_idle(files: Sequence[Recording]) -> None:
+def refuse_idle(files: Sequence[FrameFile]) -> None:
     """Refuse options about files that were read which none of them leaves open."""
     refuse_not_needed([file.form for file in files], *OPEN_IN_TREES)
     if settings().topics and not any(file.topics.counts or file.topics.seen for file in files):
@@ -229,7 +229,7 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     return value
 
 
-def state(files: Sequence[Recording], *, whole: bool = True) -> None:
+def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
     """Say on stderr what files that were read were taken for: those of other forms than the own one, with -v all.
 
     whole: these are all; of one of two sides, the other may need an option that this one does not
@@ -245,7 +245,7 @@ def state(files: Sequence[Recording], *, whole: bool = True) -> None:
 
 def opened(
     arguments: Sequence[str], *, streams: bool = False, behind: int = 0, of: int | None = None, drawings: bool = False
-) -> list[Recording]:
+) -> list[FrameFile]:
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or trees written inline.
 
     streams: as `load_tree` has it
@@ -253,7 +253,7 @@ def opened(
     of: so many files there are in all
     drawings: files without poses are taken too
     """
-    from frametool.formats.load import Recording, close_all, opened_together
+    from frametool.formats.load import FrameFile, close_all, opened_together
 
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
@@ -271,9 +271,9 @@ def opened(
             raise click.UsageError(f"{option} is given {times}")
     form_of_next, general = iter(forms[behind:] or forms), answers()
     found = opened_together(
-        Recording.inline(source_of(each))
+        FrameFile.inline(source_of(each))
         if is_inline(each)
-        else Recording(
+        else FrameFile(
             tree_file(each),
             form=next(form_of_next, None),
             topics=chosen.topics,
@@ -282,7 +282,7 @@ def opened(
         )
         for each in arguments
     )
-    lacking = [file for file in found if "frames" in file.asks]
+    lacking = [file for file in found if "frames" in file.required_options]
     if len(named) not in (0, 1, len(lacking), files):
         close_all(found)
         raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
@@ -290,7 +290,7 @@ def opened(
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:
             say(f"note: --frames {','.join(names)} changes nothing: {file.name} names its own frames")
-    chosen.inputs = (*chosen.inputs, *((file.form, file.asks) for file in found))
+    chosen.inputs = (*chosen.inputs, *((file.form, file.required_options) for file in found))
     return found
 
 

@@ -42,11 +42,11 @@ def chain(sheet: Sheet, frames: Frames, target: str, source: str, at_ns: int | N
     if len(tracks) > 1 or first:
         sheet.say(f"{to}_from_{of} = {_formula(first, second)}")
     sheet.caveat(STORED)
-    moving = [track for child in (*down, *up) if not (track := tracks[child]).standing]
+    moving = [track for child in (*down, *up) if not (track := tracks[child]).is_static]
     if moving and at_ns is not None:
         _say_time(sheet, moving, at_ns)
     for child in (*down, *reversed(up)):
-        if (track := tracks[child]).standing:
+        if (track := tracks[child]).is_static:
             sheet.reached(track.components[:3])
             sheet.say(f"{printable(track.parent)}_from_{printable(child)}: {_line(sheet, track.components)}")
     edges = {child: _edge(sheet, tracks[child], at_ns or 0) for child in (*down, *up)}
@@ -96,7 +96,7 @@ def _say_time(sheet: Sheet, moving: Sequence[MovingTrack], at_ns: int) -> None:
 
 def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
     """Return an edge as it is at a time, with the steps to it if it moves."""
-    if track.standing:
+    if track.is_static:
         return printable(track.parent), printable(track.child), track.components
     before, after = around(track, at_ns)
     edge = f"{printable(before[1])}_from_{printable(track.child)}"

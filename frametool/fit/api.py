@@ -153,10 +153,10 @@ def solve(
 
 def _measurements(given: Measured) -> list[Measurement]:
     if isinstance(given, str | PathLike):
-        from frametool.formats.load import Recording
+        from frametool.formats.load import FrameFile
         from frametool.stream.measurements import read_measurements
 
-        return read_measurements([Recording(given)])
+        return read_measurements([FrameFile(given)])
     return [_measurement(each, f"measurement {number}") for number, each in enumerate(given, 1)]
 
 

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frametool.errors import NotConnected, printable
+from frametool.errors import Finding, NotConnected, printable
 from frametool.fit.least_squares import applied, length
 from frametool.fit.rigid_arrays import PoseArrays
 from frametool.fit.robust import KEPT
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
-from frametool.lint.findings import Finding
 from frametool.lint.tree_diff import Tolerance
 from frametool.stream.measurements import Measurement, parted
 

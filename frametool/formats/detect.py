@@ -253,7 +253,7 @@ def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) 
 
 
 def _signs(form: str) -> tuple[tuple[str, str | bytes], ...]:
-    return (UNSUPPORTED[form] if form in UNSUPPORTED else FORMATS[form]).signs
+    return (UNSUPPORTED[form] if form in UNSUPPORTED else FORMATS[form]).magic
 
 
 # kind -> by what a file was known; all others by its keys
@@ -305,7 +305,7 @@ def not_read(form: str, name: str) -> FormatError:
 def of_folder(path: str) -> str | None:
     """Return the form of which a folder is; None for a file, and for any other folder."""
     for form, row in FORMATS.items():
-        for kind, what in row.signs:
+        for kind, what in row.magic:
             if kind == "folder" and os.path.isdir(path) and os.path.exists(os.path.join(path, str(what))):
                 return form
     return None
@@ -389,7 +389,7 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     likely = readers(*reads)
     what = "this text"
     if begin.xml:
-        likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].signs))
+        likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].magic))
         what = f"XML with the root element {bare(''.join(begin.elements[:1]))}"
     named = first_of(likely, _MOST_NAMED)
     return FormatError(

@@ -22,6 +22,7 @@ from frametool.errors import (
     BadAnswer,
     BadTopology,
     FileProblem,
+    Finding,
     FormatError,
     ValueInvalid,
     alternatives,
@@ -30,7 +31,8 @@ from frametool.errors import (
 )
 from frametool.formats.detect import Beginning, detect, of_folder
 from frametool.formats.table import BAG, CHOICES, FORMATS, readers
-from frametool.frames.lookups import FrameTree, two_covariances
+from frametool.frames import topology
+from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, at_other_times, stop
@@ -44,10 +46,10 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.edges import Remark, Report
+    from frametool.grammar.edges import Report
 
 
-class Recording(InputFile):
+class FrameFile(InputFile):
     """A file of frames and its form."""
 
     def __init__(
@@ -81,7 +83,7 @@ class Recording(InputFile):
         self.answers = answers
 
     @classmethod
-    def inline(cls, source: Source) -> Recording:
+    def inline(cls, source: Source) -> FrameFile:
         """Take a tree that is written on the command line or was read already."""
         made = cls(source.name, BytesIO(), "yaml")
         made.text = source.text
@@ -93,13 +95,13 @@ class Recording(InputFile):
         return "records" not in FORMATS[self.form].reads
 
     @property
-    def asks(self) -> tuple[str, ...]:
+    def required_options(self) -> tuple[str, ...]:
         """Name what the file leaves open; of a table frames too where no columns name them, of poses in recordings."""
         row = FORMATS[self.form]
         if self.form in ("csv", "tsv", "semicolon"):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
-            return row.asks[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
-        return (*row.asks, *["frames"] * bool(self.topics.chosen))
+            return row.required_options[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
+        return (*row.required_options, *["frames"] * bool(self.topics.chosen))
 
     @property
     def described(self) -> str:
@@ -114,7 +116,7 @@ class Recording(InputFile):
     @property
     def stated(self) -> str:
         """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
-        states, about = FORMATS[self.form].states, self.tally.about
+        states, about = FORMATS[self.form].conventions, self.tally.about
         said = f"{self.described}{', ' if about else ''}{about}" if states or about else ""
         return f"{said}; {states}" if states else said
 
@@ -152,16 +154,16 @@ class Recording(InputFile):
 
     def tell(self) -> None:
         """Warn of what was odd in the file, once it was read."""
-        found: dict[str | Remark, list[Remark]] = {}
+        found: dict[str | Finding, list[Finding]] = {}
         for told in self.tally.told():
             found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
         for first, *others in found.values():
             warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
 
 
-def opened_together(files: Iterable[Recording]) -> list[Recording]:
+def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
     """Return files that are opened one after the other; where one cannot be, the others are closed again."""
-    found: list[Recording] = []
+    found: list[FrameFile] = []
     try:
         found.extend(files)
     except BaseException:
@@ -172,14 +174,14 @@ def opened_together(files: Iterable[Recording]) -> list[Recording]:
     return found
 
 
-def close_all(files: Iterable[Source | Recording]) -> None:
+def close_all(files: Iterable[Source | FrameFile]) -> None:
     """Let go of files, those among them that were not read."""
     for file in files:
-        if isinstance(file, Recording):
+        if isinstance(file, FrameFile):
             file.close()
 
 
-def refuse_unknown_joints(files: Sequence[Recording]) -> None:
+def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
     """Raise the error for a joint that options or files told of and that none of the files has, once all were read."""
     told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
     robots = [file.tally for file in files if file.tally.has_joints]
@@ -223,11 +225,11 @@ class Replaced(NamedTuple):
     later: EdgePlace
 
 
-class Assembly:
+class TreeBuilder:
     """What has been read so far, and where the first word on each frame stood."""
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
-        """Create an empty assembly; `name` says in messages where they come from."""
+        """Create an empty builder; `name` says in messages where they come from."""
         self.name = name
         self.rules = rules or Rules()
         self.earth, self._one_earth = self.rules.earth, False  # its name, and whether an edge to itself was told
@@ -303,8 +305,8 @@ class Assembly:
         """Keep the covariance of an edge; raises BadTopology with both places where it is not the one said before."""
         first = self._first[child][2]
         if place.edge.covariance != first.edge.covariance:
-            error = two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
-            raise place.error(f"{error}: {first.seen_from(place)} and {place.seen_from(place)}", BadTopology)
+            error = topology.two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
+            raise self._placed(error, parent, child, place)
         if place.edge.covariance is not None:
             self.covariances[child] = place.edge.covariance
 
@@ -327,7 +329,7 @@ class Assembly:
         for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
             self.add(parent, child, pose, stamp_ns, placed.place(at))
 
-    def add_columns(self, file: Recording, columns: EdgeColumns) -> None:
+    def add_columns(self, file: FrameFile, columns: EdgeColumns) -> None:
         """Add edges: what only goes on with its frame comes in whole, frame by frame, the rest one by one."""
         pairs = [*zip(columns.parents, columns.children, strict=True)]
         rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
@@ -346,7 +348,7 @@ class Assembly:
     def _goes_on(self, parent: str, child: str) -> bool:
         """Tell whether a frame is known to move, now in this parent."""
         track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
-        return track is not None and not track.standing and track.parent == parent
+        return track is not None and not track.is_static and track.parent == parent
 
     def _takes_whole(self, samples: Samples) -> bool:
         """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
@@ -373,10 +375,10 @@ class Assembly:
         made: FrameTree | TransformBuffer = self.tree
         if self.buffer is not None:
             made = self.buffer
-            single = (track.child for track in made.tracks() if not track.standing and track.child not in self._moves)
+            single = (track.child for track in made.tracks() if not track.is_static and track.child not in self._moves)
             standing = set() if self.rules.moving else set(single)
             for child in standing:
-                made.make_stand(child)
+                made.make_static(child)
             self._tell_replaced(standing)
             tree = self._standing_tree(made)
             made = made if made.moves else tree
@@ -403,7 +405,7 @@ class Assembly:
     ) -> None:
         """Add a sample, or a standing edge beside samples."""
         track = buffer.track(child)
-        settled = track is not None and child not in self._moves and (track.standing or stamp_ns is None)
+        settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
         if track is not None and settled and (track.parent, track.components) == (parent, components):
             return  # said again, once with and once without a stamp
         self._first.setdefault(child, (parent, components, place))
@@ -423,7 +425,7 @@ class Assembly:
 
         for each in self._replaced:
             if each.child in standing:
-                raise self._placed(BadTopology("", rule="two-poses"), each.parent, each.child, each.later)
+                raise self._placed(topology.two_poses(each.child, each.parent), each.parent, each.child, each.later)
         most += len(self._replaced) == most + 1
         for each in self._replaced[:most]:
             places = f"{each.earlier.seen_from(each.later)} and {each.later.seen_from(each.later)}"
@@ -438,7 +440,7 @@ class Assembly:
         for frame in buffer.frames:
             tree.add_root(frame)
         for track in buffer.tracks():
-            if track.standing:
+            if track.is_static:
                 try:
                     tree.add_components(track.parent, track.child, track.components)
                 except BadTopology as error:
@@ -447,24 +449,19 @@ class Assembly:
 
     def _placed(self, error: BadTopology, parent: str, child: str, place: EdgePlace) -> FormatError:
         """Make the error for a place; where it contradicts what was said before, both places are named."""
-        message = str(error)
         known = self._first.get(child)
-        if error.rule not in ("cycle", "self") and known is not None and known[2] is not place:
-            first, second = known[2].seen_from(place), place.seen_from(place)
-            if known[0] != parent:
-                parents = f"{shown(known[0])} ({first}) and {shown(parent)} ({second})"
-                message = f"frame {shown(child)} has two parents: {parents}"
-            elif error.rule == "two-poses":
-                message = f"frame {shown(child)} has two different poses in {shown(parent)}: {first} and {second}"
-            else:
-                message = f"{error}: {first} and {second}"
-        return place.error(message, BadTopology)
+        if error.rule in ("cycle", "self") or known is None or known[2] is place:
+            return place.error(str(error), BadTopology)
+        places = known[2].seen_from(place), place.seen_from(place)
+        if known[0] != parent and error.rule != "two-covariances":
+            return place.error(str(topology.two_parents(child, known[0], parent, places)), BadTopology)
+        return place.error(f"{error}: {' and '.join(places)}", BadTopology)
 
 
 class EdgePlace(NamedTuple):
     """Where an edge was read."""
 
-    file: Recording
+    file: FrameFile
     edge: Edge
 
     def error(self, message: str, kind: type[FormatError]) -> FormatError:
@@ -482,7 +479,7 @@ class EdgePlace(NamedTuple):
 class SamplesOfFile(NamedTuple):
     """Poses of one frame, and the file they were read from."""
 
-    file: Recording
+    file: FrameFile
     samples: Samples
 
     def place(self, at: int) -> EdgePlace:
@@ -523,33 +520,33 @@ def load(
     for ask, choices in CHOICES.items():
         if (answer := answers.get(ask)) and answer not in choices:
             raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
-    files = opened_together(Recording(path, form=format, topics=chosen, answers=known) for path in paths)
+    files = opened_together(FrameFile(path, form=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
-        if getattr(known, ask) and not any(ask in file.asks for file in files):
+        if getattr(known, ask) and not any(ask in file.required_options for file in files):
             names = " and ".join(dict.fromkeys(file.form for file in files))
             warn(f"{ask} changes nothing: {names} does not leave that open")
     return load_sources(files, rules)
 
 
 def load_sources(
-    sources: Sequence[Source | Recording], rules: Rules | None = None, places: dict[str, EdgePlace] | None = None
+    sources: Sequence[Source | FrameFile], rules: Rules | None = None, places: dict[str, EdgePlace] | None = None
 ) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts and files; otherwise as `load`.
 
     places: is filled with where each frame was first said to hang from its parent
     """
-    assembly = Assembly(", ".join(source.name for source in sources), rules)
+    builder = TreeBuilder(", ".join(source.name for source in sources), rules)
     try:
         with paused_collector():
-            files = [Recording.inline(source) if isinstance(source, Source) else source for source in sources]
+            files = [FrameFile.inline(source) if isinstance(source, Source) else source for source in sources]
             for file in files:
-                _add(assembly, file)
+                _add(builder, file)
             refuse_unknown_joints(files)
-            tree = assembly.finish()
+            tree = builder.finish()
     finally:
         close_all(sources)
     if places is not None:
-        places |= assembly.places
+        places |= builder.places
     return tree
 
 
@@ -563,18 +560,18 @@ def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
     return [(each.file.name, lines.get(id(each), each.edge.line)) for each in places]
 
 
-def _add(assembly: Assembly, file: Recording) -> None:
+def _add(builder: TreeBuilder, file: FrameFile) -> None:
     piece = None
-    rules = assembly.rules
+    rules = builder.rules
     for piece in file.pieces(normalize=rules.normalize):
-        if isinstance(piece, Samples) and not assembly.renames(piece.parent, piece.child):
-            assembly.add_samples(SamplesOfFile(file, piece))
-        elif isinstance(piece, EdgeColumns) and not assembly.renames(*dict.fromkeys((*piece.parents, *piece.children))):
-            assembly.add_columns(file, piece)
+        if isinstance(piece, Samples) and not builder.renames(piece.parent, piece.child):
+            builder.add_samples(SamplesOfFile(file, piece))
+        elif isinstance(piece, EdgeColumns) and not builder.renames(*dict.fromkeys((*piece.parents, *piece.children))):
+            builder.add_columns(file, piece)
         else:
             for edge in (piece,) if isinstance(piece, Edge) else piece.edges():
-                assembly.add_edge(edge, EdgePlace(file, edge))
+                builder.add_edge(edge, EdgePlace(file, edge))
     if piece is None:
         raise FormatError("no frames in it", source=file.name)
-    assembly.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
-    assembly.drawn |= file.tally.drawn
+    builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
+    builder.drawn |= file.tally.drawn

@@ -35,10 +35,10 @@ class Format(NamedTuple):
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
         are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`; as messages of a
         `recording`, whose trees `tree_pieces` of `writer` yields
-    signs: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
-    states: what its numbers mean (which frame in which, units, order), told when such a file was read
-    asks: the options that say what it leaves open
-    loses: what a tree written in it may have had and it does not hold, told then
+    magic: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
+    conventions: what its numbers mean (which frame in which, units, order), told when such a file was read
+    required_options: the options that say what it leaves open
+    not_stored: what a tree written in it may have had and it does not hold, told then
     delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
     columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
     poses: what its rows mean
@@ -51,10 +51,10 @@ class Format(NamedTuple):
     reader: str = ""
     writes: tuple[str, ...] = ()
     writer: str = ""
-    signs: tuple[tuple[str, str | bytes], ...] = ()
-    states: str = ""
-    asks: tuple[str, ...] = ()
-    loses: str = ""
+    magic: tuple[tuple[str, str | bytes], ...] = ()
+    conventions: str = ""
+    required_options: tuple[str, ...] = ()
+    not_stored: str = ""
     names: tuple[str, ...] = ()
     delimiter: str | None = None
     columns: tuple[str, ...] = ()
@@ -68,13 +68,11 @@ class Format(NamedTuple):
         return self.delimiter is not None
 
 
-def _trajectory(
-    summary: str, module: str, *, reader: str = "", asks: tuple[str, ...] = ("frames", "stamps", "camera_axes"),
-    **fields: Any,
-) -> Format:  # fmt: skip
+def _trajectory(summary: str, module: str, **fields: Any) -> Format:
     """Return the row of a form that lists poses of one frame, which one module writes, and reads unless told."""
-    reads, writes = ("tree", "trajectory", "rows"), ("poses", "trajectory")
-    return Format(summary, reads=reads, reader=reader or module, writes=writes, writer=module, asks=asks, **fields)
+    known: dict[str, Any] = {"reader": module, "required_options": ("frames", "stamps", "camera_axes")}
+    known |= {"reads": ("tree", "trajectory", "rows"), "writes": ("poses", "trajectory")}
+    return Format(summary, writer=module, **known | fields)
 
 
 def _tree(summary: str, module: str, **fields: Any) -> Format:
@@ -89,9 +87,9 @@ def _read_tree(summary: str, module: str, **fields: Any) -> Format:
 
 def _drawing(summary: str, module: str, **fields: Any) -> Format:
     """Return the row of a form that says how frames hang together and nothing of where they are."""
-    states = "parent -> child, no poses"
+    conventions = "parent -> child, no poses"
     return Format(
-        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, states=states, **fields
+        summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, conventions=conventions, **fields
     )
 
 
@@ -144,13 +142,13 @@ _EUROC = (
     "b_a_RS_S_z [m s^-2]",
 )  # fmt: skip
 
-# forms that differ only in their names and signs
+# formats that differ only in their names and magic
 _ECHO = Format("", writes=("poses", "points", "tree"), writer="frametool.ros.echo_format")
 _CALLS = Format("", writes=("poses", "tree"), writer="frametool.ros.publisher")
-_LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), states="metres")
+_LAS = _arrays("", "frametool.formats.rows.las", writes=("points", "arrays"), conventions="metres")
 _BIN = _arrays(
     "", "frametool.formats.rows.bin_cloud", writes=("points", "arrays"),
-    states="float32, metres, frame of the lidar; only --in tells it from other .bin",
+    conventions="float32, metres, frame of the lidar; only --in tells it from other .bin",
 )  # fmt: skip
 _XYZI = ("x", "y", "z", "intensity")
 _LAS_HEAD = rb"LASF.{100}"
@@ -164,7 +162,7 @@ FORMATS = {
         reader=_TREE,
         writes=("poses", "points", "tree", "report"),
         writer="frametool.formats.trees.yaml_json",
-        signs=(
+        magic=(
             ("own key", "frames|children"),
             ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
             # a header of CSV whose first column ends in a colon is no key
@@ -178,17 +176,17 @@ FORMATS = {
         reader=_TREE,
         writes=("poses", "points", "tree", "report"),
         writer="frametool.formats.trees.yaml_json",
-        signs=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
+        magic=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
     ),
     "csv": Format(
         "CSV with a header",
         suffixes=(".csv",),
         reads=("tree", "rows"),
         reader=_TABLE,
-        asks=("frames", "stamps"),
+        required_options=("frames", "stamps"),
         writes=("poses", "points", "report", "trajectory"),
         writer="frametool.formats.rows.csv",
-        signs=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
+        magic=(("begin", _ONE_COLUMN), ("header", r"[^\t]*,[^\t]*$")),
         delimiter=",",
     ),
     "tsv": Format(
@@ -196,22 +194,22 @@ FORMATS = {
         (".tsv", ".tab"),
         reads=("tree", "rows"),
         reader=_TABLE,
-        asks=("frames", "stamps"),
-        signs=(("header", r".*\t"),),
+        required_options=("frames", "stamps"),
+        magic=(("header", r".*\t"),),
         delimiter="\t",
     ),
     "semicolon": Format(
         "CSV with semicolons and a header",
         reads=("tree", "rows"),
         reader=_TABLE,
-        asks=("frames", "stamps"),
-        signs=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
+        required_options=("frames", "stamps"),
+        magic=(("line", r"[^\t,;:{]+(?:;[^\t,;:{]*)+$"),),
         delimiter=";",
     ),
     "columns": Format(
         "columns between blanks, # comments",
-        reads=("rows",), asks=("stamps",),
-        signs=(("header", r"#|\s*\S+\s+\S"),),
+        reads=("rows",), required_options=("stamps",),
+        magic=(("header", r"#|\s*\S+\s+\S"),),
         delimiter="",
     ),
     "tum": _trajectory(
@@ -219,9 +217,9 @@ FORMATS = {
         "frametool.formats.rows.tum",
         suffixes=(".tum",),
         reader=_TABLE,
-        signs=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
-        states="world<-body, seconds, metres, quaternion x y z w",
-        asks=("frames",),
+        magic=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
+        conventions="world<-body, seconds, metres, quaternion x y z w",
+        required_options=("frames",),
         delimiter="",
         columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"),
         poses=Poses("xyzw", counted=""),
@@ -229,42 +227,44 @@ FORMATS = {
     "echo": _read_tree(
         "messages as `ros2 topic echo` or `rostopic echo` print them",
         _MESSAGES,
-        asks=("frames",), signs=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
+        required_options=("frames",), magic=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
     ),
     "jsonl": _read_tree(
         "messages as JSON, one a line (rosbridge, Foxglove)",
         _MESSAGES,
-        asks=("frames",), signs=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
+        required_options=("frames",), magic=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
     ),
-    "csv1": _read_tree("CSV of `rostopic echo -p`", _MESSAGES, asks=("frames",), signs=(("line", "%time,"),)),
+    "csv1": _read_tree(
+        "CSV of `rostopic echo -p`", _MESSAGES, required_options=("frames",), magic=(("line", "%time,"),)
+    ),
     "csv2": _read_tree(
         "CSV of `ros2 topic echo --csv`",
-        _MESSAGES, asks=("frames",),
-        signs=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{_NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
+        _MESSAGES, required_options=("frames",),
+        magic=(("line", rf"-?\d{{1,12}},\d{{1,10}},(?!{_NUMBER},)[^,]*,[^,]+,|[-+0-9.e]+(?:,[-+0-9.e]+){{5}}$"),),
     ),
     "calls": _read_tree(
         "static_transform_publisher calls",
         "frametool.ros.publisher",
-        signs=(
+        magic=(
             ("line", r".*\bstatic_transform_publisher\s+[-\d.]|--[\w-]+[ =]"),
             # numbers and two names: poses of a trajectory are numbers only
             ("line", r"[-+]?[\d.]+\s(?:\S+\s+){5,6}(?!-?[\d.])\S+\s+\S+\s*\d*\s*&?$"),
         ),
     ),
     "bag1": _read_tree(
-        "ROS 1 bag", BAG, **_RECORDING, suffixes=(".bag",), asks=("frames",),
-        signs=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),),
+        "ROS 1 bag", BAG, **_RECORDING, suffixes=(".bag",), required_options=("frames",),
+        magic=(("magic", rb"#ROSBAG V2\.0\n(?:..\0\0|.{0,3}\Z)"),),
     ),
     "bag2": _read_tree(
         "ROS 2 bag: sqlite3, or a folder",
         BAG,
         **_RECORDING,
-        suffixes=(".db3",), asks=("frames",),
-        signs=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
+        suffixes=(".db3",), required_options=("frames",),
+        magic=(("magic", rb"SQLite format 3\0"), ("folder", "metadata.yaml")),
     ),
     "mcap": _read_tree(
-        "MCAP file", BAG, **_RECORDING, suffixes=(".mcap",), asks=("frames",),
-        signs=(("magic", rb"\x89MCAP0\r\n"),),
+        "MCAP file", BAG, **_RECORDING, suffixes=(".mcap",), required_options=("frames",),
+        magic=(("magic", rb"\x89MCAP0\r\n"),),
     ),
     "ros1": _ECHO._replace(summary="messages as `rostopic echo` prints them"),
     "ros2": _ECHO._replace(summary="messages as `ros2 topic echo` prints them"),
@@ -272,25 +272,25 @@ FORMATS = {
     "static1": _CALLS._replace(summary="static_transform_publisher of ROS 1"),
     "static2": _CALLS._replace(summary="static_transform_publisher of ROS 2"),
     "tf2": _drawing(
-        "the listing of tf2's all_frames_as_yaml", "frametool.ros.tf2_listing", signs=(("yaml inner", "broadcaster"),)
+        "the listing of tf2's all_frames_as_yaml", "frametool.ros.tf2_listing", magic=(("yaml inner", "broadcaster"),)
     ),
     "dot": _drawing(
         "graphviz",
         "frametool.formats.trees.drawings",
         suffixes=(".dot", ".gv"),
-        signs=(("text", r"\A\ufeff?(?:\s|//[^\n]*\n)*(?:strict\s+)?digraph\b"),),
+        magic=(("text", r"\A\ufeff?(?:\s|//[^\n]*\n)*(?:strict\s+)?digraph\b"),),
     ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(
         "EuRoC ground truth",
         "frametool.formats.rows.euroc",
         reader=_TABLE,
-        signs=(
+        magic=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
             ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
         ),
-        states="world<-body (R<-S), nanoseconds, metres, quaternion w x y z",
-        asks=("frames",),
+        conventions="world<-body (R<-S), nanoseconds, metres, quaternion w x y z",
+        required_options=("frames",),
         delimiter=",",
         columns=_EUROC,
         widths=(8, 17),
@@ -301,26 +301,26 @@ FORMATS = {
         "frametool.formats.rows.colmap",
         names=("images.txt",),
         poses=Poses("wxyz", inverse=True, axes="optical", frames=_CAMERA, counted="image ids"),
-        signs=(
+        magic=(
             ("text", r"\A\ufeff?(?:\s*#[^\n]*\n)*?# *(?:Image|Frame) list with"),
             ("line", rf"\d+(?:[ \t]+{_NUMBER}){{7}}[ \t]+\d+[ \t]+\S*[^\s\d.]"),
         ),
-        states="the file holds camera<-world, quaternion w x y z",
+        conventions="the file holds camera<-world, quaternion w x y z",
     ),
     "nerf": _trajectory(
         "NeRF transforms.json",
         "frametool.formats.rows.nerf",
         names=("transforms.json",),
         poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
-        signs=(("json path", "frames/transform_matrix"),),
-        states="world<-camera; opengl (y up, z back)",
+        magic=(("json path", "frames/transform_matrix"),),
+        conventions="world<-camera; opengl (y up, z back)",
     ),
     "kitti": _trajectory(
         "KITTI poses",
         "frametool.formats.rows.kitti",
         reader=_TABLE,
-        signs=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
-        states="world<-cam0, metres",
+        magic=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),),
+        conventions="world<-cam0, metres",
         delimiter="",
         columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"),
         widths=(12,),
@@ -330,164 +330,165 @@ FORMATS = {
         "g2o pose graph",
         "frametool.formats.rows.g2o",
         suffixes=(".g2o",),
-        signs=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
-        states="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
+        magic=(("line", r"(?:VERTEX|EDGE|PARAMS)_[A-Z0-9_]+(?::[A-Z_]+)?\s+\d|FIX\s+\d"),),
+        conventions="world<-vertex or vertex<-vertex (--edges), quaternion x y z w",
         poses=Poses("quaternion", counted="ids of vertices"),
-        asks=("frames", "stamps", "edges"),
+        required_options=("frames", "stamps", "edges"),
     ),
     "autoware": _tree(
         "Autoware sensor calibration",
         "frametool.formats.trees.autoware",
-        signs=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
-        states="parent<-child, metres, radians, roll pitch yaw about fixed axes",
+        magic=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
+        conventions="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
     "named": _tree(
         "extrinsics by hand: a pose under each name",
         "frametool.formats.trees.named",
-        signs=(("entries", _POSE_WORDS),),
-        states="pose of the name in its parent, metres, radians unless _deg",
-        asks=("frames", "direction", "order"),
+        magic=(("entries", _POSE_WORDS),),
+        conventions="pose of the name in its parent, metres, radians unless _deg",
+        required_options=("frames", "direction", "order"),
     ),
     "camchain": _tree(
         "camera chain of Kalibr, OpenVINS or okvis; matrices by name",
         "frametool.formats.trees.camchain",
-        signs=(
+        magic=(
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
             ("json path", "*/T_BS/data"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
         ),
-        states="target<-source as each key says; metres; intrinsics are not kept",
-        asks=("direction", "frames"),
+        conventions="target<-source as each key says; metres; intrinsics are not kept",
+        required_options=("direction", "frames"),
     ),
     "kalibr": _read_tree(
         "results of Kalibr as text",
         "frametool.formats.trees.kalibr",
-        signs=(
+        magic=(
             ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|T_(?:ci|ic):?[ \t]*\(\w+ to|Camera-system parameters:)"),
         ),
-        states="target<-source; metres; q of a baseline is the inverse's, as in T_cn_cnm1; +- and timeshifts not read",
-        asks=("frames",),
+        conventions="target<-source; metres; q of a baseline is the inverse's, as in T_cn_cnm1; "
+        "+- and timeshifts not read",
+        required_options=("frames",),
     ),
     "opencv": _tree(
         "OpenCV FileStorage",
         "frametool.formats.trees.opencv",
-        signs=(
+        magic=(
             ("xml", "opencv_storage"),
             ("json path", "*/type_id"),
             ("magic", rb"(?:\xef\xbb\xbf)?\s*%YAML:1\.0(?!.*\bT_(?:cam_imu|imu_cam|cn_cnm1|i_b|SC|BS) *:)"),
             ("text", ": *!!opencv-"),
             ("yaml key", "trans_matrix"),  # of OpenLORIS-Scene
         ),
-        states="target<-source as each key says, camera<-object by rvec and tvec; metres",
-        asks=("direction", "frames"),
+        conventions="target<-source as each key says, camera<-object by rvec and tvec; metres",
+        required_options=("direction", "frames"),
     ),
     "euroc-sensor": _read_tree(
         "sensor.yaml of EuRoC",
         "frametool.formats.trees.camchain",
-        signs=(("yaml key", "T_BS"), ("json key", "T_BS")),
-        states="T_BS is body<-sensor, metres",
-        asks=("frames",),
+        magic=(("yaml key", "T_BS"), ("json key", "T_BS")),
+        conventions="T_BS is body<-sensor, metres",
+        required_options=("frames",),
     ),
     "apollo": _read_tree(
         "Apollo extrinsics: a TransformStamped",
         _TREE,
-        signs=(("yaml inner", "euler_angles_degree"),),
-        states="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
+        magic=(("yaml inner", "euler_angles_degree"),),
+        conventions="parent<-child, metres, quaternion by name; its euler_angles_degree are not used",
     ),
     "kitti-calib": _read_tree(
         "KITTI calibration",
         "frametool.formats.trees.kitti_calib",
-        signs=(("text", _KITTI),),
-        states="parent<-child, metres, optical axes of cameras unless told",
-        asks=("frames", "camera_axes"),
+        magic=(("text", _KITTI),),
+        conventions="parent<-child, metres, optical axes of cameras unless told",
+        required_options=("frames", "camera_axes"),
     ),
     "handeye": _tree(
         "hand-eye calibration of easy_handeye",
         "frametool.formats.trees.handeye",
-        signs=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
-        states="effector (base if not on the hand)<-tracking base, metres, x y z w",
+        magic=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
+        conventions="effector (base if not on the hand)<-tracking base, metres, x y z w",
     ),
     "nuscenes": _read_tree(
         "nuScenes table",
         "frametool.formats.trees.nuscenes",
-        signs=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
-        states="ego<-sensor, global<-ego, metres, w first, microseconds",
-        asks=("frames",),
+        magic=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
+        conventions="ego<-sensor, global<-ego, metres, w first, microseconds",
+        required_options=("frames",),
     ),
     "dh": _read_tree(
         "Denavit-Hartenberg table",
         "frametool.formats.robots.dh",
-        signs=(("text", _DH),),
-        states="parent<-child, metres, radians unless their names say deg",
-        asks=("dh", "frames"),
+        magic=(("text", _DH),),
+        conventions="parent<-child, metres, radians unless their names say deg",
+        required_options=("dh", "frames"),
     ),
     "launch": _tree(
         "launch file",
         "frametool.formats.trees.launch",
         suffixes=(".launch",),
-        signs=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
-        states="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
+        magic=(("xml", "launch"), ("yaml key", "launch"), ("text", r"(?m)^ *def generate_launch_description\b")),
+        conventions="parent<-child, metres, radians; angles yaw pitch roll where they have no flags",
     ),
     "mjcf": Format(
         "MJCF of MuJoCo",
         suffixes=(".mjcf",),
         reads=("tree", "joints"),
         reader="frametool.formats.robots.mjcf",
-        signs=(("xml", "mujoco"),),
-        states="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
-        asks=("camera_axes",),
+        magic=(("xml", "mujoco"),),
+        conventions="parent<-child, metres, degrees unless radian, w first; site:NAME, camera:NAME (looking along -z)",
+        required_options=("camera_axes",),
     ),
     "sdf": _read_tree(
         "SDF of Gazebo",
         "frametool.formats.robots.sdf",
         suffixes=(".sdf", ".world"),
-        signs=(("xml", "sdf"),),
-        states="parent<-child, metres, radians unless degrees; frames are model::link",
+        magic=(("xml", "sdf"),),
+        conventions="parent<-child, metres, radians unless degrees; frames are model::link",
     ),
     "urdf": _tree(
         "URDF robot",
         "frametool.formats.robots.urdf",
         suffixes=(".urdf",),
-        signs=(("xml", "robot"),),
-        loses="written as links that are fixed to one another; joints, limits and shapes are no frames",
-        states="parent<-child, metres, radians, rpy about fixed axes",
+        magic=(("xml", "robot"),),
+        not_stored="written as links that are fixed to one another; joints, limits and shapes are no frames",
+        conventions="parent<-child, metres, radians, rpy about fixed axes",
     ),
     "npy": _arrays(
         "NPY of numpy: n x 3 points, n x 7 poses, records with fields",
         "frametool.formats.rows.npy",
         texts=True,
         suffixes=(".npy",),
-        signs=(("magic", rb"\x93NUMPY"),),
+        magic=(("magic", rb"\x93NUMPY"),),
     ),
     "pcd": _arrays(
         "PCD point cloud",
         "frametool.formats.rows.pcd",
         suffixes=(".pcd",),
         writes=("points", "arrays"),
-        signs=(("magic", _PCD),),
-        states="metres; VIEWPOINT: pose of the sensor among the points, w first",
+        magic=(("magic", _PCD),),
+        conventions="metres; VIEWPOINT: pose of the sensor among the points, w first",
     ),
     "ply": _arrays(
         "PLY point cloud or mesh",
         "frametool.formats.rows.ply",
         suffixes=(".ply",),
         writes=("points", "arrays"),
-        signs=(("magic", rb"ply\r?\n"),),
-        states="metres",
+        magic=(("magic", rb"ply\r?\n"),),
+        conventions="metres",
     ),
     "kitti-bin": _BIN._replace(summary="point cloud of KITTI, .bin", columns=_XYZI),
     "nuscenes-bin": _BIN._replace(summary="point cloud of nuScenes, .pcd.bin", columns=(*_XYZI, "ring")),
-    "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), signs=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
-    "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), signs=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
+    "las": _LAS._replace(summary="LAS laser scan", suffixes=(".las",), magic=(("magic", _LAS_HEAD + rb"[\x00-\x7f]"),)),
+    "laz": _LAS._replace(summary="LAZ laser scan", suffixes=(".laz",), magic=(("magic", _LAS_HEAD + rb"[\x80-\xff]"),)),
     "parquet": _ARROW._replace(
         summary="Parquet (pip install 'frametool[arrow]')",
         suffixes=(".parquet", ".pq"),
-        signs=(("magic", rb"PAR1"),),
+        magic=(("magic", rb"PAR1"),),
     ),
     "arrow": _ARROW._replace(
         summary="a file of Arrow, Feather (pip install 'frametool[arrow]')",
         suffixes=(".arrow", ".feather", ".ipc"),
-        signs=(("magic", rb"ARROW1"),),
+        magic=(("magic", rb"ARROW1"),),
     ),
 }
 
@@ -524,7 +525,7 @@ def has_no_text(name: str) -> bool:
 
 def is_folder(name: str) -> bool:
     """Tell whether a form is written as a folder of files."""
-    return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].signs)
+    return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].magic)
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:

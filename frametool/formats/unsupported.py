@@ -15,13 +15,13 @@ class Unsupported(NamedTuple):
     """A form that is neither read nor written.
 
     summary: what it is; remedy: what to do instead
-    signs, suffixes: how it is recognised, as in `frametool.formats.table`
+    magic, suffixes: how it is recognised, as in `frametool.formats.table`
     was_written: files with its suffix were written before 0.2.0
     """
 
     summary: str
     remedy: str
-    signs: tuple[tuple[str, str | bytes], ...] = ()
+    magic: tuple[tuple[str, str | bytes], ...] = ()
     suffixes: tuple[str, ...] = ()
     was_written: bool = False
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from frametool.errors import BadTopology, ValueInvalid, shown, warn
-from frametool.frames.lookups import Frames, taken, two_covariances
-from frametool.frames.path import cycle_message
-from frametool.frames.refusals import check_age, check_edge, check_same
+from frametool.errors import ValueInvalid, shown, warn
+from frametool.frames import topology
+from frametool.frames.lookups import Frames, taken
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
-from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StandingTrack
+from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StaticTransform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,9 +55,9 @@ class TransformBuffer(Frames):
         components = transform.components
         if type(components[6]) is not float and transform.shape:
             raise ValueInvalid(f"insert takes one transform, found {len(transform)}; insert them one by one")
-        parent, child, found = self.called(parent), self.called(child), taken(covariance)
+        parent, child, found = self.resolve_name(parent), self.resolve_name(child), taken(covariance)
         if found and (known := self.covariances.get(child, found)) != found:
-            raise two_covariances(parent, child, known, found)
+            raise topology.two_covariances(parent, child, known, found)
         if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
             warn(f"frame {shown(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
         if found:
@@ -74,7 +73,7 @@ class TransformBuffer(Frames):
         """
         track = self._tracks.get(child)
         if (
-            self.keep_ns is None and track is not None and type(stamp_ns) is int and not static and not track.standing
+            self.keep_ns is None and track is not None and type(stamp_ns) is int and not static and not track.is_static
             and track.parent == parent and -FURTHEST_NS < stamp_ns < FURTHEST_NS
             and -1e300 < sum(components) < 1e300  # finite
         ):  # fmt: skip
@@ -90,7 +89,7 @@ class TransformBuffer(Frames):
                 return False
             if track.add_if_new(stamp_ns, components):
                 return False
-        check_edge(parent, child, components)
+        topology.check_edge(parent, child, components)
         standing = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
         return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
@@ -104,7 +103,7 @@ class TransformBuffer(Frames):
         self.insert_components(parent, child, components[0], stamps_ns[0])
         track = self._tracks[child]
         within = stamps_ns[0] > -FURTHEST_NS and stamps_ns[-1] < FURTHEST_NS
-        if self.keep_ns is not None or track.standing or not within or not all(map(isfinite, map(sum, components))):
+        if self.keep_ns is not None or track.is_static or not within or not all(map(isfinite, map(sum, components))):
             for stamp_ns, each in zip(stamps_ns[1:], components[1:], strict=True):
                 self.insert_components(parent, child, each, stamp_ns)
         else:
@@ -115,17 +114,17 @@ class TransformBuffer(Frames):
     ) -> bool:  # fmt: skip
         """Add what may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
-        if track is not None and track.standing != standing:
-            raise BadTopology(f"frame {shown(child)} both stands still and moves", rule="static-and-moving")
+        if track is not None and track.is_static != standing:
+            raise topology.static_and_moving(child)
         replaced = False
         if track is None:
             self._refuse_cycle(parent, child, stamp_ns, standing=standing)
             if standing:
-                track = self._put(StandingTrack(child, parent, components))
+                track = self._put(StaticTransform(child, parent, components))
             else:
                 track = self._put(MovingTrack(child, stamp_ns, parent, components))
-        elif track.standing:
-            check_same(track, parent, components)
+        elif track.is_static:
+            topology.check_same(child, (track.parent, track.components), (parent, components))
         else:
             replaced = self._move(track, parent, components, stamp_ns)
         self._frames[parent] = None
@@ -135,7 +134,7 @@ class TransformBuffer(Frames):
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:
         """Add a further sample of a frame that moves; returns whether it replaced another one."""
         if self.keep_ns is not None:
-            check_age(track, stamp_ns, self.keep_ns)
+            _check_age(track, stamp_ns, self.keep_ns)
         if known := track.samples_at(stamp_ns):
             self._varies = self._varies or parent != known[-1][0]
             self._queries.clear()
@@ -161,14 +160,14 @@ class TransformBuffer(Frames):
         while (track := self._tracks.get(line[-1])) is not None and _holds(track, at_ns):
             line.append(track.parent)
             if line[-1] == child:
-                raise BadTopology(cycle_message([*line, parent]), rule="cycle")
+                raise topology.cycle([*line, parent])
             if len(line) > len(self._tracks):
                 return  # round in a circle of others, whose edges held at different times when they came
 
-    def make_stand(self, frame: str) -> None:
+    def make_static(self, frame: str) -> None:
         """Take the newest sample of a moving frame for its pose at all times."""
         moved = self._tracks[frame]
-        self._put(StandingTrack(frame, moved.parent, moved.components))
+        self._put(StaticTransform(frame, moved.parent, moved.components))
 
     def __repr__(self) -> str:
         """Return how many frames and samples there are."""
@@ -176,8 +175,18 @@ class TransformBuffer(Frames):
         return f"TransformBuffer({len(self._frames)} frames, {samples} samples)"
 
 
+def _check_age(track: MovingTrack, stamp_ns: int, keep_ns: int) -> None:
+    """Refuse a sample older than what a buffer keeps."""
+    newest = track.last_ns
+    if newest - keep_ns > stamp_ns:
+        raise ValueInvalid(
+            f"a sample of {shown(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
+            f"{format_stamp(keep_ns)} s before its newest at {format_stamp(newest)}",
+        )
+
+
 def _holds(track: Track, at_ns: int | None) -> bool:
     """Return whether an edge under its newest parent has data at a time; None asks for standing ones."""
-    if track.standing:
+    if track.is_static:
         return True
     return at_ns is not None and track.covers(at_ns) and track.parent_at(at_ns) == track.parent

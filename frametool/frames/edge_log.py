@@ -11,9 +11,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
-from frametool.frames.path import edges_between
 from frametool.frames.refusals import seconds
 from frametool.frames.stamps import BILLION
+from frametool.frames.topology import edges_between
 from frametool.geometry import floats, rigid
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class EdgeLog:
         self.topics: dict[str, int] = {}  # how many samples came by each, where that is known
         self.changes = 0
         self.count = 0
-        self.standing = False
+        self.is_static = False
         self.first_ns: int | None = None
         self.last_ns: int | None = None
         self.backward = 0  # samples that came after a later stamp
@@ -75,7 +75,7 @@ class EdgeLog:
         self.parent = parent
         under = self.parents.setdefault(parent, len(self.parents))
         if stamp_ns is None:
-            self.standing = True
+            self.is_static = True
             return
         if received_ns is not None:
             self.delays_ns.append(received_ns - stamp_ns)
@@ -128,7 +128,7 @@ class EdgeLog:
     @property
     def moves(self) -> bool:
         """Return whether there are two different stamps."""
-        return not self.standing and self.first_ns != self.last_ns
+        return not self.is_static and self.first_ns != self.last_ns
 
     @property
     def span(self) -> tuple[int, int]:
@@ -195,7 +195,7 @@ class CacheEntry:
 
     def __init__(self, track: Track) -> None:
         """Count."""
-        oldest, newest = (0, 0) if track.standing else track.span
+        oldest, newest = (0, 0) if track.is_static else track.span
         self.child, self.parent, self.authority = track.child, track.parent, track.authority
         self.oldest, self.newest = oldest / BILLION, newest / BILLION
         self.length = (newest - oldest) / BILLION

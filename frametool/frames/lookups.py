@@ -11,13 +11,14 @@ from itertools import chain, repeat
 from math import ceil, floor
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, shown, warn
-from frametool.frames.path import Query, cycle_message, edges_between, to_root
-from frametool.frames.refusals import check_same, left_out, no_data
+from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, warn
+from frametool.frames import topology
+from frametool.frames.path import Query
+from frametool.frames.refusals import left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
-from frametool.frames.track import StandingTrack
+from frametool.frames.topology import Groups, edges_between, to_root
+from frametool.frames.track import StaticTransform
 from frametool.geometry import rigid
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 
@@ -68,11 +69,9 @@ class Frames:
         """Return every frame, in the order of first mention."""
         return tuple(self._frames)
 
-    def called(self, frame: str) -> str:
+    def resolve_name(self, frame: str) -> str:
         """Return what a frame is called here: the Earth's, `ecef` or `earth`, is one by either name."""
-        if frame in EARTH_FRAMES and frame not in self._frames:
-            return next((other for other in EARTH_FRAMES if other in self._frames), frame)
-        return frame
+        return topology.resolve_name(frame, self._frames)
 
     @property
     def roots(self) -> tuple[str, ...]:
@@ -82,7 +81,7 @@ class Frames:
     @property
     def moves(self) -> bool:
         """Return whether any frame moves."""
-        return any(not track.standing for track in self._tracks.values())
+        return any(not track.is_static for track in self._tracks.values())
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
         """Return a frame's parent at a time, or the newest; None for a root or where it is not known."""
@@ -98,7 +97,7 @@ class Frames:
 
     def track(self, frame: str) -> Track | None:
         """Return what is known about a frame over time; None for a root."""
-        return self._tracks.get(frame) or self._tracks.get(self.called(frame))
+        return self._tracks.get(frame) or self._tracks.get(self.resolve_name(frame))
 
     def tracks(self) -> Iterator[Track]:
         """Walk what is known about each frame that has a parent, in the order of first mention."""
@@ -113,7 +112,7 @@ class Frames:
             pose, parent = track.at(at_ns), track.parent_at(at_ns)
             if pose is not None and parent is not None:
                 tree.add_components(parent, track.child, pose)
-            elif not track.standing:
+            elif not track.is_static:
                 warn(left_out(track, at_ns))
         tree.covariances = {child: each for child, each in self.covariances.items() if tree.track(child)}
         tree.drawn = self.drawn
@@ -153,7 +152,7 @@ class Frames:
         """
         newest = self.query(target, source, None).latest()
         own = self._tracks.get(source) if target == source else None
-        return newest if own is None or own.standing else own.last_ns
+        return newest if own is None or own.is_static else own.last_ns
 
     def lookup_across(
         self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str,
@@ -262,7 +261,7 @@ class Frames:
         if at_ns is None and self._varies:
             at_ns = self.latest(target, source)
         down, up = self.between(target, source, at_ns)
-        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else self.called(source)
+        top = self.parent(up[-1] if up else down[0], at_ns) if up or down else self.resolve_name(source)
         return [*reversed(down), str(top), *reversed(up)]
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
@@ -296,7 +295,7 @@ class Frames:
         """List the stamps, sorted, at which a frame whose parent changes gets another one, or begins, or has ended."""
         stamps: set[int] = set()
         for track in self._tracks.values() if self._varies else ():
-            if not track.standing and (track.varies or self._loops):
+            if not track.is_static and (track.varies or self._loops):
                 stamps.update(track.changes())
                 stamps.update((track.first_ns, track.last_ns + 1))
         return sorted(stamps)
@@ -333,7 +332,7 @@ class Frames:
     def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
         """Name the edges between two frames that both exist, as `edges_between` does."""
         self.require(target, source)
-        target, source = self.called(target), self.called(source)
+        target, source = self.resolve_name(target), self.resolve_name(source)
         try:
             parent_of = partial(self.parent, at_ns=at_ns) if self._varies else self.parent
             return edges_between(target, source, parent_of)
@@ -353,7 +352,7 @@ class Frames:
     def require(self, *frames: str) -> None:
         """Raise UnknownFrame unless all frames are there."""
         for frame in frames:
-            if self.called(frame) not in self._frames:
+            if self.resolve_name(frame) not in self._frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
@@ -387,7 +386,7 @@ class FrameTree(Frames):
     def __init__(self, name: str = "") -> None:
         """Create an empty tree; `name` says in error messages where the frames come from."""
         super().__init__(name)
-        self._upward: dict[str, str] = {}  # frame -> some ancestor of it; shortened as it is walked
+        self.groups = Groups()  # of frames that hang together
 
     def add(self, parent: str, child: str, transform: Transform, covariance: Any = None) -> None:
         """Hang a frame under a parent; `transform` is parent_from_child, the pose of the child in its parent.
@@ -397,10 +396,10 @@ class FrameTree(Frames):
         Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
         ValueInvalid for numbers that are no covariance.
         """
-        parent, child = self.called(parent), self.called(child)
+        parent, child = self.resolve_name(parent), self.resolve_name(child)
         known, found = self._tracks.get(child), taken(covariance)
         if known is not None and known.parent == parent and self.covariances.get(child) != found:
-            raise two_covariances(parent, child, self.covariances.get(child), found)
+            raise topology.two_covariances(parent, child, self.covariances.get(child), found)
         self.add_components(parent, child, transform.components)
         if found:
             self.covariances[child] = found
@@ -408,27 +407,25 @@ class FrameTree(Frames):
     def add_components(self, parent: str, child: str, components: Rigid) -> None:
         """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._tracks.get(child)
-        if known is not None and known.standing:
-            check_same(known, parent, components)
+        if known is not None and known.is_static:
+            topology.check_same(child, (known.parent, known.components), (parent, components))
             return
         if parent == child:
-            raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")
-        if child in self._frames and self._root_of(parent) == child:
-            raise BadTopology(cycle_message([*to_root(parent, self.parent), parent]), rule="cycle")
+            raise topology.own_parent(child)
+        if child in self._frames and self.groups.of(parent) == self.groups.of(child):
+            raise topology.cycle([*to_root(parent, self.parent), parent])
         self._frames[parent] = None
-        self._put(StandingTrack(child, parent, components))
-        self._upward[child] = parent
+        self._put(StaticTransform(child, parent, components))
+        self.groups.join(child, parent)
 
-    def _root_of(self, frame: str) -> str:
-        """Find a frame's root, halving the way for the next search."""
-        upward = self._upward
-        while (above := upward.get(frame)) is not None:
-            further = upward.get(above)
-            if further is None:
-                return above
-            upward[frame] = further
-            frame = further
-        return frame
+    def reroot(self, frame: str) -> None:
+        """Turn the edges above a frame round, so that all of its tree hangs from it."""
+        way = []
+        while (track := self._tracks.pop(frame, None)) is not None:
+            way.append(track)
+            frame = track.parent
+        for track in way:
+            self._put(StaticTransform(track.parent, track.child, rigid.inverse(*track.components)))
 
     def __repr__(self) -> str:
         """Return how many frames there are and which roots."""
@@ -464,8 +461,3 @@ def taken(covariance: Any) -> Components | None:
 
     return uncertainty.taken(covariance)
 
-
-def two_covariances(parent: str, child: str, one: Components | None, other: Components | None) -> BadTopology:
-    """Make the error for an edge that is said to be uncertain in two ways."""
-    what = "two different covariances" if one and other else "a covariance in one place and none in another"
-    return BadTopology(f"frame {shown(child)} in {shown(parent)} has {what}", rule="two-covariances")

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from operator import attrgetter
 
-from frametool.errors import BadTopology, NotConnected, bare, shown
-from frametool.frames.track import StandingTrack
+from frametool.frames.track import StaticTransform
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
@@ -22,48 +21,6 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
     Edge = TypeVar("Edge")
-
-MOST_SHOWN = 16  # frames of a cycle
-
-
-def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
-    """List a frame and its ancestors, root last.
-
-    Raises BadTopology when the ancestors run in a circle.
-    """
-    line = [frame]
-    parent = parent_of(frame)
-    seen = {frame}
-    while parent is not None:
-        if parent in seen:
-            raise BadTopology(cycle_message([*line[line.index(parent) :], parent]), rule="cycle")
-        line.append(parent)
-        seen.add(parent)
-        parent = parent_of(parent)
-    return line
-
-
-def edges_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> tuple[list[str], list[str]]:
-    """Name the edges between two frames, each by its child.
-
-    Returns (down, up): `down` leads from the common ancestor to the target, `up` from the source to that ancestor;
-    target_from_source = inverse(product of down) @ product of reversed up.
-    Raises NotConnected, naming both roots.
-    """
-    target_line = to_root(target, parent_of)
-    source_line = to_root(source, parent_of)
-    if target_line[-1] != source_line[-1]:
-        raise NotConnected(
-            f"{shown(target)} and {shown(source)} are not connected: "
-            f"{shown(target)} hangs from root {shown(target_line[-1])}, "
-            f"{shown(source)} from root {shown(source_line[-1])}",
-            target=target, source=source, target_root=target_line[-1], source_root=source_line[-1],
-        )  # fmt: skip
-    while target_line and source_line and target_line[-1] == source_line[-1]:
-        target_line.pop()
-        source_line.pop()
-    return target_line[::-1], source_line
-
 
 def compose_path(
     to_target: Sequence[Edge], to_source: Sequence[Edge], sample: Callable[[Edge], Rigid | None], *, far: bool = False
@@ -97,14 +54,6 @@ def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> R
     return IDENTITY if product is None else product
 
 
-def cycle_message(frames: list[str]) -> str:
-    """Draw a cycle, parents to the left: `a <- b <- a`; of a long one both ends."""
-    if len(frames) > MOST_SHOWN + 1:
-        left_out = f"({len(frames) - MOST_SHOWN} more)"
-        frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
-    return f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}"
-
-
 class Query:
     """The way between two frames, from their common ancestor down to the target and down to the source.
 
@@ -117,7 +66,7 @@ class Query:
 
     def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
         """Compose what stands still; both branches come topmost edge first."""
-        self.moving = [track for track in (*to_target, *to_source) if not track.standing]
+        self.moving = [track for track in (*to_target, *to_source) if not track.is_static]
         self.far = bool(to_target) and to_target[0].parent in EARTH_FRAMES
         self.fixed: Rigid | None = None
         self.to_target: Sequence[Track] = ()
@@ -158,9 +107,9 @@ def _folded(tracks: Sequence[Track]) -> list[Track]:
     """Compose neighbours that stand still."""
     pieces: list[Track] = []
     for track in tracks:
-        if pieces and track.standing and pieces[-1].standing:
+        if pieces and track.is_static and pieces[-1].is_static:
             pose = rigid.compose(*pieces[-1].components, *track.components)
-            pieces[-1] = StandingTrack(track.child, pieces[-1].parent, pose)
+            pieces[-1] = StaticTransform(track.child, pieces[-1].parent, pose)
         else:
             pieces.append(track)
     return pieces

@@ -1,13 +1,8 @@
-"""What frames do not accept; and the error of a lookup at a time without data.
-
-That error says which edge lacks them, how far off the time is, and when the whole way has data.
-"""
+"""The error of a lookup at a time without data: which edge lacks them, how far off the time is, and what has data."""
 
 from __future__ import annotations
 
-from math import isfinite
-
-from frametool.errors import BadTopology, NoDataAt, TooEarly, TooLate, ValueInvalid, bare, shown
+from frametool.errors import NoDataAt, TooEarly, TooLate, bare
 from frametool.frames.stamps import BILLION, format_stamp
 
 TYPE_CHECKING = False
@@ -16,39 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.frames.edge_log import EdgeLog
-    from frametool.frames.track import MovingTrack, StandingTrack, Track
-    from frametool.geometry.types import Rigid
-
-
-def check_edge(parent: str, child: str, components: Rigid) -> None:
-    """Refuse an edge that cannot be; raises ValueInvalid, BadTopology."""
-    if not parent or not child:
-        raise ValueInvalid(f"an edge needs two frames, found parent {shown(parent)} and child {shown(child)}")
-    if parent == child:
-        raise BadTopology(f"frame {shown(child)} is its own parent", rule="self")
-    if not all(map(isfinite, components)):
-        numbers = " ".join(map(repr, components))
-        raise ValueInvalid(f"the pose of {shown(child)} in {shown(parent)} is not finite: {numbers}")
-
-
-def check_same(track: StandingTrack, parent: str, components: Rigid) -> None:
-    """Refuse a further value of a standing frame, unless it is the same."""
-    if parent != track.parent:
-        message = f"frame {shown(track.child)} has two parents: {shown(track.parent)} and {shown(parent)}"
-        raise BadTopology(message, rule="two-parents")
-    if components != track.components:
-        message = f"frame {shown(track.child)} has two different poses in {shown(parent)}"
-        raise BadTopology(message, rule="two-poses")
-
-
-def check_age(track: MovingTrack, stamp_ns: int, keep_ns: int) -> None:
-    """Refuse a sample older than what a buffer keeps."""
-    newest = track.last_ns
-    if newest - keep_ns > stamp_ns:
-        raise ValueInvalid(
-            f"a sample of {shown(track.child)} at {format_stamp(stamp_ns)} is older than the buffer keeps: "
-            f"{format_stamp(keep_ns)} s before its newest at {format_stamp(newest)}",
-        )
+    from frametool.frames.track import MovingTrack, Track
 
 
 OTHER_CLOCK = 10**8 * BILLION  # three years: beyond, one clock counts from 1970 and the other from its start
@@ -59,7 +22,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
 
     path: the edges between the two frames, from the target to the source.
     """
-    moving = [track for track in path if not track.standing]
+    moving = [track for track in path if not track.is_static]
     worst = max(moving, key=lambda track: gap(track, at_ns))
     first, last = worst.span
     short = gap(worst, at_ns)

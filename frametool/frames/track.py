@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
-    Track: TypeAlias = "StandingTrack | MovingTrack"  # what is known of one child frame; `standing` tells which
+    Track: TypeAlias = "StaticTransform | MovingTrack"  # what is known of one child frame; `is_static` tells which
 
 MANY = 1 << 13  # samples that come in one piece: from so many on they are packed
 FEW = 64  # late samples: up to so many are sorted in one by one, a microsecond each; a whole page takes a hundred
@@ -106,11 +106,11 @@ class Page:
 DEFAULT_AUTHORITY = "default_authority"
 
 
-class StandingTrack:
+class StaticTransform:
     """One pose, which holds at all times."""
 
     __slots__ = ("authority", "child", "components", "parent")
-    standing: Literal[True] = True
+    is_static: Literal[True] = True
     varies = False
     count = 1
 
@@ -148,7 +148,7 @@ class MovingTrack:
     """
 
     __slots__ = ("authority", "begins", "child", "known", "last_ns", "pages", "parent", "table", "tail", "varies")
-    standing: Literal[False] = False
+    is_static: Literal[False] = False
 
     def __init__(self, child: str, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Create a track with one sample."""

@@ -6,7 +6,7 @@ from itertools import repeat
 from types import MappingProxyType
 from typing import NamedTuple
 
-from frametool.errors import listing, shown
+from frametool.errors import Finding, listing, shown
 from frametool.grammar.readers import is_slashed, slash_note
 
 TYPE_CHECKING = False
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from frametool.errors import FormatError
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.readers import Note, Path
+    from frametool.grammar.readers import Path
 
     Report = Callable[[FormatError], None]
 
@@ -118,14 +118,6 @@ class Names(dict[str, str]):
         return name[1:]
 
 
-class Remark(NamedTuple):
-    """One sentence about a recording: the first line it is about, in words, and the rule of `check` that finds it."""
-
-    line: int
-    message: str
-    rule: str
-
-
 class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
@@ -154,35 +146,40 @@ class Tally:
         self.projected = 0.0
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
-        self.notes: dict[str, Remark] = {}
+        self.notes: dict[str, Finding] = {}
 
-    def note(self, note: Note, line: int) -> None:
-        """Keep what was noted while reading; of rotations that had to be normalised only the lines."""
-        if note.rule == "rounded":
+    def note(self, message: str, line: int, rule: str = "odd") -> None:
+        """Keep a sentence, once; of rotations that had to be normalised only the lines."""
+        if rule == "rounded":
             self.rough.append(line)
         else:
-            self.notes.setdefault(note.message, Remark(line, note.message, note.rule))
+            self.notes.setdefault(message, Finding(rule, message, line=line))
+
+    def note_all(self, notes: Iterable[Finding], line: int) -> None:
+        """Keep what was noted while one line was read."""
+        for note in notes:
+            self.note(note.message, line, note.rule)
 
     def note_each(self, message: str, line: int, rule: str = "odd") -> None:
         """Keep a sentence about one line, also where it was said of other lines."""
-        self.notes.setdefault(f"{line}: {message}", Remark(line, message, rule))
+        self.notes.setdefault(f"{line}: {message}", Finding(rule, message, line=line))
 
-    def told(self) -> Iterator[Remark]:
+    def told(self) -> Iterator[Finding]:
         """Yield one sentence for each kind of oddity."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
-            yield Remark(self.rough[0], f"{count} off norm 1 by up to 1e-3 and normalised", "rounded")
+            yield Finding("rounded", f"{count} off norm 1 by up to 1e-3 and normalised", line=self.rough[0])
         if self.projected > PROJECTED_IN_SILENCE:
-            yield Remark(1, projection(self.projected), "rounded")
+            yield Finding("rounded", projection(self.projected), line=1)
         if self.noise:
             line, text = self.noise[0]
             count = "a line" if len(self.noise) == 1 else f"{len(self.noise)} lines"
-            yield Remark(line, f"{count} printed between messages skipped: {shown(text)}", "noise")
+            yield Finding("noise", f"{count} printed between messages skipped: {shown(text)}", line=line)
         if self.others:
             kinds = ", ".join(f"{count} on {topic}" for topic, count in self.others.items())
-            yield Remark(1, f"messages without transforms were left out: {kinds}", "odd")
+            yield Finding("odd", f"messages without transforms were left out: {kinds}", line=1)
         for name in self.names.slashed:
-            self.notes.setdefault(slash_note(name), Remark(1, slash_note(name), "slash"))
+            self.notes.setdefault(slash_note(name), Finding("slash", slash_note(name), line=1))
         yield from self.notes.values()
 
 

@@ -198,7 +198,7 @@ def sample_stamps(frames: Frames, target: str, source: str) -> list[int]:
     stamps = {
         stamp_ns
         for track in frames.way(target, source)
-        if not track.standing
+        if not track.is_static
         for stamp_ns, *_ in track.walk()
         if first <= stamp_ns <= last
     }

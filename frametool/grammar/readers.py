@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import Finding, ValueInvalid, shown, warn
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.errors import FormatError
     from frametool.geometry.place import Earth
-    from frametool.grammar.edges import Remark
 
     Path = tuple[str | int, ...]
     Vector = tuple[float, float, float]
@@ -51,14 +50,6 @@ class NotARotation(Misfit):
     """Numbers that were read well but make no rotation, no covariance, or no pose."""
 
 
-class Note(NamedTuple):
-    """Something odd that does not stop the reading: the rule of `check` that finds it, in words, and where."""
-
-    rule: str
-    message: str
-    path: Path
-
-
 class Reading:
     """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
 
@@ -80,7 +71,7 @@ class Reading:
         self.earth = earth
         self.bare_numbers = self.framed = False
         self.here: Path = ()
-        self.notes: list[Note] = []
+        self.notes: list[Finding] = []
         self.faults: list[Misfit] | None = None
 
     def refuse(self, misfit: Misfit) -> None:
@@ -91,7 +82,7 @@ class Reading:
 
     def note(self, message: str, *path: str | int, rule: str = "odd") -> None:
         """Keep something worth telling about a place below `here`."""
-        self.notes.append(Note(rule, message, (*self.here, *path)))
+        self.notes.append(Finding(rule, message, path=(*self.here, *path)))
 
     def bare(self, name: str, *path: str | int) -> str:
         """Take one leading `/` off a frame's name, as tf2 does, and note it."""
@@ -101,7 +92,7 @@ class Reading:
         return name[1:]
 
 
-def tell(source: Source, notes: list[Note], most: int = 10) -> None:
+def tell(source: Source, notes: list[Finding], most: int = 10) -> None:
     """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
     if not notes:
         return
@@ -110,7 +101,7 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
     from frametool.documents.document import locate_many
     from frametool.documents.source import Pasted
 
-    firsts: dict[str, Note] = {}
+    firsts: dict[str, Finding] = {}
     for note in notes:
         firsts.setdefault(alike(note), note)
     counts = Counter(map(alike, notes))
@@ -123,7 +114,7 @@ def tell(source: Source, notes: list[Note], most: int = 10) -> None:
         warn(f"{source.name}: {counts.total()} more like these")
 
 
-def alike(note: Note | Remark) -> str:
+def alike(note: Finding) -> str:
     """Return what notes have in common that are told once, whatever the names and numbers in some are."""
     return note.rule if note.rule in ("slash", "identity", "rounded") else note.message
 

@@ -216,7 +216,7 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     yield from ({"name": root} for root in tree.roots)
     for track in tree.tracks():
         covariance = tree.covariances.get(track.child)
-        if track.standing:
+        if track.is_static:
             yield _edge(Pose.of((*track.components, *(covariance or ())), track.child, track.parent), style)
             continue
         if covariance and style.place is not None and track.parent in EARTH_FRAMES:

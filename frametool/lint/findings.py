@@ -6,12 +6,14 @@ Example:
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.documents.json import dump
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+
+    from frametool.errors import Finding
 
 # rule -> (level, what it is about); an error fails, a warning fails under --strict, a note never
 RULES = {
@@ -54,19 +56,9 @@ RULES = {
 MOST_LINES = 5  # of the further places of a finding
 
 
-class Finding(NamedTuple):
-    """Something wrong or odd: the rule that says so, in words, and where."""
-
-    rule: str
-    message: str
-    source: str
-    line: int = 0
-    column: int = 0
-
-    @property
-    def level(self) -> str:
-        """Return error, warning or note."""
-        return RULES[self.rule][0]
+def level(finding: Finding) -> str:
+    """Return error, warning or note."""
+    return RULES[finding.rule][0]
 
 
 def write_text(findings: Iterable[Finding]) -> str:
@@ -77,7 +69,7 @@ def write_text(findings: Iterable[Finding]) -> str:
     lines = []
     for each, *more in alike.values():
         place = ":".join(str(part) for part in (each.source, each.line, each.column) if part)
-        lines.append(f"{place}: {each.level}: {each.message} [{each.rule}]{_further(more)}\n")
+        lines.append(f"{place}: {level(each)}: {each.message} [{each.rule}]{_further(more)}\n")
     return "".join(lines)
 
 
@@ -95,7 +87,7 @@ def write_json(findings: Iterable[Finding]) -> str:
     lines = []
     for each in findings:
         place = {"file": each.source, "line": each.line or None, "column": each.column or None}
-        lines.append(f"{dump(place | {'level': each.level, 'rule': each.rule, 'message': each.message})}\n")
+        lines.append(f"{dump(place | {'level': level(each), 'rule': each.rule, 'message': each.message})}\n")
     return "".join(lines)
 
 
@@ -103,15 +95,15 @@ def write_github(findings: Iterable[Finding]) -> str:
     """Return workflow commands, which GitHub shows beside the lines of a pull request."""
     lines = []
     for each in findings:
-        level, place = "notice" if each.level == "note" else each.level, {"line": each.line, "col": each.column}
-        lines.append(github_command(level, each.message, file=each.source, **place, title=each.rule))
+        kind, place = level(each).replace("note", "notice"), {"line": each.line, "col": each.column}
+        lines.append(github_command(kind, each.message, file=each.source, **place, title=each.rule))
     return "".join(lines)
 
 
-def github_command(level: str, message: str, **place: str | int) -> str:
+def github_command(kind: str, message: str, **place: str | int) -> str:
     """Return one workflow command: `error`, `warning` or `notice`; what is empty or 0 of its place is left out."""
     properties = ",".join(f"{key}={_escaped(str(value), ',:')}" for key, value in place.items() if value)
-    return f"::{level} {properties}::{_escaped(message)}\n"
+    return f"::{kind} {properties}::{_escaped(message)}\n"
 
 
 def _escaped(text: str, more: str = "") -> str:

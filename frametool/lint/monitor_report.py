@@ -14,12 +14,12 @@ from frametool.grammar.edges import stop
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.grammar.edges import Report
 
 
 def monitor(
-    files: Sequence[Recording], *ends: str, normalize: bool = False, clashing: Report = stop
+    files: Sequence[FrameFile], *ends: str, normalize: bool = False, clashing: Report = stop
 ) -> list[dict[str, Any]]:
     """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
 

@@ -7,24 +7,23 @@ from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import locate_many, parse_documents
-from frametool.errors import BadTopology, FormatError, Unanswered, first_of, shown
+from frametool.errors import BadTopology, Finding, FormatError, Unanswered, first_of, shown
 from frametool.formats.detect import by_sign
 from frametool.formats.load import refuse_unknown_joints
 from frametool.formats.trees.tree_reader import read_edges, without_slashes
+from frametool.frames import topology
 from frametool.frames.edge_log import EdgeLog
-from frametool.frames.path import cycle_message
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.names import may_be_on_earth
-from frametool.grammar.readers import Misfit, Note, Reading
-from frametool.lint.findings import Finding
+from frametool.grammar.readers import Misfit, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.documents.document import Document
     from frametool.documents.source import Source
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge
@@ -53,17 +52,21 @@ class Statement(NamedTuple):
         """Make a finding for this place."""
         return Finding(rule, message, self.source, self.line, self.column)
 
+    def broken(self, error: BadTopology, places: str = "") -> Finding:
+        """Make the finding of edges that make no tree."""
+        return self.finding(error.rule, error.message + places)
 
-def read_all(recording: Recording, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
+
+def read_all(recording: FrameFile, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
     """Read everything that can be read of a file, and report what cannot."""
     if not recording.holds_samples:
         return _read_tree(recording.source, find, normalize=normalize)
     return _read_recording(recording, find, normalize=normalize)
 
 
-def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Iterator[Statement]:
+def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
     def report(error: FormatError) -> None:
-        find(Finding(error.rule or "syntax", error.message, error.source, error.line, error.column))
+        find(error.finding)
 
     in_documents = []
     try:
@@ -85,7 +88,7 @@ def _read_recording(recording: Recording, find: Find, *, normalize: bool) -> Ite
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
     for note in recording.tally.told():
-        find(Finding(note.rule, note.message, recording.name, note.line, 1))
+        find(note._replace(source=recording.name, column=1))
 
 
 def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
@@ -103,20 +106,20 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     try:
         documents = parse_documents(source.text, source.name)
     except FormatError as error:
-        find(Finding("syntax", error.message, source.name, error.line, error.column))
+        find(error.finding)
         return
-    notes: list[Note] = []
+    notes: list[Finding] = []
     edges = []
     for document in documents:
         edges += _read_document(document, Reading(source, normalize=normalize), notes)
     places = locate_many(source.text, [*(note.path for note in notes), *(edge.path for edge, _ in edges)])
     for note, (line, column) in zip(notes, places, strict=False):
-        find(Finding(note.rule, note.message, source.name, line, column))
+        find(note._replace(source=source.name, line=line, column=column))
     for (edge, w_first), place in zip(edges, places[len(notes) :], strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, reading: Reading, notes: list[Note]) -> list[tuple[Edge, bool]]:
+def _read_document(document: Document, reading: Reading, notes: list[Finding]) -> list[tuple[Edge, bool]]:
     """Return the edges of a document, each with whether it looks written w first; collect its notes."""
     reading.faults = []
     edges = []
@@ -128,7 +131,7 @@ def _read_document(document: Document, reading: Reading, notes: list[Note]) -> l
                 edges.append((edge._replace(path=(document.index, *edge.path)), w_first))
     except Misfit as misfit:
         reading.faults.append(misfit)
-    faults = (Note(misfit.rule or "syntax", str(misfit), misfit.path) for misfit in reading.faults)
+    faults = (Finding(misfit.rule or "syntax", str(misfit), path=misfit.path) for misfit in reading.faults)
     notes += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
     return edges
 
@@ -144,7 +147,7 @@ FLICKER = 3  # so many changes of parent are no picking up and putting down
 
 
 def check(
-    files: Sequence[Recording], *, normalize: bool = False, tree: FrameTree | None = None, others: bool = False
+    files: Sequence[FrameFile], *, normalize: bool = False, tree: FrameTree | None = None, others: bool = False
 ) -> list[Finding]:
     """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines.
 
@@ -189,7 +192,7 @@ def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
 
 
 def _statements(
-    files: Sequence[Recording], findings: list[Finding], *, normalize: bool, others: bool
+    files: Sequence[FrameFile], findings: list[Finding], *, normalize: bool, others: bool
 ) -> Iterator[Statement]:
     """Read all files; what cannot be read is found at once."""
     for file in files:
@@ -249,7 +252,7 @@ def lint(everything: Iterable[Statement]) -> Iterator[Finding]:
     children: dict[str, Child] = {}
     for number, seen in enumerate(everything):
         if seen.parent == seen.child:
-            yield seen.finding("self", f"frame {shown(seen.child)} is its own parent")
+            yield seen.broken(topology.own_parent(seen.child))
             continue
         child = children.get(seen.child)
         if child is None:
@@ -270,16 +273,15 @@ def _child(child: Child) -> Iterator[Finding]:
     moves = len(child.stamps) > 1
     if child.stands is not None and moves:
         moving = next(each for each in (first, child.newest) if each.stamp_ns is not None)
-        yield moving.finding("static-and-moving", f"{frame} moves, but stands still in {_at(child.stands)}")
+        told = f" moves, but stands still in {_at(child.stands)}"
+        yield moving.broken(topology.static_and_moving(first.child, told))
     elif moves:
         yield from _moving(child, frame)
         yield from _steps(child)
     elif other := child.other_parent:
-        parents = f"{shown(first.parent)} ({_at(first)}) and {shown(other.parent)} ({_at(other)})"
-        yield other.finding("two-parents", f"{frame} has two parents: {parents}")
+        yield other.broken(topology.two_parents(first.child, first.parent, other.parent, (_at(first), _at(other))))
     elif other := child.other_pose:
-        message = f"{frame} has two different poses in {shown(first.parent)}: {_at(first)} and {_at(other)}"
-        yield other.finding("two-poses", message)
+        yield other.broken(topology.two_poses(first.child, first.parent), f": {_at(first)} and {_at(other)}")
 
 
 def _moving(child: Child, frame: str) -> Iterator[Finding]:
@@ -335,7 +337,7 @@ def _cycles(children: dict[str, Child]) -> Iterator[Finding]:
             circle = line[line.index(frame) :]
             _, last = max(children[each].since for each in circle)
             at = circle.index(last.parent)
-            yield last.finding("cycle", cycle_message([*circle[at:], *circle[:at], last.parent]))
+            yield last.broken(topology.cycle([*circle[at:], *circle[:at], last.parent]))
 
 
 def _roots(children: dict[str, Child]) -> Iterator[Finding]:

@@ -299,8 +299,8 @@ class _Pair:
         if seen is None and self.start not in (None, frame):
             found = found._replace(note=f"not connected to {shown(self.start)} in both")
         one, other = self.a.tree.track(frame), self.b.tree.track(frame)
-        if one is not None and other is not None and one.standing != other.standing:
-            note = "stands still in A, moves in B" if one.standing else "moves in A, stands still in B"
+        if one is not None and other is not None and one.is_static != other.is_static:
+            note = "stands still in A, moves in B" if one.is_static else "moves in A, stands still in B"
             yield Difference("motion", frame, parent_a, parent_b, note=note)
         if blind:
             yield found._replace(kind="no-data", note=f"no data in {blind} at {format_stamp(self.a.at_ns or 0)}")
@@ -316,7 +316,7 @@ class _Pair:
     def _other_samples(self, frame: str) -> Difference | None:
         """Compare all samples of a frame that moves in both."""
         one, other = self.a.tree.track(frame), self.b.tree.track(frame)
-        if one is None or other is None or one.standing or other.standing:
+        if one is None or other is None or one.is_static or other.is_static:
             return None
         found = Difference("samples", frame, one.parent, other.parent)
         if one.count != other.count or one.span != other.span:
@@ -360,7 +360,7 @@ def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
     if at_ns is not None or not (a.moves or b.moves):
         return
     newest = [
-        f"{name} {format_stamp(max(track.last_ns for track in tree.tracks() if not track.standing))}"
+        f"{name} {format_stamp(max(track.last_ns for track in tree.tracks() if not track.is_static))}"
         for name, tree in (("A", a), ("B", b))
         if tree.moves
     ]

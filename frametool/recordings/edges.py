@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import BadTopology, bare, first_of, shown
-from frametool.frames.path import to_root
+from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid
-from frametool.geometry.representations import EARTH_FRAMES
 from frametool.grammar.edges import Names, Topics
 
 if TYPE_CHECKING:
@@ -122,10 +121,9 @@ class RecordedEdges:
         """
         found = EdgePlan([], [], [])
         for track in tree.tracks():
-            child, parent = (self._called(frame) for frame in (track.child, track.parent))
-            if not track.standing:
-                what = f"frame {shown(child)} moves in {bare(tree.name)}; --with adds what stands still"
-                raise BadTopology(what, rule="static-and-moving")
+            child, parent = (resolve_name(frame, self._topic_of) for frame in (track.child, track.parent))
+            if not track.is_static:
+                raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds what stands still")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
             if known is None:
                 found.added.append(edge)
@@ -138,24 +136,16 @@ class RecordedEdges:
         self._refuse_cycles(found.added)
         return found
 
-    def _called(self, frame: str) -> str:
-        """Return the name of a frame here: the Earth's has two."""
-        if frame in EARTH_FRAMES and frame not in self._topic_of:
-            return next((other for other in EARTH_FRAMES if other in self._topic_of), frame)
-        return frame
-
     def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
         """Raise BadTopology for a frame with another parent, one that moves, and one that comes from two robots."""
-        topics, child = first_of([*known.topics], MOST_NAMED), shown(edge.child)
-        here = f"({self.name}, {topics})"
+        here = f"{self.name}, {first_of([*known.topics], MOST_NAMED)}"
         if edge.child in self._conflicts:
             raise BadTopology(self._conflicts[edge.child], source=self.name, rule="two-topics")
         if others := [parent for parent in known.parents if parent != edge.parent]:
-            parents = f"{shown(others[0])} {here} and {shown(edge.parent)} ({bare(tree)})"
-            raise BadTopology(f"frame {child} has two parents: {parents}", rule="two-parents")
+            raise two_parents(edge.child, others[0], edge.parent, (here, bare(tree)))
         if known.moves:
-            both = f"it moves in {shown(edge.parent)} {here} and stands still in it ({bare(tree)})"
-            raise BadTopology(f"frame {child}: {both}", rule="static-and-moving")
+            both = f"it moves in {shown(edge.parent)} ({here}) and stands still in it ({bare(tree)})"
+            raise static_and_moving(edge.child, f": {both}")
 
     def _others(self, edges: list[AddedEdge], tree: str) -> str:
         """Say which edges have other values, and how far off they are."""

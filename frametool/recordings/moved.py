@@ -54,7 +54,7 @@ class MessageMover:
         normalize: take any non-zero quaternion
         """
         frames.require(into)
-        self.frames, self.into, self.types, self.normalize = frames, frames.called(into), types, normalize
+        self.frames, self.into, self.types, self.normalize = frames, frames.resolve_name(into), types, normalize
         self.tally = Tally()  # of names with a leading slash, and rough quaternions
         self.header: MessageHeader | None = None  # of the message that was moved last, as far as it was read
         self._last: tuple[MessageHeader, Rigid] | None = None

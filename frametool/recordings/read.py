@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
 from frametool.errors import FileProblem, FormatError, FrametoolError, shown
-from frametool.grammar.readers import Note
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -101,7 +100,7 @@ class McapFile:
         self.head, summary = reader.get_header(), reader.get_summary()
         said = summary.statistics if summary else None
         if said is None:
-            tally.note(Note("odd", NO_SUMMARY.format(path.name), ()), 1)
+            tally.note(NO_SUMMARY.format(path.name), 1)
         self.said = said
         chunks = summary.chunk_indexes if summary else []
         self._chunks = chunks if said and said.chunk_count == len(chunks) else []

@@ -201,17 +201,17 @@ class RecordingFile:
 def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     """Yield the bytes of a recording of a tree: what stands in one message, what moves in one for each stamp."""
     form, asked = style.form, style.recording
-    topics = {"tf_static": any(track.standing for track in tree.tracks()), "tf": tree.moves}
+    topics = {"tf_static": any(track.is_static for track in tree.tracks()), "tf": tree.moves}
     if asked.topic and all(topics.values()):
         raise ValueInvalid(f"the tree stands and moves, on two topics; {asked.topic} names one")
     if not any(topics.values()):
         raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
     file = RecordingFile(form, asked.folder)
-    moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.standing), key=itemgetter(0))
+    moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.is_static), key=itemgetter(0))
     messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))
     first = next(messages, None)
     if topics["tf_static"]:
-        still = [row for track in tree.tracks() if track.standing for row in _samples(track, style)]
+        still = [row for track in tree.tracks() if track.is_static for row in _samples(track, style)]
         data = serialised(KINDS["tf_static"], form, *_columns(still))
         file.write(file.channel(KINDS["tf_static"], asked.topic), 0 if first is None else first[0], data)
     if first is not None:

@@ -328,8 +328,7 @@ def _read(
     else:
         found = messages.read_transform(transform, reading)
     parent, child, position, rotation, stamp_ns = found
-    for note in reading.notes:
-        options.tally.note(note, line)
+    options.tally.note_all(reading.notes, line)
     return parent, child, (*position, *rotation), stamp_ns
 
 

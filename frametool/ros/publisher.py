@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from frametool.documents.chunks import lines
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.frames.topology import own_parent
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge
 from frametool.grammar.pose import Pose
@@ -113,8 +114,7 @@ def read_edge(
         options.report(FormatError(str(error), source=file.name, line=line, column=column, rule=error.rule))
         return None
     parent, child = reading.bare(pose.parent or ""), reading.bare(pose.name or "")
-    for note in reading.notes:
-        options.tally.note(note, line)
+    options.tally.note_all(reading.notes, line)
     return Edge(parent, child, pose.components, line=line)
 
 
@@ -202,5 +202,6 @@ def _pose(
     if not parent or not child:
         raise ValueInvalid(f"an empty frame name; {CALL} takes {_FORMS}")
     if parent == child:
-        raise ValueInvalid(f"frame {shown(child)} is its own parent", rule="self")
+        error = own_parent(child)
+        raise ValueInvalid(error.message, rule=error.rule)
     return Pose((x, y, z), turned, child, parent)

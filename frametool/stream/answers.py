@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
     from frametool.documents.document import Document
     from frametool.documents.source import Source
+    from frametool.errors import Finding
     from frametool.geometry.types import Components, Rigid
-    from frametool.grammar.readers import Note, Path
+    from frametool.grammar.readers import Path
     from frametool.stream.record import Record
     from frametool.stream.request import Memory, Request
     from frametool.stream.row_layout import Target
@@ -64,7 +65,7 @@ class Answer(NamedTuple):
 
 
 def read_entries(
-    document: Document, request: Request, source: Source, note: Callable[[list[Note]], object]
+    document: Document, request: Request, source: Source, note: Callable[[list[Finding]], object]
 ) -> list[Entry]:
     """Read the records of a document, and what each is asked; what is odd about them goes to `note`.
 
@@ -81,7 +82,7 @@ def read_entries(
         raise error from misfit
 
 
-def _at_its_number(note: Note, records: Sequence[Record]) -> Note:
+def _at_its_number(note: Finding, records: Sequence[Record]) -> Finding:
     """Return a note about a rotation with the place of the first of its numbers, as blocks of rows have it."""
     found = (each for each in records if note.rule == "rounded" and each.path == note.path and each.shape.notation)
     record = next(found, None)

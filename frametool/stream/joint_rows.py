@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, first_of, listing, shown, warn
+from frametool.formats.robots.joints import find_joint_columns
 from frametool.formats.robots.model import TURNING, JointValue
-from frametool.formats.robots.posture import find_joint_columns
 from frametool.formats.table import FORMATS
 from frametool.geometry import floats
 from frametool.grammar.edges import Tally
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import BinaryIO
 
+    from frametool.formats.robots.joints import JointState
     from frametool.formats.robots.model import Joint, Robot
-    from frametool.formats.robots.posture import Posture
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.stream.faults import BadRows
 
@@ -48,7 +48,7 @@ class JointRows:
     needs_time = False
     adds = False
 
-    def __init__(self, robot: Robot, posture: Posture, base: str, tip: str) -> None:
+    def __init__(self, robot: Robot, posture: JointState, base: str, tip: str) -> None:
         """Find the way; the joints that the posture was told of need no column.
 
         Raises UnknownFrame, NotConnected; BadAnswer for joints that were told to move over time.

@@ -33,7 +33,7 @@ from frametool.stream.row_layout import POSE
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
     from frametool.stream.record import Record
@@ -100,7 +100,7 @@ class MeasuredRow(NamedTuple):
 
 
 def read_measurements(
-    files: Sequence[Recording], *, degrees: bool = False, normalize: bool = False
+    files: Sequence[FrameFile], *, degrees: bool = False, normalize: bool = False
 ) -> list[Measurement]:
     """Read the measurements of files, in their order.
 
@@ -154,7 +154,7 @@ def parted(place: str) -> tuple[str, int, int]:
     return file, int(line), int(column)
 
 
-def _reader(file: Recording) -> Callable[[Recording, Request], Iterator[MeasuredRow]]:
+def _reader(file: FrameFile) -> Callable[[FrameFile, Request], Iterator[MeasuredRow]]:
     is_rows = file.form == "jsonl" and not re.search(WRAPPED, file.head())
     if is_rows or not file.holds_samples:
         return _of_documents
@@ -182,7 +182,7 @@ def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str
     return ""
 
 
-def _of_edges(file: Recording, request: Request) -> Iterator[MeasuredRow]:
+def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the edges of a file that holds a tree; what recordings say again at one time they say once."""
     edges = [edge for edge in file.edges(normalize=request.normalize) if edge.parent is not None]
     lines = lines_of([EdgePlace(file, edge) for edge in edges])
@@ -193,7 +193,7 @@ def _of_edges(file: Recording, request: Request) -> Iterator[MeasuredRow]:
         yield MeasuredRow(made, line, edge.stamp_ns)
 
 
-def _of_table(file: Recording, request: Request) -> Iterator[MeasuredRow]:
+def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
     from frametool.geometry.representations import notation
     from frametool.stream.row_poses import TablePoses, results_of
@@ -231,7 +231,7 @@ def _read_flag(cell: str | None) -> bool:
     return cell == "true"
 
 
-def _of_documents(file: Recording, request: Request) -> Iterator[MeasuredRow]:
+def _of_documents(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the measurements of a YAML or JSON text."""
     source = file.source
     reading = Reading(source, normalize=request.normalize)

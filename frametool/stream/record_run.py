@@ -17,7 +17,7 @@ from frametool.errors import (
     shown,
     warn,
 )
-from frametool.formats.load import Recording, Rules, load_sources
+from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
 from frametool.recordings.copy import RecordCopy
@@ -30,8 +30,9 @@ from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misuse
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.errors import Finding
     from frametool.frames.lookups import Frames
-    from frametool.grammar.edges import EdgeColumns, Remark, Report, Samples
+    from frametool.grammar.edges import EdgeColumns, Report, Samples
     from frametool.recordings.copy import Advance, Change
     from frametool.recordings.edges import AddedEdge
     from frametool.recordings.read import Channel, RecordingReader
@@ -229,7 +230,7 @@ class RecordRun:
         if not (self.added or self.rewritten or self.moved or self.request.window):
             yield f"nothing is changed: {_count(sum(self.copy.counts.values()))} copied"
 
-    def remarks(self) -> Iterator[Remark]:
+    def remarks(self) -> Iterator[Finding]:
         """Yield what was odd in messages that were moved."""
         if self.mover is not None:
             yield from self.mover.tally.told()
@@ -245,7 +246,7 @@ class RecordRun:
         return ROWS_SKIPPED
 
 
-class TransformsOfCopy(Recording):
+class TransformsOfCopy(FrameFile):
     """The transforms of a recording as its copy has them: some of its edges are replaced, and others are added."""
 
     def __init__(

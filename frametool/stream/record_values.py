@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, Verbatim
-from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.errors import Finding, FormatError, ValueInvalid, shown, warn
 from frametool.formats.table import has_no_text, is_recording
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
-from frametool.grammar.readers import Misfit, NotARotation, Note, Reading, tell
+from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
 from frametool.stream.record import placed, value_at
@@ -121,7 +121,7 @@ class Teller:
         self.most = most
         self.counts: Counter[str] = Counter()
 
-    def tell(self, source: Source, notes: Sequence[Note]) -> None:
+    def tell(self, source: Source, notes: Sequence[Finding]) -> None:
         """Warn of notes that are new."""
         new = []
         for note in notes:
@@ -208,7 +208,7 @@ def _answer(
         from frametool.geometry.uncertainty import WIDE_RULE, doubt
 
         if not own.counts[WIDE_RULE] and (told := doubt(found.parts[-SIX_BY_SIX:])):
-            own.tell(source, [Note(WIDE_RULE, told, record.path)])
+            own.tell(source, [Finding(WIDE_RULE, told, path=record.path)])
     return found
 
 

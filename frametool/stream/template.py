@@ -28,7 +28,8 @@ from frametool.stream.text_parts import Const, IfLocked, In, Out, Word
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.grammar.readers import Note, Path
+    from frametool.errors import Finding
+    from frametool.grammar.readers import Path
     from frametool.stream.answers import Answer, Entry
     from frametool.stream.record import Record
     from frametool.stream.request import Request
@@ -84,7 +85,7 @@ class Template:
         root: Node,
         edits: Sequence[Edit],
         request: Request,
-        notes: Sequence[Note] = (),
+        notes: Sequence[Finding] = (),
         *,
         json: bool,
     ) -> None:
@@ -357,7 +358,7 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
     line: of the record's first character, from 1.  Raises FormatError with the place.
     """
     here = Source(source, text)
-    notes: list[Note] = []
+    notes: list[Finding] = []
     try:
         documents = _json_documents(here) if json else parse_documents(text, source)
         entries = [entry for document in documents for entry in read_entries(document, request, here, notes.extend)]

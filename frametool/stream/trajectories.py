@@ -14,7 +14,7 @@ import numpy as np
 from frametool.documents.source import InputFile
 from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
 from frametool.formats.detect import by_sign, detect
-from frametool.formats.load import Recording, Rules, load_sources, opened_together
+from frametool.formats.load import FrameFile, Rules, load_sources, opened_together
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import FURTHEST_NS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
@@ -194,7 +194,7 @@ def _stamps_of_poses(path: str, form: str, *, is_tree: bool) -> list[int]:
 
 def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, form: str | None = None) -> list[int]:
     """Return the stamps of all that moves in a tree or recording, or of what came by a topic."""
-    recording = Recording(path, form=form, topics=topics)
+    recording = FrameFile(path, form=form, topics=topics)
     found = {edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None}
     if not found:
         raise FormatError(f"no stamps in it ({FORMATS[recording.form].summary})", source=path)
@@ -272,14 +272,14 @@ def _of_tree(
     *, normalize: bool = False,
 ) -> Trajectory:
     """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
-    recording = Recording(name, None if file is None else file.stream, form or None, topics, answers)
+    recording = FrameFile(name, None if file is None else file.stream, form or None, topics, answers)
     tree = cast("TransformBuffer", load_sources(opened_together([recording]), Rules(normalize=normalize)))
     if topics and not recording.topics.counts:
         raise ValueInvalid(f"{recording.name}: {FORMATS[recording.form].summary}: nothing in it came by a topic")
     if not tree.moves:
         raise ValueInvalid(f"{recording.name}: nothing moves in it")
     if not frames:
-        moving = [(track.parent, track.child) for track in tree.tracks() if not track.standing]
+        moving = [(track.parent, track.child) for track in tree.tracks() if not track.is_static]
         if len(moving) != 1:
             some = ", ".join(f"{parent}:{child}" for parent, child in moving[:3])
             what = f"{len(moving)} frames move ({some} ..)"

@@ -66,8 +66,8 @@ class Ground(NamedTuple):
 
 def _ground(tree: Frames) -> Ground | None:
     """Return the ground below the first frame on the Earth, one that stands still if there is any."""
-    earth = tree.called(EARTH)
-    there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.standing)
+    earth = tree.resolve_name(EARTH)
+    there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.is_static)
     if not there or earth not in tree.roots:
         return None
     x, y, z = there[0].components[:3]
@@ -79,7 +79,7 @@ def _ground(tree: Frames) -> Ground | None:
 
 def _on(tree: Frames, ground: Ground) -> Frames:
     """Return the same frames with the ground in the place of the Earth's frame."""
-    earth, found = tree.called(EARTH), TransformBuffer(name=tree.name)
+    earth, found = tree.resolve_name(EARTH), TransformBuffer(name=tree.name)
     for frame in tree.frames:
         found.add_root(ground.name if frame == earth else frame)
     for track in tree.tracks():
@@ -118,12 +118,12 @@ class FrameScene:
         """
         if not tree.frames:
             raise ValueInvalid("no frames in it: nothing to draw")
-        self.ground = None if tree.called(EARTH) in (fixed, below, target, source) else ground or _ground(tree)
+        self.ground = None if tree.resolve_name(EARTH) in (fixed, below, target, source) else ground or _ground(tree)
         if self.ground is not None:  # the Earth's centre is no place to look from
             tree = _on(tree, self.ground)
         tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
-        self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.standing}
+        self.tracks: dict[str, MovingTrack] = {track.child: track for track in tree.tracks() if not track.is_static}
         self.names, self._roots = _in_order(tree, {name: _first_parent(tree, name) for name in tree.frames})
         self.target, self.source, self.path_only = target, source, path_only
         if self.tracks and at_ns is None:
@@ -223,7 +223,7 @@ def can_be_drawn(point: Sequence[float]) -> bool:
 
 def _first_parent(tree: Frames, name: str) -> str | None:
     track = tree.track(name)
-    if track is None or track.standing:
+    if track is None or track.is_static:
         return tree.parent(name)
     return track.parent_near(track.first_ns)
 

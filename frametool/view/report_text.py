@@ -201,8 +201,8 @@ def form_entry(name: str) -> dict[str, Any]:
         "suffixes": row.suffixes,
         "reads": row.reads,
         "writes": row.writes,
-        "states": row.states or None,
-        "asks": tuple(map(option_of, row.asks)),
+        "states": row.conventions or None,
+        "asks": tuple(map(option_of, row.required_options)),
     }
 
 
@@ -264,6 +264,6 @@ def _labelled(label: str, texts: Iterable[str | None]) -> str:
 
 def _signs(name: str) -> Iterator[str]:
     """Name the signs of a form; of a pattern only the kind, if it is more than words."""
-    for kind, what in FORMATS[name].signs:
+    for kind, what in FORMATS[name].magic:
         words = what if isinstance(what, str) and re.fullmatch(r"[\w./*|-]+", what) else ""
         yield f"{kind} {words}".rstrip()

@@ -86,7 +86,7 @@ def _label(track: Track, style: Style, covariance: Components | None) -> tuple[s
         from frametool.view.pose_text import largest_sigmas
 
         label = *label, largest_sigmas(covariance)
-    if track.standing:
+    if track.is_static:
         return label
     from frametool.frames.edge_log import motion
 

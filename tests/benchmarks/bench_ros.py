@@ -173,9 +173,9 @@ def load(path: str) -> int:
 
 def samples(path: str) -> int:
     """Read one record after the other and keep none."""
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
 
-    return sum(1 for _ in Recording(path).edges())
+    return sum(1 for _ in FrameFile(path).edges())
 
 
 def safe(path: str) -> int:

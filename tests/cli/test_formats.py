@@ -36,7 +36,7 @@ def test_the_list_names_every_form_with_what_the_table_says_of_it(run: Run) -> N
     assert (found.status, found.err) == (0, "")
     for name, row in FORMATS.items():
         assert f"\n  {name} " in found.out
-        assert all(words(said) in words(found.out) for said in (row.summary, row.states))
+        assert all(words(said) in words(found.out) for said in (row.summary, row.conventions))
     assert max(map(len, found.out.splitlines())) <= 80
 
 
@@ -50,7 +50,7 @@ def test_json_has_one_object_a_line_with_all_the_table_says(run: Run) -> None:
     assert [entry["name"] for entry in entries] == list(FORMATS)
     for entry in entries:
         row = FORMATS[entry.pop("name")]._asdict()
-        row["asks"] = map(option_of, row["asks"])
+        row |= {"states": row["conventions"], "asks": list(map(option_of, row["required_options"]))}
         assert entry == {key: (row[key] or None) if isinstance(row[key], str) else list(row[key]) for key in LISTED}
 
 
@@ -82,8 +82,8 @@ def test_an_example_stands_where_the_reader_or_the_writer_shows_one(run: Run, na
 
 
 def test_a_row_with_all_there_can_be_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    row = Format("a toy", (".toy",), ("tree",), "frametool.formats.trees.tree_reader", states="toy<-child, feet",
-                 asks=("direction", "frames"), signs=(("xml", "toy"), ("line", r"toy \d")))  # fmt: skip
+    row = Format("a toy", (".toy",), ("tree",), "frametool.formats.trees.tree_reader", conventions="toy<-child, feet",
+                 required_options=("direction", "frames"), magic=(("xml", "toy"), ("line", r"toy \d")))  # fmt: skip
     monkeypatch.setitem(FORMATS, "a-toy-with-a-long-name", row)
     told = words(run("formats", "a-toy-with-a-long-name").out)
     assert "means toy<-child, feet" in told
@@ -94,7 +94,7 @@ def test_a_row_with_all_there_can_be_is_told(run: Run, monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_what_a_form_asks_for_is_an_answer_that_options_give(name: str) -> None:
-    assert set(FORMATS[name].asks) <= set(Answers._fields)
+    assert set(FORMATS[name].required_options) <= set(Answers._fields)
 
 
 def test_a_misspelled_form_is_told_with_the_nearest(run: Run) -> None:

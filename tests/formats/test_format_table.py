@@ -43,7 +43,7 @@ ROW = {
     "reader": "toy",
     "writes": ("tree",),
     "writer": "toy",
-    "signs": (("line", r"toy \d"),),
+    "magic": (("line", r"toy \d"),),
 }
 TEXT = "toy 1\nodom < map 1.0 2.0 3.0\nbase < odom 0.5 0.0 0.0\n"
 
@@ -213,18 +213,18 @@ def test_the_suffix_counts_more_than_the_look_and_less_than_a_sign() -> None:
 
 def test_two_forms_that_fit_are_both_named(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("toy", "other"):
-        monkeypatch.setitem(FORMATS, name, Format("a toy", reads=("tree",), signs=(("yaml key", "toys"),)))
+        monkeypatch.setitem(FORMATS, name, Format("a toy", reads=("tree",), magic=(("yaml key", "toys"),)))
     with pytest.raises(FormatError, match=r"^a\.yaml: fits toy and other; give --in toy\|other$"):
         by_sign(b"toys:\n", "tree", name="a.yaml")
 
 
 def test_a_form_that_is_read_goes_before_one_that_is_only_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("yaml key", "toys"),)))
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), magic=(("yaml key", "toys"),)))
     assert by_sign(b"distortion_model: x\ntoys:\n", "tree") == "toy"
 
 
 def test_the_root_element_of_xml_is_a_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), signs=(("xml", "toys"),)))
+    monkeypatch.setitem(FORMATS, "toy", Format("a toy", reads=("tree",), magic=(("xml", "toys"),)))
     for head in (b"<toys name='a'>", b"<?xml version='1.0'?>\n<!-- <b> -->\n<!DOCTYPE x>\n<toys>", b"\xef\xbb\xbf<toys/>"):
         assert by_sign(head, "tree") == "toy"
     assert by_sign(b"<toy>", "tree") is None

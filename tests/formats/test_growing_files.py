@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from frametool.formats.load import Recording
+from frametool.formats.load import FrameFile
 from frametool.formats.rows.ply import read_head
 from frametool.grammar.edges import Answers
 
@@ -74,7 +74,7 @@ def test_a_file_costs_work_in_proportion_to_its_size(name: str, tmp_path: Path) 
         faults: list[Any] = []
 
         def read(path: Path = path, faults: list[Any] = faults) -> None:
-            assert list(Recording(path, form=form, answers=answers).edges(faults.append, tell=False)) or faults
+            assert list(FrameFile(path, form=form, answers=answers).edges(faults.append, tell=False)) or faults
 
         work.append(calls_of(read))
         assert len(faults) == (count if "bad" in name else 0)

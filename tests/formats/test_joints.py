@@ -9,8 +9,8 @@ import pytest
 
 import frametool
 from frametool.errors import BadAnswer, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
+from frametool.formats.robots.joints import JointState, find_joint_columns, stamp_column
 from frametool.formats.robots.model import Joint, JointValue, Mimic, motion, read_value
-from frametool.formats.robots.posture import Posture, find_joint_columns, stamp_column
 from frametool.grammar.edges import Answers, Options, Tally, Topics
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def test_only_its_own_name_overrides_a_mimic(arm: Callable[..., Any]) -> None:
 def test_a_quarter_turn_in_degrees_is_exact_and_so_is_what_follows_it() -> None:
     joints = [TURN, Joint("other", "continuous", (0.0, 0.0, 1.0), mimic=Mimic("pan", -2.0))]
     options = Options(Tally(), Topics(), answers=Answers(joints={"pan": "90deg"}))
-    found = Posture(joints, options, lambda *_: FormatError(""))
+    found = JointState(joints, options, lambda *_: FormatError(""))
     assert motion(joints[0], found.still["pan"])[5:] == (0.7071067811865476, 0.7071067811865476)
     assert motion(joints[1], found.still["other"])[5:] == (-1.0, 0.0)
 
@@ -322,7 +322,7 @@ def test_joints_that_move_together_are_interpolated_at_each_others_times() -> No
     series = {"a": {0: 0.0, 10: 1.0}, "b": {5: 0.5, 15: 2.5}}
     options = Options(Tally(), Topics())
     joints = [Joint(name, "prismatic") for name in "ab"]
-    found = Posture(joints, options, lambda *_: FormatError(""))
+    found = JointState(joints, options, lambda *_: FormatError(""))
     for name, values in series.items():
         found.still.pop(name)
         found.moving[name] = {at: JointValue(value) for at, value in values.items()}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.load import Recording
+from frametool.formats.load import FrameFile
 from frametool.grammar.result import Style
 from frametool.ros.echo_format import message_text, stamp
 
@@ -87,10 +87,10 @@ FORMS = {
 }
 
 
-def recording(tmp_path: Path, text: str | bytes) -> Recording:
+def recording(tmp_path: Path, text: str | bytes) -> FrameFile:
     path = tmp_path / "tf.txt"
     path.write_bytes(text.encode() if isinstance(text, str) else text)
-    return Recording(path)
+    return FrameFile(path)
 
 
 def read(tmp_path: Path, text: str | bytes) -> list[Edge]:
@@ -233,7 +233,7 @@ def write_bag(path: Path, kind: str, recorded: list[tuple[str, Any]] = RECORDED)
 def test_a_bag_gives_its_samples_with_the_time_they_were_received(kind: str, file: str, tmp_path: Path) -> None:
     path = tmp_path / ("run.bag" if kind == "ros1" else "run")
     write_bag(path, kind)
-    samples = list(Recording(next(path.glob(file)) if file else path).edges())
+    samples = list(FrameFile(next(path.glob(file)) if file else path).edges())
     assert [each[:4] for each in samples if each.stamp_ns is not None] == EXPECTED
     assert [each[:3] for each in samples if each.stamp_ns is None] == [EXPECTED[0][:3]]
     assert {each.received_ns for each in samples} == {EPOCH + 7, EPOCH + 8}
@@ -244,7 +244,7 @@ def test_without_the_extra_a_bag_says_what_to_install(tmp_path: Path, monkeypatc
     path.write_bytes(b"#ROSBAG V2.0\n")
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(FileProblem, match=r"frametool\[bag\]"):
-        list(Recording(path).edges())
+        list(FrameFile(path).edges())
 
 
 def spoilt(data: bytes, draw: random.Random) -> bytes:
@@ -264,7 +264,7 @@ def check_spoilt_bags(kind: str, folder: Path, count: int) -> None:
     for _ in range(count):
         file.write_bytes(spoilt(data, draw))
         try:
-            found = list(Recording(draw.choice((path, file))).edges())
+            found = list(FrameFile(draw.choice((path, file))).edges())
         except FrametoolError:
             continue
         assert len(found) == 3
@@ -285,7 +285,7 @@ def test_a_bag_spoilt_in_many_ways_never_comes_out_short_in_silence(kind: str, t
 
 def refusal(path: Path) -> str:
     with pytest.raises(FrametoolError) as caught:
-        list(Recording(path).edges())
+        list(FrameFile(path).edges())
     return str(caught.value).removeprefix(f"{path}: ")
 
 
@@ -297,7 +297,7 @@ def test_an_empty_bag_is_named_as_that(name: str, tmp_path: Path) -> None:
 
 def test_a_comment_that_begins_as_a_bag_does_makes_no_bag(tmp_path: Path) -> None:
     (tmp_path / "t.yaml").write_text("#ROSBAG V2.0\nframes: {a: {b: {xyz: [1, 2, 3]}}}\n")
-    assert len(list(Recording(tmp_path / "t.yaml").edges())) == 2
+    assert len(list(FrameFile(tmp_path / "t.yaml").edges())) == 2
 
 
 def test_a_folder_of_bags_without_metadata_names_the_files_in_it(tmp_path: Path) -> None:
@@ -355,7 +355,7 @@ def test_foxglove_stamps_may_be_dates(date: str, tmp_path: Path) -> None:
     seconds = EXPECTED[0][3] // 10**9
     line = json.loads(foxglove(*EXPECTED[0])) | {"timestamp": date}
     (tmp_path / "f.jsonl").write_text(json.dumps(line) + "\n")
-    (edge,) = Recording(tmp_path / "f.jsonl").edges()
+    (edge,) = FrameFile(tmp_path / "f.jsonl").edges()
     assert edge.stamp_ns == seconds * 10**9 + DATES[date]
 
 
@@ -371,7 +371,7 @@ def test_an_mcap_file_without_a_summary_says_what_cannot_be_known(tmp_path: Path
     data = file.read_bytes()
     file.write_bytes(data[:-28] + bytes(20) + data[-8:])
     with pytest.warns(FrametoolWarning, match=r"run\.mcap has no summary: whether it lost messages cannot be known"):
-        assert len(list(Recording(file).edges())) == 2
+        assert len(list(FrameFile(file).edges())) == 2
 
 
 # --- topics --------------------------------------------------------------------------------------------------------
@@ -408,7 +408,7 @@ def test_two_robots_that_use_the_same_names_are_not_merged(kind: str, tmp_path: 
     ("topics", "count"), [(["/tf"], 1), (["tf", "tf_static"], 2), (["/robot1/tf"], 1), (["/robot1/tf", "/tf_static"], 2)]
 )
 def test_the_topics_chosen_are_read(kind: str, topics: list[str], count: int, tmp_path: Path) -> None:
-    edges = list(Recording(two_robots(kind, tmp_path), topics=topics).edges())
+    edges = list(FrameFile(two_robots(kind, tmp_path), topics=topics).edges())
     assert {edge.topic.strip("/") for edge in edges} == {topic.strip("/") for topic in topics}
     assert len(edges) == count
 
@@ -416,17 +416,17 @@ def test_the_topics_chosen_are_read(kind: str, topics: list[str], count: int, tm
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_topic_that_is_not_there_is_told_with_those_that_are(kind: str, tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"no transforms on odom; topics: /robot1/tf, /tf, /tf_static"):
-        list(Recording(two_robots(kind, tmp_path), topics=["/odom"]).edges())
+        list(FrameFile(two_robots(kind, tmp_path), topics=["/odom"]).edges())
 
 
 def test_robots_with_names_of_their_own_are_one_tree(tmp_path: Path) -> None:
     apart = [("/tf", EXPECTED[0]), ("/robot1/tf", EXPECTED[1])]
-    assert len(list(Recording(two_robots("rosbridge", tmp_path, apart)).edges())) == 2
+    assert len(list(FrameFile(two_robots("rosbridge", tmp_path, apart)).edges())) == 2
 
 
 def test_what_names_no_topics_is_read_whatever_is_chosen(tmp_path: Path) -> None:
     (tmp_path / "tf.txt").write_text(GOOD)
-    assert len(list(Recording(tmp_path / "tf.txt", topics=["/odom"]).edges())) == 1
+    assert len(list(FrameFile(tmp_path / "tf.txt", topics=["/odom"]).edges())) == 1
 
 
 def test_the_command_line_chooses_and_lists_topics(run: Callable[..., Any], tmp_path: Path) -> None:

@@ -736,7 +736,7 @@ def test_every_command_that_takes_a_tree_takes_a_trajectory(command: tuple[str, 
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if is_trajectory(name)])
 def test_a_trajectory_states_what_its_numbers_mean(name: str) -> None:
-    assert "<-" in FORMATS[name].states
+    assert "<-" in FORMATS[name].conventions
 
 
 # --- lines that somebody damaged ---

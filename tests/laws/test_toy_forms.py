@@ -59,13 +59,13 @@ def create(columns, count, style):
 ROWS = r"""
 FORMATS["bars"] = FORMATS["tum"]._replace(
     summary="a toy trajectory", suffixes=(".bars",), writer="toy_bars", delimiter="|",
-    columns=("qw", "qx", "qy", "qz", "x", "y", "z", "stamp"), signs=(("line", r"[-\d.]+(?:\|[-\d.]+){7}$"),),
+    columns=("qw", "qx", "qy", "qz", "x", "y", "z", "stamp"), magic=(("line", r"[-\d.]+(?:\|[-\d.]+){7}$"),),
 )
 """
 ARRAYS = r"""
 FORMATS["doubles"] = FORMATS["npy"]._replace(
     summary="a toy array", suffixes=(".doubles",), reader="toy_doubles", writer="toy_doubles",
-    signs=(("magic", rb"DBL1\n"),),
+    magic=(("magic", rb"DBL1\n"),),
 )
 """
 WALK = [("0.5", (1.0, 2.0, 3.0)), ("1.5", (2.0, 2.0, 3.0)), ("2.500000001", (3.0, 0.0, 3.0))]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool.errors import FormatError
-from frametool.formats.load import Recording, load
+from frametool.formats.load import FrameFile, load
 from frametool.grammar.edges import Tally
 from frametool.grammar.result import Style
 from frametool.ros.echo_format import message_text
@@ -86,7 +86,7 @@ def taken(path: Path, lines: Sequence[str], *topics: str, normalize: bool = Fals
     """Read lines; return the edges, the errors, and what was odd."""
     path.write_text("".join(line + "\n" for line in lines))
     errors: list[FormatError] = []
-    recording = Recording(path, form="jsonl", topics=topics)
+    recording = FrameFile(path, form="jsonl", topics=topics)
     edges = list(recording.edges(errors.append, tell=False, normalize=normalize))
     said = [(error.line, error.message, error.rule) for error in errors]
     return edges, said, list(recording.tally.told()), recording.topics.counts
@@ -138,7 +138,7 @@ def test_text_and_json_normalize_alike(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text(block + "---\n")
     (tmp_path / "a.jsonl").write_text(PLAIN[1] + "\n")
     for normalize, rough in (False, 1), (True, 0):
-        text, lines = (Recording(tmp_path / name) for name in ("a.txt", "a.jsonl"))
+        text, lines = (FrameFile(tmp_path / name) for name in ("a.txt", "a.jsonl"))
         (one,), (other,) = (list(each.edges(tell=False, normalize=normalize)) for each in (text, lines))
         assert one.components == other.components
         assert len(text.tally.rough) == len(lines.tally.rough) == rough
@@ -196,7 +196,7 @@ def test_echoed_stretches_give_what_the_full_reader_gives(ros: str, odd: int | N
     plain, full = tmp_path / "plain.txt", tmp_path / "full.txt"
     plain.write_text("".join(messages))
     full.write_text("".join(messages).replace("stamp:", "stamp: #"))
-    edges = [list(Recording(path).edges(tell=False)) for path in (plain, full)]
+    edges = [list(FrameFile(path).edges(tell=False)) for path in (plain, full)]
     assert edges[0] == edges[1]
     assert len(edges[0]) == 200
     found = plain_columns("".join(messages), 1, Tally())

@@ -68,15 +68,15 @@ def section() -> Section:
 
 def _text(name: str, row: Format) -> str:
     facts = {
-        "What its numbers mean": [inline(row.states)],
+        "What its numbers mean": [inline(row.conventions)],
         "Suffixes": [f"`{each}`" for each in row.suffixes],
         "Files called": [f"`{each}`" for each in row.names],
         "Columns": [f"`{' '.join(row.columns)}`" if row.columns else ""],
         "Read as": [READ.get(each, each) for each in row.reads],
         "Written from": [WRITTEN.get(each, each) for each in row.writes],
         "How it is recognised": _signs(name, row),
-        "What it leaves open": [f"`{option_of(each)}`: {ASKED.get(each, 'what it does not say')}" for each in row.asks],
-        "What is lost": [inline(row.loses)],
+        "What it leaves open": [f"`{option_of(each)}`: {ASKED.get(each, 'what it does not say')}" for each in row.required_options],
+        "What is lost": [inline(row.not_stored)],
     }
     parts = [bullets(_fact(title, texts) for title, texts in facts.items() if any(texts))]
     if lines := example_of(name):
@@ -93,7 +93,7 @@ def _fact(title: str, texts: list[str]) -> str:
 
 def _signs(name: str, row: Format) -> list[str]:
     """Return how a form is known, in words, each once."""
-    found = [_sign(kind, what) for kind, what in row.signs] + ["its suffix, where its content says nothing"] * bool(row.suffixes)
+    found = [_sign(kind, what) for kind, what in row.magic] + ["its suffix, where its content says nothing"] * bool(row.suffixes)
     only_told = [f"`--in {name}` only"] if row.reads else []
     return list(dict.fromkeys(found)) or only_told
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, ValueInvalid
-from frametool.formats.load import Recording
+from frametool.formats.load import FrameFile
 from frametool.geometry import placed
 from frametool.geometry.transform import Transform
 from frametool.stream.measurements import read_measurements, without
@@ -34,7 +34,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
 
     def read_text(text: str | bytes, name: str = "m.yaml") -> list[Measurement]:
         (tmp_path / name).write_bytes(text.encode() if isinstance(text, str) else text)
-        return read_measurements([Recording(name)])
+        return read_measurements([FrameFile(name)])
 
     return read_text
 

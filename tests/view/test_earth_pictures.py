@@ -41,7 +41,7 @@ def test_what_is_drawn_lies_on_the_ground_at_the_first_frame_that_stands(tree: A
 
 @pytest.mark.parametrize("name", ["ecef", "earth"])
 def test_who_asks_for_the_centre_sees_it(tree: Any, name: str) -> None:
-    assert {*FrameScene(tree, fixed=tree.called(name)).poses()} == {"car", "map", "mast", tree.called(name)}
+    assert {*FrameScene(tree, fixed=tree.resolve_name(name)).poses()} == {"car", "map", "mast", tree.resolve_name(name)}
 
 
 def test_a_frame_called_earth_that_is_a_floor_is_drawn(tmp_path: Path) -> None:

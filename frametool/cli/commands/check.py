@@ -15,15 +15,15 @@ from frametool.cli.output import in_colour
 from frametool.cli.sink import writing
 from frametool.cli.stderr import folded, say
 from frametool.cli.trees import opened, refuse_two_readers, state
-from frametool.errors import FormatError, listing, warn
-from frametool.lint.findings import RULES, WRITERS, Finding
+from frametool.errors import Finding, FormatError, listing, warn
+from frametool.lint.findings import RULES, WRITERS, level
 from frametool.lint.rules import check
 from frametool.lint.tree_diff import Tolerance, parse_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
@@ -89,8 +89,8 @@ def command(
     with writing(None) as write:
         is_seen = form == "text" and sys.stdout.isatty()
         write(in_colour("\n".join(map(folded, text.split("\n"))), TROUBLE) if is_seen else text)
-    counts = {level: sum(each.level == level for each in findings) for level in ("error", "warning", "note")}
-    summary = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
+    counts = {kind: sum(level(each) == kind for each in findings) for kind in ("error", "warning", "note")}
+    summary = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items() if count)
     if summary:
         say(summary)
     return FAILED if counts["error"] or (strict and counts["warning"]) else 0
@@ -110,7 +110,7 @@ def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:
     return findings
 
 
-def _read(files: Sequence[Recording], *, normalize: bool) -> list[Measurement]:
+def _read(files: Sequence[FrameFile], *, normalize: bool) -> list[Measurement]:
     from frametool.stream.measurements import read_measurements
 
     rows = read_measurements(files, normalize=normalize)
@@ -119,7 +119,7 @@ def _read(files: Sequence[Recording], *, normalize: bool) -> list[Measurement]:
 
 
 def _with_loops(
-    files: Sequence[Recording], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
+    files: Sequence[FrameFile], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
 ) -> list[Finding]:
     """Return what is wrong with files, then the measurements that do not agree; tell what was not compared."""
     if not rows:

@@ -13,7 +13,7 @@ from frametool.cli.recording import copied_as, folder_of, refuse_input
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
 from frametool.errors import FileProblem, FormatError, shown, warn
-from frametool.formats.load import Recording, Rules
+from frametool.formats.load import FrameFile, Rules
 from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.grammar.edges import Tally
 from frametool.grammar.readers import is_slashed
@@ -133,7 +133,7 @@ def _bare(frame: str) -> str:
 
 def _form_of(path: str) -> str:
     """Return the form of a recording; raises FormatError for what is none."""
-    source = Recording(path)
+    source = FrameFile(path)
     source.close()
     if not is_recording(source.form):
         hint = "frametool tree, convert and lookup write one: -o NEW.mcap"

@@ -56,7 +56,7 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
         output = Output("tree", format_name=form or "static2", deg=deg, **options)
         tree = load_tree(arguments[0])
         if tree.moves:
-            raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.standing))
+            raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.is_static))
         output.tree(tree)
         return
     output = Output("tree", format_name=form, deg=deg, **options)

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.document import format_error, locate_many, parse_documents
 from frametool.documents.json import looks_like_json
 from frametool.errors import FormatError, Unanswered, ValueInvalid, did_you_mean, listing, shown
+from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link
-from frametool.formats.robots.posture import Posture
 from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import euler, floats, rigid
 from frametool.geometry.rigid import IDENTITY
@@ -347,7 +347,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         raise Unanswered(message, source=file.name, line=rows[0].line, column=1)
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
     links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
-    posture = Posture.of(links, options)
+    posture = JointState.of(links, options)
     options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
     yield from posture.edges(links)
 

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.source import InputFile, Source
 from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
+from frametool.formats.robots.joints import JointSample, JointState
 from frametool.formats.robots.model import Joint, JointValue, Link
-from frametool.formats.robots.posture import Posture, Setting
 from frametool.geometry import floats, matrix, quaternion, rigid, vectors
 from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
 from frametool.geometry.quaternion import cross, unit_vector
@@ -195,10 +195,10 @@ SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others hav
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a model, its joints as options say, else at their references."""
     model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
-    yield from Posture.of(model.links.values(), options).edges(model.links.values())
+    yield from JointState.of(model.links.values(), options).edges(model.links.values())
 
 
-def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
+def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
     """Yield what a key of the model says of its joints: `state` is its name, or its number from 0.
 
     Raises FormatError.
@@ -218,7 +218,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[Setting]:
 
     for joint, size in zip(joints, sizes, strict=True):
         value = _value(joint, list(islice(numbers, size)), refuse)
-        yield Setting(joint.name, value, None, refuse, Source(xml.name, ""))
+        yield JointSample(joint.name, value, None, refuse, Source(xml.name, ""))
 
 
 def _key(root: XmlNode, state: str) -> XmlNode:

@@ -8,7 +8,7 @@ joint has no single one.  A link is where its joints put it; `Robot.fk` and the 
     robot = frametool.load_robot("arm.urdf")
     base_from_tip = robot.fk("base", "tip", {"shoulder": 0.3, "elbow": numpy.linspace(0.0, 1.0, 1000)})
 
-Knows neither files of values nor times: those are `frametool.formats.robots.posture`.
+Knows neither files of values nor times: those are `frametool.formats.robots.joints`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeAlias
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
 from frametool.errors import FormatError, UnknownFrame, ValueInvalid, alternatives, listing, shown
-from frametool.frames.path import edges_between
+from frametool.frames.topology import edges_between
 from frametool.geometry import floats, quaternion, rigid
 from frametool.geometry.floats import DEGREE, RADIAN
 from frametool.geometry.representations import notation
@@ -60,8 +60,7 @@ def read_quaternion(
         rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
     except ValueInvalid as error:
         raise xml.error(element, str(error), attribute, rule=error.rule) from None
-    for note in reading.notes:
-        options.tally.note(note, element.line)
+    options.tally.note_all(reading.notes, element.line)
     return rotation
 
 

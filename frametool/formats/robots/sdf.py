@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
+from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
-from frametool.formats.robots.posture import Posture
+from frametool.frames.topology import Groups
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.rigid import IDENTITY
@@ -480,7 +481,7 @@ class _SdfTree:
         self.joints = joints = SdfJoints(frames)
         self.options = frames.options
         self.hung: dict[str, SdfJoint] = {}  # link -> the joint that it hangs on
-        self._above: dict[str, str] = {}  # link -> one on which it hangs, if not at once
+        self._groups = Groups()  # of links that hang together
         for joint in joints.all:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
@@ -496,23 +497,13 @@ class _SdfTree:
         link = joint.hanging.name
         if link in self.hung:
             where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
-        elif self._root_of(joint.outer.name) == link:
+        elif not self._groups.join(link, joint.outer.name):
             where = f"{shown(joint.outer.name)} hangs on {shown(link)} already"
         else:
             self.hung[link] = joint
-            self._above[link] = joint.outer.name
             return
         message = f"joint {shown(joint.frame.local)} closes a loop and is left out: {where}"
         self.options.tally.note_each(message, joint.frame.holder.line)
-
-    def _root_of(self, link: str) -> str:
-        """Return the link at the top of those on which a link hangs; the way is cut short for the next time."""
-        way = []
-        while link in self._above:
-            way.append(link)
-            link = self._above[link]
-        self._above.update(dict.fromkeys(way, link))
-        return link
 
     def edges(self) -> Iterator[Edge]:
         """Yield every edge, and the root where nothing stands in a world."""
@@ -549,7 +540,7 @@ class _SdfTree:
             scope = scope.scope
         return scope
 
-    def _posture(self) -> Posture:
+    def _posture(self) -> JointState:
         """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""
         places = {motion.name: joint.frame.holder for joint in self.joints.all for motion in joint.motions}
         moving = [motion for joint in self.joints.all for motion in joint.motions]
@@ -557,4 +548,4 @@ class _SdfTree:
         answers = self.options.answers
         values = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
         options = self.options._replace(answers=answers._replace(joints=values))
-        return Posture(moving, options, lambda joint, problem: places[joint.name].error(problem), fixed=fixed)
+        return JointState(moving, options, lambda joint, problem: places[joint.name].error(problem), fixed=fixed)

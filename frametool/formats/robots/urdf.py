@@ -18,18 +18,18 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.documents.source import UTF16, InputFile, paused_collector
 from frametool.documents.xml import Element, XmlFile, XmlNode, read_nodes
 from frametool.errors import BadTopology, FormatError, ValueInvalid, alternatives, bare, first_of, listing, shown
-from frametool.formats.load import Recording, refuse_unknown_joints
+from frametool.formats.load import FrameFile, refuse_unknown_joints
+from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, Robot, read_quaternion
-from frametool.formats.robots.posture import Posture
 from frametool.formats.table import FORMATS
 from frametool.formats.unsupported import UNSUPPORTED
+from frametool.frames.topology import two_parents
 from frametool.geometry import euler, floats
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.pose import Pose
-from frametool.grammar.readers import Note
 from frametool.grammar.result import Style, rotation_numbers
 from frametool.grammar.rotation_spelling import TURN, agreeing_rotation
 
@@ -57,7 +57,7 @@ class RobotDescription(NamedTuple):
 
     frames: dict[str, int]
     links: list[Link]
-    posture: Posture
+    posture: JointState
 
     @property
     def roots(self) -> list[str]:
@@ -91,13 +91,13 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
         except FormatError as error:
             options.report(error)
     links = list(reader.connected())
-    robot = RobotDescription(reader.frames, links, Posture.of(links, options, reader.fail))
+    robot = RobotDescription(reader.frames, links, JointState.of(links, options, reader.fail))
     if not robot.frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
         named = first_of(roots, 5, quote=bare)
         message = f"{len(roots)} roots, where a robot has one: {named}; they are not connected"
-        options.tally.note(Note("several-roots", message, ()), robot.frames[roots[1]])
+        options.tally.note(message, robot.frames[roots[1]], "several-roots")
     return robot
 
 
@@ -173,7 +173,7 @@ class _Reader:
         rotation = IDENTITY[3:]
         if beyond := next((each for each in (roll, pitch, yaw) if abs(each) > TURN), None):
             message = f"rpy {beyond:g} is more than a full turn in radians; degrees?"
-            self.options.tally.note(Note("degrees", message, ()), element.line)
+            self.options.tally.note(message, element.line, "degrees")
         if roll or pitch or yaw:
             rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
         if "quat_xyzw" not in element.attributes:
@@ -208,7 +208,7 @@ class _Reader:
         (lower,), (upper,) = self.xml.numbers(element, "lower", 1, "0"), self.xml.numbers(element, "upper", 1, "0")
         if lower > upper:
             message = f"joint {shown(name)} has the limits {lower:g} .. {upper:g}, which nothing fits"
-            self.options.tally.note(Note("limit", message, ()), element.line)
+            self.options.tally.note(message, element.line, "limit")
         return lower, upper
 
     def _mimic(self, name: str, kind: str, element: Element) -> Mimic:
@@ -235,10 +235,10 @@ def load_robot(path: str | PathLike[str]) -> Robot:
 
     Raises FormatError and BadTopology with file, line and column; FileProblem.
     """
-    return robot_of(Recording(path))[0]
+    return robot_of(FrameFile(path))[0]
 
 
-def robot_of(file: Recording) -> tuple[Robot, Posture]:
+def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
     """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
     if file.form != "urdf":
         file.close()
@@ -253,9 +253,8 @@ def robot_of(file: Recording) -> tuple[Robot, Posture]:
     links: dict[str, Link] = {}
     for link in described.links:
         if link.child in links:
-            parents = f"{shown(links[link.child].parent)} and {shown(link.parent)}"
-            problem = f"frame {shown(link.child)} has two parents: {parents}"
-            raise BadTopology(problem, source=file.name, line=link.line, rule="two-parents")
+            error = two_parents(link.child, str(links[link.child].parent), str(link.parent))
+            raise BadTopology(error.message, source=file.name, line=link.line, rule=error.rule)
         links[link.child] = link
     file.tell()
     return Robot(file.name, links, described.frames), described.posture
@@ -269,7 +268,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
     Raises ValueInvalid for what URDF cannot hold: frames that move, several roots, names that XML has no letters for.
     """
-    if moving := [track.child for track in tree.tracks() if not track.standing]:
+    if moving := [track.child for track in tree.tracks() if not track.is_static]:
         raise ValueInvalid(f"URDF holds no motion, but these frames move: {listing(moving)}; give --at TIME")
     if len(tree.roots) > 1:
         message = "URDF holds one tree, and this has the roots"

@@ -18,7 +18,6 @@ from frametool.formats.rows.pose_rows import Numbers, RowForm
 from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import FORMATS, Poses
 from frametool.geometry import euler, floats
-from frametool.grammar.readers import Note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -66,7 +65,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
     if unknown:
         counts = listing((f"{count} {tag}" for tag, count in unknown.items()), 3)
         message = f"lines of unknown tags left out: {counts}{did_you_mean(next(iter(unknown)), kinds)}"
-        options.tally.note(Note("odd", message, ()), first)
+        options.tally.note(message, first)
     if only_others > 0:
         as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
         found = "vertices in it; leave --edges out" if edges else as_poses

@@ -14,7 +14,7 @@ from frametool.documents.document import parse_documents
 from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, rows_of_matrix
 from frametool.formats.rows.trajectory import Written, position_and_turn, samples
 from frametool.formats.table import FORMATS
-from frametool.grammar.readers import Misfit, Note, as_mapping, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,7 +43,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
         try:
             whole = as_mapping(document.value, "transforms.json")
             if "applied_transform" in whole:
-                options.tally.note(Note("odd", "the poses contain its applied_transform; it is not taken out", ()), 1)
+                options.tally.note("the poses contain its applied_transform; it is not taken out", 1)
             for index, entry in enumerate(whole.get("frames") or ()):
                 yield within(("frames", index), _pose, entry, index)._replace(
                     path=(document.index, "frames", index, MATRIX)

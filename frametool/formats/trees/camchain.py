@@ -29,7 +29,7 @@ from frametool.grammar.readers import Reading, as_mapping
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.formats.load import Recording
+    from frametool.formats.load import FrameFile
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge, Options
@@ -39,7 +39,7 @@ NAME = "camchain"
 _CAMERA = r"cam([0-9]+)"
 
 
-def read(file: Recording, options: Options) -> Iterator[Edge]:
+def read(file: FrameFile, options: Options) -> Iterator[Edge]:
     """Yield an edge a camera, and check what is stated twice; of a sensor.yaml the one edge."""
     frames = options.answers.frames
     naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames, blocks=frames[1:])

@@ -43,7 +43,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     """
     from html import escape
 
-    if moving := [track.child for track in tree.tracks() if not track.standing]:
+    if moving := [track.child for track in tree.tracks() if not track.is_static]:
         raise ValueInvalid(f"{publisher.moving_frames(moving[:10])}; give --at TIME")
     lines = publisher.write_tree(tree, style.in_form("static2")).splitlines()
     if unsafe := next((line for line in lines if "$(" in line), None):

@@ -18,6 +18,8 @@ from frametool.documents.yaml import TAG
 from frametool.errors import bare, first_of, shown
 from frametool.formats.table import DIRECTIONS
 from frametool.formats.trees.tree_reader import Unclear, dotted, named
+from frametool.frames import topology
+from frametool.frames.lookups import FrameTree
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
@@ -304,74 +306,52 @@ class Stated(NamedTuple):
         return self.target if self.child == self.source else self.source
 
 
-class _Forest:
-    """Edges by their child, so far."""
-
-    def __init__(self) -> None:
-        self.edges: dict[str, Edge] = {}
-        self._groups: dict[str, str] = {}  # a frame -> one nearer to that which stands for its tree
-
-    def hang(self, each: Stated) -> None:
-        """Add a pose that connects two trees."""
-        child, parent = each.child, each.parent
-        if child in self.edges and parent not in self.edges:
-            child, parent = parent, child
-        self._make_root(child)
-        self._groups[self._group(child)] = self._group(parent)
-        pose = each.components if child == each.source else rigid.inverse(*each.components)
-        self.edges[child] = Edge(parent, child, pose, path=each.path)
-
-    def _make_root(self, frame: str) -> None:
-        """Turn the edges above a frame round, so that all of its tree hangs under it."""
-        way = []
-        while frame in self.edges:
-            way.append(self.edges.pop(frame))
-            frame = way[-1].parent or ""
-        for edge in way:
-            parent = edge.parent or ""
-            self.edges[parent] = Edge(edge.child, parent, rigid.inverse(*edge.components), path=edge.path)
-
-    def _group(self, frame: str) -> str:
-        """Return the frame that stands for all of a tree."""
-        while (above := self._groups.get(frame, frame)) != frame:
-            self._groups[frame] = self._groups.get(above, above)  # so that the way is half as long the next time
-            frame = above
-        return frame
-
-    def lookup(self, target: str, source: str) -> Rigid | None:
-        """Return target_from_source; None where the two are not connected.
-
-        Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
-        """
-        if self._group(target) != self._group(source):
-            return None
-        ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
-        tops = [target, source]
-        at = 0
-        while (top := tops[at]) not in ways[1 - at]:
-            if edge := self.edges.get(top):
-                tops[at] = edge.parent or ""
-                ways[at][tops[at]] = rigid.compose(*edge.components, *ways[at][top])
-            at = 1 - at
-        return rigid.compose(*rigid.inverse(*ways[0][top]), *ways[1][top])
-
-
 def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
     """Return the edges, and check what is stated again against them.
 
     Raises Misfit where a pose and its inverse contradict each other; other contradictions are noted.
     """
-    forest = _Forest()
+    tree = FrameTree()
     first: dict[frozenset[str], Stated] = {}
     for each in sorted(statements, key=lambda each: (each.chained, each.child != each.source)):
         if each.target == each.source:
-            raise Misfit(f"frame {shown(each.source)} is its own parent", each.path, key=True)
-        if (known := forest.lookup(each.target, each.source)) is None:
-            first[frozenset((each.target, each.source))] = each
-            forest.hang(each)
+            error = topology.own_parent(each.source)
+            raise Misfit(error.message, each.path, key=True)
+        ends = frozenset((each.target, each.source))
+        if tree.groups.of(each.target) != tree.groups.of(each.source):
+            first[ends] = each
+            _hang(tree, each)
         else:
-            _compare(known, each, first.get(frozenset((each.target, each.source))), reading)
-    return list(forest.edges.values())
+            _compare(_lookup(tree, each.target, each.source), each, first.get(ends), reading)
+    return [
+        Edge(track.parent, track.child, track.components, path=first[frozenset((track.parent, track.child))].path)
+        for track in tree.tracks()
+    ]
+
+
+def _hang(tree: FrameTree, each: Stated) -> None:
+    """Add a pose that connects two trees."""
+    child, parent = each.child, each.parent
+    if tree.track(child) is not None and tree.track(parent) is None:
+        child, parent = parent, child
+    tree.reroot(child)
+    tree.add_components(parent, child, each.components if child == each.source else rigid.inverse(*each.components))
+
+
+def _lookup(tree: FrameTree, target: str, source: str) -> Rigid:
+    """Return target_from_source of two frames that hang together.
+
+    Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
+    """
+    ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
+    tops = [target, source]
+    at = 0
+    while (top := tops[at]) not in ways[1 - at]:
+        if track := tree.track(top):
+            tops[at] = track.parent
+            ways[at][track.parent] = rigid.compose(*track.components, *ways[at][top])
+        at = 1 - at
+    return rigid.compose(*rigid.inverse(*ways[0][top]), *ways[1][top])
 
 
 def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading) -> None:

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
-from frametool.errors import FormatError, Unanswered, ValueInvalid, bare, shown
+from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import Misfit, Note, Reading, as_mapping, kind, read_numbers, tell, within
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
 from frametool.ros import messages
 
@@ -46,7 +46,7 @@ CHILDREN = frozenset(("children", *TIMED))
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a text of trees, then tell of what was odd in it."""
     source = file.source
-    notes: list[Note] = []
+    notes: list[Finding] = []
     for document in parse_documents(source.text, source.name):
         reading = Reading(source, normalize=options.normalize)
         try:
@@ -301,13 +301,18 @@ def stamp_of(entry: dict[str, Any]) -> int | None:
     keys = [key for key in ("stamp", "stamp_ns") if key in entry]
     if len(keys) > 1:
         raise Misfit("stamp and stamp_ns in one entry; keep one", ("stamp",), key=True)
-    text = entry[keys[0]]
+    return read_time(entry, keys[0])
+
+
+def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
+    """Read the time under a key: seconds, or nanoseconds where the key ends so; raises Misfit."""
+    text = entry[key]
     if type(text) is not str:
-        raise Misfit(f"expected a time, found {kind(text)}", (keys[0],))
+        raise Misfit(f"expected a time{example}, found {kind(text)}", (key,))
     try:
-        return parse_stamp(text if keys[0] == "stamp" else f"{text}ns")
+        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
     except ValueInvalid as error:
-        raise Misfit(str(error), (keys[0],)) from None
+        raise Misfit(str(error), (key,)) from None
 
 
 def named(fields: dict[str, Any], key: str) -> str:
@@ -392,7 +397,7 @@ def _placed(faults: Sequence[Misfit], source: Source, document: int) -> Iterator
             yield FormatError(str(fault), source=source.name, line=line, column=column, rule=fault.rule)
 
 
-def remember(notes: Iterable[Note], lines: Iterable[int], tally: Tally) -> None:
+def remember(notes: Iterable[Finding], lines: Iterable[int], tally: Tally) -> None:
     """Keep what was odd, each with its line and behind the keys that lead to it."""
     for note, line in zip(notes, lines, strict=True):
         tally.note_each(f"{bare(dotted(note.path))}: {note.message}" if note.path else note.message, line, note.rule)

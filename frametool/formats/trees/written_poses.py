@@ -26,7 +26,7 @@ MOST_DECIMALS = 17
 def standing_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
     """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
     tracks = list(tree.tracks())
-    if moving := next((track.child for track in tracks if not track.standing), None):
+    if moving := next((track.child for track in tracks if not track.is_static), None):
         raise ValueInvalid(f"{form} holds no frames that move, and {shown(moving)} does; give --at TIME")
     if not tracks:
         raise ValueInvalid(f"{form} holds poses, and there is none: {listing(tree.frames)}")

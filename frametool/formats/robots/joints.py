@@ -34,10 +34,11 @@ from frametool.errors import (
 from frametool.formats.detect import detect
 from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.table import FORMATS, readers
+from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge, Options, Tally
-from frametool.grammar.readers import Misfit, Note, as_mapping, kind
+from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import joint_state, messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.text.csv_line import split_line
@@ -57,7 +58,7 @@ HALF_TURN = 3.141592653589793
 STATES = "--joint NAME=VALUE"
 
 
-class Posture:
+class JointState:
     """The values of all joints of a robot: one each, or samples over time.
 
     still, moving: values by name, or by name and stamp
@@ -89,7 +90,7 @@ class Posture:
         options.tally.about = options.tally.about or self._about()
 
     @classmethod
-    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> Posture:
+    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> JointState:
         """Find out where the joints of some links stand."""
         joints = (joint for link in links for joint in link.joints)
         fail = fail or (lambda joint, problem: FormatError(problem, line=joint.line))
@@ -150,7 +151,7 @@ class Posture:
             for name, values in found.items():
                 self._take(name, values)
 
-    def _read(self, setting: Setting) -> Value:
+    def _read(self, setting: JointSample) -> Value:
         normalize = self._options.normalize
         try:
             return read_value(self.joints[setting.joint], setting.value, setting.source, normalize=normalize)
@@ -235,11 +236,11 @@ class Posture:
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
                 beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]
                 if beyond:
-                    tally.note(Note("limit", _about_limits(joint, beyond, len(values)), ()), joint.line)
+                    tally.note(_about_limits(joint, beyond, len(values)), joint.line, "limit")
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
             if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
-                tally.note(Note("odd", f"{far}; poses between go the shorter way", ()), joint.line)
+                tally.note(f"{far}; poses between go the shorter way", joint.line)
 
     def _about(self) -> str:
         """Say how many joints stand where nobody said."""
@@ -348,7 +349,7 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
 DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
 
 
-class Setting(NamedTuple):
+class JointSample(NamedTuple):
     """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place."""
 
     joint: str
@@ -370,7 +371,7 @@ class JointFile:
         self.tally = Tally()
         self.file = InputFile(self.path)
 
-    def settings(self) -> Iterator[Setting]:
+    def settings(self) -> Iterator[JointSample]:
         """Yield what it says, in order, and close it.
 
         Raises FormatError.
@@ -382,7 +383,7 @@ class JointFile:
         for told in self.tally.told():
             warn(f"{self.file.name}:{told.line}: {told.message}")
 
-    def _settings(self) -> Iterator[Setting]:
+    def _settings(self) -> Iterator[JointSample]:
         head = self.file.head()
         name = self.file.name
         form = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
@@ -400,7 +401,7 @@ class JointFile:
 
     def _messages(
         self, messages: Iterable[Message | FormatError], state_of: Callable[[Any], Any] | None = None
-    ) -> Iterator[Setting]:
+    ) -> Iterator[JointSample]:
         """Yield what documents or rows say; `state_of` makes a JointState of a row."""
         for message in messages:
             if isinstance(message, FormatError):
@@ -410,7 +411,7 @@ class JointFile:
             except Misfit as misfit:
                 raise message.error(misfit) from None
 
-    def _values(self, value: Any, path: Path, message: Message) -> Iterator[Setting]:
+    def _values(self, value: Any, path: Path, message: Message) -> Iterator[JointSample]:
         """Yield the settings of a plain value: a JointState, a map, or a list of either."""
         if type(value) is list:
             for index, each in enumerate(value):
@@ -426,24 +427,24 @@ class JointFile:
                 stamp_ns = joint_state.stamp_of_state(mapping)
                 for joint, position, place in joint_state.positions(mapping):
                     refuse = partial(_refused, message, (*path, *place))
-                    yield Setting(joint, _finite(position, place), stamp_ns, refuse, message.source)
+                    yield JointSample(joint, _finite(position, place), stamp_ns, refuse, message.source)
             except Misfit as misfit:
                 raise misfit.below(*path) from None
 
-    def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[Setting]:
+    def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[JointSample]:
         """Yield what a map says, or the one map in it, as under `joints:`."""
         from frametool.grammar.names import STAMP_KEYS
 
         times = [key for key in STAMP_KEYS if key in mapping and key not in self.joints]
-        stamp_ns = _time(mapping, times[0]) if times else None
+        stamp_ns = read_time(mapping, times[0], " like 12.5") if times else None
         keys = [key for key in mapping if key not in times]
         if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
             path, mapping = (*path, keys[0]), mapping[keys[0]]
             keys = list(mapping)
         for key in keys:
-            yield Setting(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
+            yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
 
-    def _table(self, form: str, head: str) -> Iterator[Setting]:
+    def _table(self, form: str, head: str) -> Iterator[JointSample]:
         """Yield the settings of a table: a column a joint, or what the echo tools write."""
         first = next((line for line in head.split("\n") if line.strip()), "")
         name = self.file.name
@@ -462,7 +463,7 @@ class JointFile:
             return [cell.text for cell in split_line(line)]
         return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(form))]
 
-    def _columns(self, form: str) -> Iterator[Setting]:
+    def _columns(self, form: str) -> Iterator[JointSample]:
         """Yield the settings of a table whose header names joints."""
         rows = line_texts(self.file.stream, self.file.name, self.tally)
         number, header = next(rows, (1, ""))
@@ -499,19 +500,9 @@ class JointFile:
                 for place, joint, degrees, per_metre in columns:
                     at = names[place]
                     value = JointValue(parse_number(cells[place]) / per_metre, degrees)
-                    yield Setting(joint, value, stamp_ns if stamp else None, refuse, source)
+                    yield JointSample(joint, value, stamp_ns if stamp else None, refuse, source)
             except ValueInvalid as error:
                 raise refuse(f"{at}: {error}", ()) from None
-
-
-def _time(mapping: dict[str, Any], key: str) -> int:
-    text = mapping[key]
-    if type(text) is not str:
-        raise Misfit(f"expected a time like 12.5, found {kind(text)}", (key,))
-    try:
-        return parse_stamp(f"{text}ns" if key.endswith("_ns") else text)
-    except ValueInvalid as error:
-        raise Misfit(str(error), (key,)) from None
 
 
 def _finite(value: Any, path: Path) -> JointValue:

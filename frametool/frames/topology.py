@@ -1,0 +1,146 @@
+"""What makes edges a tree: one parent a frame, one pose in it, no circle; and what is said of edges that do not fit.
+
+Each mistake is a BadTopology without a place: a tree raises it, a loader adds where both edges stand, `check` lists it.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from frametool.errors import BadTopology, NotConnected, ValueInvalid, bare, shown
+from frametool.geometry.representations import EARTH_FRAMES
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Container, Sequence
+
+    from frametool.geometry.types import Components, Rigid
+
+MOST_SHOWN = 16  # frames of a cycle
+
+
+class Groups:
+    """Frames in groups that grow together (union-find)."""
+
+    def __init__(self) -> None:
+        """Begin with every frame alone."""
+        self._up: dict[str, str] = {}
+
+    def of(self, frame: str) -> str:
+        """Return the frame that stands for a group; the way to it is halved for the next time."""
+        up = self._up
+        while (above := up.get(frame)) is not None:
+            further = up.get(above)
+            if further is None:
+                return above
+            up[frame] = further
+            frame = further
+        return frame
+
+    def join(self, frame: str, other: str) -> bool:
+        """Put the group of a frame into that of another; return False if they are one already."""
+        frame, other = self.of(frame), self.of(other)
+        if frame != other:
+            self._up[frame] = other
+        return frame != other
+
+
+def resolve_name(frame: str, known: Container[str]) -> str:
+    """Return the name of a frame among those known: the Earth's has two, `ecef` and `earth`."""
+    if frame in EARTH_FRAMES and frame not in known:
+        return next((other for other in EARTH_FRAMES if other in known), frame)
+    return frame
+
+
+def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
+    """List a frame and its ancestors, root last.
+
+    Raises BadTopology when the ancestors run in a circle.
+    """
+    line = [frame]
+    parent = parent_of(frame)
+    seen = {frame}
+    while parent is not None:
+        if parent in seen:
+            raise cycle([*line[line.index(parent) :], parent])
+        line.append(parent)
+        seen.add(parent)
+        parent = parent_of(parent)
+    return line
+
+
+def edges_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> tuple[list[str], list[str]]:
+    """Name the edges between two frames, each by its child.
+
+    Returns (down, up): `down` leads from the common ancestor to the target, `up` from the source to that ancestor;
+    target_from_source = inverse(product of down) @ product of reversed up.
+    Raises NotConnected, naming both roots.
+    """
+    target_line = to_root(target, parent_of)
+    source_line = to_root(source, parent_of)
+    if target_line[-1] != source_line[-1]:
+        raise NotConnected(
+            f"{shown(target)} and {shown(source)} are not connected: "
+            f"{shown(target)} hangs from root {shown(target_line[-1])}, "
+            f"{shown(source)} from root {shown(source_line[-1])}",
+            target=target, source=source, target_root=target_line[-1], source_root=source_line[-1],
+        )  # fmt: skip
+    while target_line and source_line and target_line[-1] == source_line[-1]:
+        target_line.pop()
+        source_line.pop()
+    return target_line[::-1], source_line
+
+
+def check_edge(parent: str, child: str, components: Rigid) -> None:
+    """Refuse an edge that cannot be; raises ValueInvalid, BadTopology."""
+    if not parent or not child:
+        raise ValueInvalid(f"an edge needs two frames, found parent {shown(parent)} and child {shown(child)}")
+    if parent == child:
+        raise own_parent(child)
+    if not all(map(isfinite, components)):
+        numbers = " ".join(map(repr, components))
+        raise ValueInvalid(f"the pose of {shown(child)} in {shown(parent)} is not finite: {numbers}")
+
+
+def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -> None:
+    """Refuse a further parent or pose of a static frame; both are (parent, components)."""
+    if found[0] != known[0]:
+        raise two_parents(child, known[0], found[0])
+    if found[1] != known[1]:
+        raise two_poses(child, found[0])
+
+
+def own_parent(child: str) -> BadTopology:
+    """Make the error for a frame in itself."""
+    return BadTopology(f"frame {shown(child)} is its own parent", rule="self")
+
+
+def two_parents(child: str, one: str, other: str, places: Sequence[str] = ()) -> BadTopology:
+    """Make the error for a static frame with two parents; `places` says where each is named, if that is known."""
+    parents = [f"{shown(parent)} ({at})" for parent, at in zip((one, other), places, strict=False)]
+    named = " and ".join(parents or (shown(one), shown(other)))
+    return BadTopology(f"frame {shown(child)} has two parents: {named}", rule="two-parents")
+
+
+def two_poses(child: str, parent: str) -> BadTopology:
+    """Make the error for a static frame with two poses in its parent."""
+    return BadTopology(f"frame {shown(child)} has two different poses in {shown(parent)}", rule="two-poses")
+
+
+def two_covariances(parent: str, child: str, one: Components | None, other: Components | None) -> BadTopology:
+    """Make the error for an edge that is said to be uncertain in two ways."""
+    what = "two different covariances" if one and other else "a covariance in one place and none in another"
+    return BadTopology(f"frame {shown(child)} in {shown(parent)} has {what}", rule="two-covariances")
+
+
+def static_and_moving(child: str, told: str = " both stands still and moves") -> BadTopology:
+    """Make the error for a frame that moves and does not; `told` says how."""
+    return BadTopology(f"frame {shown(child)}{told}", rule="static-and-moving")
+
+
+def cycle(frames: list[str]) -> BadTopology:
+    """Make the error for a cycle, parents to the left: `a <- b <- a`; of a long one both ends."""
+    if len(frames) > MOST_SHOWN + 1:
+        left_out = f"({len(frames) - MOST_SHOWN} more)"
+        frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]
+    return BadTopology(f"frames form a cycle: {' <- '.join(map(bare, reversed(frames)))}", rule="cycle")
