@@ -115,8 +115,8 @@ MOST_LINES = {  # code lines of a room, and in brackets what is aimed at; no bou
     "view": 2_153,  # 1 800
     "explain": 1_749,  # 1 000
 }
-MOST_IN_ALL = 44_669  # 36 000
-MOST_FILES = 309  # 190
+MOST_IN_ALL = 44_660  # 36 000
+MOST_FILES = 310  # 190
 MOST_OF_PAGES = 1_900
 
 
