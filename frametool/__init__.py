@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frametool.earth import lla_from_utm as lla_from_utm
     from frametool.earth import utm_from_lla as utm_from_lla
     from frametool.errors import FrametoolError as FrametoolError
-    from frametool.explain.api import explain as explain
+    from frametool.derivation import explain as explain
     from frametool.fit.api import align as align
     from frametool.fit.api import compare as compare
     from frametool.fit.api import resample as resample

@@ -127,7 +127,7 @@ class PoseTask:
             argument, is_inverse = without_inverse(argument)
             if is_inverse:
                 return self.written(argument, warned=warned).turned()
-        from frametool.explain.given import given_poses
+        from frametool.stream.written import given_poses
 
         request = self.request()
         try:
@@ -150,7 +150,7 @@ class PoseTask:
 
 def significant(precision: int | None) -> int | None:
     """Return how many significant digits --precision asks for; None for all."""
-    from frametool.explain.sheet import DIGITS
+    from frametool.explain.run import DIGITS
 
     if precision == 0:
         raise click.UsageError("--precision counts significant digits with --explain; give 1 or more, or full")

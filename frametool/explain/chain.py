@@ -14,7 +14,7 @@ from frametool.geometry.rigid import IDENTITY
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.explain.sheet import Sheet
+    from frametool.explain.run import Sheet, Values
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack, Track
     from frametool.geometry.types import Rigid
@@ -122,21 +122,17 @@ def around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | None]:
     return samples[at - 1], samples[at] if at < len(samples) else None
 
 
-def fraction(sheet: Sheet, begin_ns: int, end_ns: int, at_ns: int) -> float:
-    """Add how far between two samples a time is."""
-    sheet.say(
-        f"{format_stamp(at_ns)} s lies between the samples at {format_stamp(begin_ns)} and {format_stamp(end_ns)}; "
-        "past is the time since the first, gap that between the two, in seconds."
-    )
-    values = {"past": (at_ns - begin_ns) / BILLION, "gap": (end_ns - begin_ns) / BILLION}
-    return sheet.step(values, "f", "past/gap")
+def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
+    """Return how long a time is after the first of two samples, and how long the second is, in seconds."""
+    return {"past": (at_ns - begin_ns) / BILLION, "gap": (end_ns - begin_ns) / BILLION}
 
 
 def _interpolated(sheet: Sheet, before: Sample, after: Sample, at_ns: int) -> Rigid:
     """Go from one sample towards the next."""
     (begin, _, a), (end, _, b) = before, after
     sheet.heading("the two samples around the time")
-    f = fraction(sheet, begin, end, at_ns)
+    words = dict(zip(("begin", "end", "at"), map(format_stamp, (begin, end, at_ns)), strict=True))
+    f = sheet.play("fraction", spans(begin, end, at_ns), **words)["f"]
     sheet.say(f"a: {_line(sheet, a)}")
     sheet.say(f"b: {_line(sheet, b)}")
     return between(sheet, a, b, f)

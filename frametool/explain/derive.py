@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain import operations
 from frametool.explain.chain import chain
-from frametool.explain.from_quaternion import blocks_of, run
-from frametool.explain.given import Given, frames_of, given_of
+from frametool.explain.given import Given, frames_of
 from frametool.explain.render import Explanation
-from frametool.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
+from frametool.explain.run import DIGITS, Row, Sheet
 from frametool.frames.lookups import Frames
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
@@ -24,20 +23,15 @@ from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
 from frametool.grammar.result import Result, Style, carries_position, pose_numbers
-from frametool.stream.record_values import documents
-from frametool.stream.request import Operation, Request
-from frametool.stream.row_layout import PARTS, POSE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Quaternion
-    from frametool.stream.record import Record
 
+METRES, RADIANS, DEGREES = "m", "rad", "deg"
 CLOSE = 1e-12  # radians; and of positions, relative to the largest of them or a metre
 TWO_NAMES = "Half a turn has two names: +180 and -180 deg are the same angle; the result shows the other one."
 REPORT = "this is a mistake in frametool, please report it"
@@ -82,15 +76,10 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
     if own.pose.position is not None:
         check_vector(sheet, derived[:3], own.pose.position)
     for each in plan.notations:
-        check_rotation(sheet, each, written(sheet, derived[3:], each, plan), own, plan)
+        degrees, keep_sign = plan.style.in_degrees(each), plan.style.keep_sign
+        found = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=keep_sign)
+        check_rotation(sheet, each, found, own, plan)
     end(sheet, own, plan)
-
-
-def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
-    """Add the way from the quaternion to a notation; return its numbers."""
-    block, style = blocks_of(form).from_quaternion, plan.style
-    numbers: Sequence[float] = run(block, sheet, q, form, degrees=style.in_degrees(form), keep_sign=style.keep_sign)
-    return numbers
 
 
 def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle) -> None:
@@ -167,12 +156,7 @@ def convert(
 
     def write(sheet: Sheet) -> None:
         sheet.reached(pose.position)
-        hub = _hub(sheet, pose, change)
-        if result.pose.position is not None:
-            check_vector(sheet, hub[:3], result.pose.position)
-        for form in plan.notations:
-            check_rotation(sheet, form, written(sheet, hub[3:], form, plan), result, plan)
-        end(sheet, result, plan)
+        end_with_pose(sheet, _hub(sheet, pose, change), result, plan)
 
     title = "identity" if pose.notation is None else pose.notation.spec
     return explained(plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", write)
@@ -200,7 +184,7 @@ def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
     if not poses:
         raise ValueInvalid("compose takes at least one pose")
     own = Result(reduce(pose_algebra.product, [each.pose for each in poses]))
-    names = frames_of(len(poses) + 1, [each.pose for each in poses])
+    names = frames_of([each.pose for each in poses])
     labels = list(itertools.pairwise(names))
 
     def write(sheet: Sheet) -> None:
@@ -217,7 +201,7 @@ def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
 def invert(plan: DerivationStyle, pose: Given) -> Explanation:
     """Derive the inverse of a pose."""
     own = Result(pose_algebra.inverse(pose.pose))
-    target, source = frames_of(2, [pose.pose])
+    target, source = frames_of([pose.pose])
 
     def write(sheet: Sheet) -> None:
         _say_given(sheet, [pose], [(target, source)])
@@ -295,9 +279,6 @@ def lookup(
     return explained(plan, f"{printable(target)}_from_{printable(source)}", write)
 
 
-UNITS = {"point": ("m",), "vector": ("",), "twist": ("m/s", "rad/s"), "wrench": ("N", "Nm")}
-
-
 class ByTree(NamedTuple):
     """Move by a lookup: from `source`, or the frame that the record names, at a time or the latest."""
 
@@ -307,98 +288,82 @@ class ByTree(NamedTuple):
     at_ns: int | None = None
 
 
-def apply(
-    plan: DerivationStyle, way: ByTree | Given, source: Source, *, kind: str = "", degrees: bool = False,
-    normalize: bool = False, counters: bool = True, timeless: bool = False,
-) -> Explanation:  # fmt: skip
-    """Derive where a record is in the target's frame.
+class Moved(NamedTuple):
+    """A record, and what the command makes of it.
 
-    way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
+    kind: point, vector, pose, twist or wrench; target, source: the frame it goes to, and that it is given in
+    mover: target_from_source; numbers: as written, of what is no pose; covariance: 36 numbers, or none
+    result: the numbers of the result, then those of its covariance
+    pose: a pose as it is written
     """
-    request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, frame_is_counter=counters)
-    records = [record for _, found in documents(source, request) for record in found]
-    if len(records) != 1:
-        raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
-    record = records[0]
-    if record.shape.kind not in (POSE, *UNITS) or {*record.shape.covariance} - {36} or len(record.shape.covariance) > 1:
-        what = f"of a {record.shape.kind}" + " with such a covariance" * bool(record.shape.covariance)
-        raise ValueInvalid(f"no derivation {what}; leave --explain out")
-    names = _target_and_source(way, record.parent.text)
-    target, origin = map(printable, names)
-    at_ns = None if timeless else record.stamp_ns
-    if isinstance(way, Given):
-        mover = way.pose.components
-    else:
-        at_ns = None if way.frames.latest(*names) is None else at_ns
-        at_ns = at_ns if way.at_ns is None else way.at_ns
-        mover = way.frames.lookup(*names, at_ns).components
+
+    kind: str
+    target: str
+    source: str
+    mover: Rigid
+    numbers: Sequence[float]
+    covariance: Sequence[float]
+    result: Sequence[float]
+    pose: Given | None = None
+
+    @property
+    def frames(self) -> tuple[str, str]:
+        """Return the names of target and source as they are printed."""
+        return printable(self.target), printable(self.source)
+
+
+LABELS = {  # of the vectors of what is moved, and their units
+    "point": (("point", METRES),),
+    "vector": (("vector", ""),),
+    "twist": (("linear", "m/s"), ("angular", "rad/s")),
+    "wrench": (("force", "N"), ("torque", "Nm")),
+}
+
+
+def apply(plan: DerivationStyle, way: ByTree | Given, record: Moved) -> Explanation:
+    """Derive where a record is in the target's frame; the source and the time of a lookup are those of the record."""
+    target, source = record.frames
 
     def write(sheet: Sheet) -> None:
         if isinstance(way, Given):
-            _say_given(sheet, [way], [(target, origin)])
-            pose = way.components(sheet, target, origin)
+            _say_given(sheet, [way], [record.frames])
+            pose = way.components(sheet, *record.frames)
         else:
-            pose = chain(sheet, way.frames, *names, at_ns)
+            pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
         sheet.reached(pose[:3])
-        check_vector(sheet, pose[:3], mover[:3])
-        if record.shape.kind == POSE:
-            _move_pose(sheet, pose, given_of(record, request), record, mover, names, plan)
+        check_vector(sheet, pose[:3], record.mover[:3])
+        if record.pose is None:
+            _move_vectors(sheet, pose, record)
         else:
-            _move_vectors(sheet, pose, record, mover, (target, origin))
+            _move_pose(sheet, pose, record.pose, record, plan)
 
-    return explained(plan, f"{record.shape.kind} in {target} of a {record.shape.kind} in {origin}", write)
-
-
-def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
-    """Return target and source for a record; where it names its own frame, that must be the source."""
-    if isinstance(way, Given):
-        target, source = way.pose.parent or "a", way.pose.name
-    else:
-        target, source = way.target, way.source
-        if own and own.startswith("/") and own not in way.frames.frames:
-            own = own[1:]
-    if own and source is not None and own != source:
-        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}")
-    if not own and source is None and isinstance(way, ByTree):
-        raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-    return target, own or source or "b"
+    return explained(plan, f"{record.kind} in {target} of a {record.kind} in {source}", write)
 
 
-def _move_vectors(sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frames: tuple[str, str]) -> None:
+def _move_vectors(sheet: Sheet, pose: Rigid, record: Moved) -> None:
     """Move a point, a vector, a twist or a wrench, and end with the result."""
-    shape = record.shape
-    numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]
-    start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
-    own = Operation(moves=True).move(shape, start, covariance, mover)
-    sheet.reached(start)
-    found = operations.MOVERS[shape.kind](sheet, pose, start, *frames)
+    sheet.reached(record.numbers)
+    found, own = operations.moved(sheet, record.kind, pose, record.numbers, record.frames), record.result
     check_vector(sheet, found, own[: len(found)])
-    labels = PARTS.get(shape.kind, (shape.kind,))
     rows = [
-        row(label, "xyz", own[3 * at : 3 * at + 3], unit)
-        for at, (label, unit) in enumerate(zip(labels, UNITS[shape.kind], strict=True))
+        row(label, "xyz", own[3 * at : 3 * at + 3], unit) for at, (label, unit) in enumerate(LABELS[record.kind])
     ]
-    if shape.covariance:
-        _check_covariance(sheet, operations.twist_covariance(sheet, pose, covariance), own[len(found) :])
+    if record.covariance:
+        _check_covariance(sheet, operations.twist_covariance(sheet, pose, record.covariance), own[len(found) :])
         rows += _rows("covariance", own[len(found) :], 6)
-    sheet.result(f"in {frames[0]}", rows)
+    sheet.result(f"in {record.frames[0]}", rows)
 
 
-def _move_pose(
-    sheet: Sheet, pose: Rigid, given: Given, record: Record, mover: Rigid, names: tuple[str, str], plan: DerivationStyle
-) -> None:
+def _move_pose(sheet: Sheet, pose: Rigid, given: Given, record: Moved, plan: DerivationStyle) -> None:
     """Move a pose, and end with the result."""
-    target, origin = map(printable, names)
-    name = printable(given.pose.name or "it")
-    covariance = tuple(record.values[record.shape.own_size :])
-    moved = Operation(moves=True).pose([(*given.pose.components, *covariance)], mover, floats)
-    own = Result(Pose.of(moved[:7], given.pose.name, names[0]))
+    (target, origin), name = record.frames, printable(given.pose.name or "it")
+    own = Result(Pose.of(record.result[:7], given.pose.name, record.target))
     sheet.heading("The record")
     given.say(sheet, origin, name)
     derived = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
-    if record.shape.covariance:
-        own.extras["covariance"] = moved[7:]
-        _check_covariance(sheet, operations.pose_covariance(sheet, pose, covariance), own.extras["covariance"])
+    if record.covariance:
+        own.extras["covariance"] = record.result[7:]
+        _check_covariance(sheet, operations.pose_covariance(sheet, pose, record.covariance), record.result[7:])
     end_with_pose(sheet, derived, own, plan)
 
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain.formula_tree import latex_number
-from frametool.explain.sheet import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
+from frametool.explain.run import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.explain.sheet import Item, Row
+    from frametool.explain.run import Item, Row
 
 WIDTH = 80
 INDENT = "   "

@@ -148,14 +148,14 @@ def _derived(
     task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str, *, timeless: bool
 ) -> int:
     """Write the derivation of one record; timeless: a time was chosen for all."""
-    from frametool.explain import derive
     from frametool.stream.request import Operation
+    from frametool.stream.written import derive_record
 
     asked = task.request(operation=Operation(moves=True))
     try:
         source = pose_source(record, asked)
-        made = derive.apply(plan, way.explained(), source, kind=kind, degrees=asked.degrees,
-                            normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
+        made = derive_record(plan, way.explained(), source, kind=kind, degrees=asked.degrees,
+                             normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
     except FormatError as error:
         raise usage_if_inline(error) from None
     return task.write(made)
