@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 INDENT = "   "
+GLUE, CUT = "\u00a0", "\v"  # a blank where no line ends, and a place where one may
 INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
 
 
@@ -45,94 +46,79 @@ def _lines(item: Item) -> list[str]:
 
 def _wrapped(text: str, first: str, further: str) -> list[str]:
     return wrap(
-        text, WIDTH, initial_indent=first, subsequent_indent=further, break_long_words=False, break_on_hyphens=False
-    )
+        text, WIDTH, initial_indent=first, subsequent_indent=further, break_long_words=False, break_on_hyphens=False,
+        replace_whitespace=False,
+    )  # fmt: skip
 
 
 def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
     """Write successive steps with their signs of equality below one another."""
     width = max(len(step.name) for step in steps)
     for step in steps:
-        texts = [*step.texts[:-1], f"{step.texts[-1]} {step.unit}".rstrip()]
         head = f"{INDENT}{step.name:<{width}} = "
-        if len(line := head + " = ".join(texts)) <= WIDTH:
-            yield line
-            continue
-        yield from _broken(head, texts[0])
-        head = " " * (len(head) - 2) + "= "
-        if len(line := head + " = ".join(texts[1:])) <= WIDTH:
-            yield line
-            continue
-        for formula in texts[1:-1]:
-            yield from _broken(head, formula)
-        yield head + texts[-1]
+        hang, room = " " * (len(head) - 2) + "= ", WIDTH - len(head)
+        texts: Sequence[str] = [*step.texts[:-1], f"{step.texts[-1]} {step.unit}".rstrip()]
+        first, rest = texts[:1], [" = ".join(texts[1:])] * (len(texts) > 1)
+        if len(whole := " = ".join(texts)) <= room:
+            texts = [whole]
+        elif len("".join(rest)) <= room:
+            texts = [*first, *rest]
+        for at, text in enumerate(texts):
+            yield from _broken(hang if at else head, text)
 
 
-def _broken(head: str, formula: str) -> Iterator[str]:
-    """Write a formula; one that is too long goes on before its plus and minus signs."""
-    line = head
-    for piece in _pieces(formula, WIDTH - len(head)):
-        if len(line) + len(piece) > WIDTH and line != head and line.strip():
-            yield line.rstrip()
-            line = " " * len(head) + piece.lstrip()
-        else:
-            line += piece
-    yield line.rstrip()
+def _broken(head: str, formula: str) -> list[str]:
+    """Write a formula; one that is too long goes on before its plus and minus signs, the outer ones first."""
+    lines = [head + formula]
+    for glued in (*(_glued(formula, deepest) for deepest in range(4)), formula.replace("·", f"{CUT}·")):
+        if max(map(len, lines)) <= WIDTH:
+            break
+        lines = _wrapped(glued, head, " " * len(head))
+    return [line.replace(GLUE, " ").replace(CUT, "") for line in lines]
 
 
-# where a formula is cut, the best places first: signs, and how deep in parentheses they stand (None: wherever)
-CUTS = ((0, (" + ", " - ")), (0, ("·(",)), (1, (" + ", " - ")), (None, (" + ", " - ")), (None, ("·",)))
-
-
-def _pieces(formula: str, room: int, cuts: Sequence[tuple[int | None, tuple[str, ...]]] = CUTS) -> Iterator[str]:
-    """Cut a formula before its signs; a piece that has no room is cut again, at the next best places."""
-    places: list[int] = []
-    depth = 0
-    for at, letter in enumerate(formula):
-        if cuts[0][0] in (depth, None) and formula.startswith(cuts[0][1], at):
-            places.append(at)
+def _glued(formula: str, deepest: int) -> str:
+    """Glue together what stands between plus and minus signs at most so deep in parentheses."""
+    depth, letters = 0, []
+    for letter, after in zip(formula, formula[1:] + " ", strict=True):
         depth += (letter == "(") - (letter == ")")
-    for begin, end in zip([0, *places], [*places, len(formula)], strict=True):
-        is_long = len(formula[begin:end].strip()) > room and len(cuts) > 1
-        yield from _pieces(formula[begin:end], room, cuts[1:]) if is_long else (formula[begin:end],)
+        is_cut = after in "+-" and depth <= deepest
+        letters.append(GLUE if letter == " " and not is_cut else letter)
+    return "".join(letters)
 
 
 def _grid(grid: MatrixLine) -> list[str]:
     """Write matrices side by side, as many as the width holds."""
     lines = [f"{INDENT}{grid.name} = {grid.text}"] if grid.text else []
     head = f"{INDENT}{' ' * len(grid.name) if grid.text else grid.name} = "
-    groups: list[list[list[str]]] = [[]]
-    used = len(head)
-    blocks = [[part] if isinstance(part, str) else _block(part) for part in grid.parts]
-    for block, after in zip(blocks, [*blocks[1:], [grid.unit]], strict=True):
-        size = len(block[0]) + 1 + (len(grid.unit) + 1) * (block is blocks[-1] and bool(grid.unit))
-        needed = size + (len(after[0]) + 1) * (len(block) == 1)  # a sign stays with what it is before
-        if used + needed > WIDTH and any(len(each) > 1 for each in groups[-1]):
-            groups.append([])
-            used = len(head)
-        groups[-1].append(block)
-        used += size
-    for at, group in enumerate(groups):
-        lead = head if at == 0 else " " * len(head)
-        lines += _side_by_side(lead, group, grid.unit if at == len(groups) - 1 else "")
+    groups: list[list[str]] = []
+    sign = ""
+    for part in grid.parts:
+        if isinstance(part, str):
+            sign += f"{part} "
+            continue
+        block = _beside(sign, _block(part), f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
+        if groups and len(head) + len(groups[-1][0]) + 1 + max(map(len, block)) <= WIDTH:
+            groups[-1] = [f"{left} {right}" for left, right in zip(groups[-1], block, strict=True)]
+        else:
+            groups.append(block)
+        sign = ""
+    for group in groups:
+        lines += [line.rstrip() for line in _beside(head, group)]
+        head = " " * len(head)
     return lines
+
+
+def _beside(left: str, block: Sequence[str], right: str = "") -> list[str]:
+    """Put words to the left and to the right of the middle row of a block."""
+    blank = " " * len(left)
+    middle = len(block) // 2
+    return [left + row + right if at == middle else blank + row for at, row in enumerate(block)]
 
 
 def _block(rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(len(row[at]) for row in rows) for at in range(len(rows[0]))]
     return [f"[{' '.join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))}]" for row in rows]
-
-
-def _side_by_side(head: str, blocks: list[list[str]], unit: str) -> list[str]:
-    height = max(map(len, blocks))
-    middle = height // 2
-    lines = []
-    for row in range(height):
-        cells = [block[row] if len(block) == height else (block[0] if row == middle else " " * len(block[0]))
-                 for block in blocks]  # fmt: skip
-        line = (head if row == middle else " " * len(head)) + " ".join(cells)
-        lines.append((line + (f" {unit}" if unit and row == middle else "")).rstrip())
-    return lines
 
 
 def result_lines(rows: Sequence[Row]) -> list[str]:
