@@ -11,7 +11,7 @@ from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain import derive
 from frametool.explain.derive import ByTree, DerivationStyle
 from frametool.explain.follow import FollowStep, derive_follow
-from frametool.explain.given import Given
+from frametool.explain.operations import Given
 from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames
 from frametool.geometry.representations import notation, notations

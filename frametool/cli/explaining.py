@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
-    from frametool.explain.given import Given
+    from frametool.explain.operations import Given
     from frametool.explain.render import Explanation
     from frametool.stream.request import Request
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from frametool.errors import ValueInvalid, shown
 from frametool.explain import derive
 from frametool.explain.derive import LABELS, ByTree, Moved
-from frametool.explain.given import Given
+from frametool.explain.operations import Given
 from frametool.geometry import floats
 from frametool.stream.record_values import documents, pose_of
 from frametool.stream.request import Operation, Request
@@ -75,10 +75,10 @@ def _moved(record: Record, request: Request, target: str, source: str, mover: Ri
     if shape.kind == POSE:
         given = _given(record, request)
         result = request.operation.pose([(*given.pose.components, *covariance)], mover, floats)
-        return Moved(POSE, target, source, mover, (), covariance, result, given)
+        return Moved(POSE, target, source, (), covariance, result, given)
     start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
     result = request.operation.move(shape, start, covariance, mover)
-    return Moved(shape.kind, target, source, mover, start, covariance, result)
+    return Moved(shape.kind, target, source, start, covariance, result)
 
 
 def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.explain.derive import ByTree, DerivationStyle
-    from frametool.explain.given import Given
+    from frametool.explain.operations import Given
     from frametool.formats.load import Rules
     from frametool.geometry.types import Components
     from frametool.stream.request import Request
