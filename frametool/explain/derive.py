@@ -71,6 +71,11 @@ def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None])
     return Explanation(title, sheet.items)
 
 
+def derived_pose(plan: DerivationStyle, title: str, own: Result, way: Callable[[Sheet], Rigid]) -> Explanation:
+    """Write the way to a pose, then that to its notations; `own` is what the command makes of it."""
+    return explained(plan, title, lambda sheet: end_with_pose(sheet, way(sheet), own, plan))
+
+
 def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationStyle) -> None:
     """Go on from the quaternion to the notations asked for, check both, and end with the command's own result."""
     if own.pose.position is not None:
@@ -152,31 +157,25 @@ def convert(
 
     own: what the command makes of it.  change: of its axes.
     """
-    result = Result(own or pose.pose)
 
-    def write(sheet: Sheet) -> None:
+    def way(sheet: Sheet) -> Rigid:
         sheet.reached(pose.position)
-        end_with_pose(sheet, _hub(sheet, pose, change), result, plan)
+        x, y, z = pose.position
+        found: Rigid = (x, y, z, *pose.quaternion(sheet))
+        if pose.inverse:
+            found = operations.inverse(sheet, found, "child", "parent")
+        return found if change is None else operations.with_other_axes(sheet, found, change)
 
     title = "identity" if pose.notation is None else pose.notation.spec
-    return explained(plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", write)
+    return derived_pose(plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", Result(own or pose.pose), way)
 
 
-def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
-    """Add the way from what is written to the position and the quaternion."""
-    q = given.quaternion(sheet)
-    x, y, z = given.position
-    pose: Rigid = (x, y, z, *q)
-    if given.inverse:
-        pose = operations.inverse(sheet, pose, "child", "parent")
-    return pose if change is None else operations.with_other_axes(sheet, pose, change)
-
-
-def _say_given(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
-    """List the poses as they are written."""
+def _written(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
+    """List the poses as they are written, and add the way from there to each; `labels` are its target and source."""
     sheet.heading("Given")
-    for each, (target, source) in zip(poses, labels, strict=True):
-        each.say(sheet, target, source)
+    for each, label in zip(poses, labels, strict=True):
+        each.say(sheet, *label)
+    return [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
 
 
 def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
@@ -187,15 +186,13 @@ def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
     names = frames_of([each.pose for each in poses])
     labels = list(itertools.pairwise(names))
 
-    def write(sheet: Sheet) -> None:
-        _say_given(sheet, poses, labels)
-        factors = [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
-        pose = factors[0]
-        for at, factor in enumerate(factors[1:], 1):
-            pose = operations.compose(sheet, pose, factor, (names[0], names[at], names[at + 1]))
-        end_with_pose(sheet, pose, own, plan)
+    def way(sheet: Sheet) -> Rigid:
+        pose, *factors = _written(sheet, poses, labels)
+        for factor, (middle, last) in zip(factors, labels[1:], strict=True):
+            pose = operations.compose(sheet, pose, factor, (names[0], middle, last))
+        return pose
 
-    return explained(plan, f"{names[0]}_from_{names[-1]}", write)
+    return derived_pose(plan, f"{names[0]}_from_{names[-1]}", own, way)
 
 
 def invert(plan: DerivationStyle, pose: Given) -> Explanation:
@@ -203,12 +200,10 @@ def invert(plan: DerivationStyle, pose: Given) -> Explanation:
     own = Result(pose_algebra.inverse(pose.pose))
     target, source = frames_of([pose.pose])
 
-    def write(sheet: Sheet) -> None:
-        _say_given(sheet, [pose], [(target, source)])
-        found = operations.inverse(sheet, pose.components(sheet, target, source), target, source)
-        end_with_pose(sheet, found, own, plan)
+    def way(sheet: Sheet) -> Rigid:
+        return operations.inverse(sheet, *_written(sheet, [pose], [(target, source)]), target, source)
 
-    return explained(plan, f"{source}_from_{target}", write)
+    return derived_pose(plan, f"{source}_from_{target}", own, way)
 
 
 def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
@@ -216,15 +211,15 @@ def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
     own = pose_algebra.relative(a.pose, b.pose)
     frames = _three_frames(a, b)
 
-    def write(sheet: Sheet) -> None:
+    def way(sheet: Sheet) -> Rigid:
         pose = operations.relative(sheet, *_both(sheet, a, b, frames), frames)
         found = operations.extent(sheet, pose, frames[1])
         for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
-        end_with_pose(sheet, pose, own, plan)
+        return pose
 
-    return explained(plan, f"{frames[1]}_from_{frames[2]}", write)
+    return derived_pose(plan, f"{frames[1]}_from_{frames[2]}", own, way)
 
 
 def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> Explanation:
@@ -233,10 +228,10 @@ def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> E
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     frames = _three_frames(a, b)
 
-    def write(sheet: Sheet) -> None:
-        end_with_pose(sheet, operations.between(sheet, *_both(sheet, a, b, frames), fraction), own, plan)
+    def way(sheet: Sheet) -> Rigid:
+        return operations.between(sheet, *_both(sheet, a, b, frames), fraction)
 
-    return explained(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", write)
+    return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
 
 
 def _three_frames(a: Given, b: Given) -> tuple[str, str, str]:
@@ -245,11 +240,10 @@ def _three_frames(a: Given, b: Given) -> tuple[str, str, str]:
     return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
 
 
-def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
+def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> list[Rigid]:
     """Add the way from what is written to both poses."""
     world, first, second = frames
-    _say_given(sheet, [a, b], [(world, first), (world, second)])
-    return a.components(sheet, world, first), b.components(sheet, world, second)
+    return _written(sheet, [a, b], [(world, first), (world, second)])
 
 
 def lookup(
@@ -264,19 +258,17 @@ def lookup(
     else:
         own = looked_up_across(tree, target, at_ns, source, source_at_ns, fixed)
 
-    def write(sheet: Sheet) -> None:
+    def way(sheet: Sheet) -> Rigid:
         if fixed is None:
-            pose = chain(sheet, tree, target, source, at_ns)
-        else:
-            with sheet.about("where the target was"):
-                first = chain(sheet, tree, target, fixed, at_ns)
-            with sheet.about("where the source was"):
-                second = chain(sheet, tree, fixed, source, source_at_ns)
-            sheet.play("across", {})
-            pose = operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
-        end_with_pose(sheet, pose, own, plan)
+            return chain(sheet, tree, target, source, at_ns)
+        with sheet.about("where the target was"):
+            first = chain(sheet, tree, target, fixed, at_ns)
+        with sheet.about("where the source was"):
+            second = chain(sheet, tree, fixed, source, source_at_ns)
+        sheet.play("across", {})
+        return operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
-    return explained(plan, f"{printable(target)}_from_{printable(source)}", write)
+    return derived_pose(plan, f"{printable(target)}_from_{printable(source)}", own, way)
 
 
 class ByTree(NamedTuple):
@@ -325,8 +317,7 @@ def apply(plan: DerivationStyle, way: ByTree | Given, record: Moved) -> Explanat
 
     def write(sheet: Sheet) -> None:
         if isinstance(way, Given):
-            _say_given(sheet, [way], [record.frames])
-            pose = way.components(sheet, *record.frames)
+            (pose,) = _written(sheet, [way], [record.frames])
         else:
             pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
         sheet.reached(pose[:3])

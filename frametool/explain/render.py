@@ -5,12 +5,13 @@ A line that begins with = + - or · goes on with the one before.
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.explain.formula_tree import latex_number
+from frametool.explain.formula_tree import as_latex, as_text, latex_number, parsed
 from frametool.explain.run import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
@@ -51,13 +52,31 @@ def _wrapped(text: str, first: str, further: str) -> list[str]:
     )  # fmt: skip
 
 
+def equals(
+    step: SheetStep, write: Callable[..., str], name: Callable[[str], str], number: Callable[[str], str]
+) -> list[str]:
+    """Return what a step's name equals: its formula, the same with numbers, its value.
+
+    write, name, number: how a tree, a name and a number's text are written
+    """
+    value = number(step.numbers[step.name])
+    if not step.formula:
+        return [value]
+    formula, shown = parsed(step.formula), parsed(step.shown)
+    plain = as_text(shown, lambda each: step.numbers.get(each, each))
+    is_said = plain in (as_text(formula, str), step.numbers[step.name])  # by the formula or by the value
+    with_numbers = write(shown, lambda each: number(step.numbers[each]) if each in step.numbers else name(each))
+    return [write(formula, name), *[with_numbers] * (not is_said), value]
+
+
 def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
     """Write successive steps with their signs of equality below one another."""
     width = max(len(step.name) for step in steps)
     for step in steps:
         head = f"{INDENT}{step.name:<{width}} = "
         hang, room = " " * (len(head) - 2) + "= ", WIDTH - len(head)
-        texts: Sequence[str] = [*step.texts[:-1], f"{step.texts[-1]} {step.unit}".rstrip()]
+        texts = equals(step, as_text, str, str)
+        texts[-1] = f"{texts[-1]} {step.unit}".rstrip()
         first, rest = texts[:1], [" = ".join(texts[1:])] * (len(texts) > 1)
         if len(whole := " = ".join(texts)) <= room:
             texts = [whole]
@@ -139,11 +158,31 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
+SYMBOLS = {
+    "roll": r"\phi", "pitch": r"\theta", "yaw": r"\psi", "angle": r"\vartheta", "arc": r"\Omega", "pi": r"\pi",
+    "bearing": r"\beta", "det": r"\det R", "norm": r"\lVert q \rVert", "tr": r"\operatorname{tr} R",
+    "dot": r"a \cdot b", "ww": "4 w^2", "xx": "4 x^2", "yy": "4 y^2", "zz": "4 z^2", "pp": r"\lvert p \rvert^2",
+    "a1": r"\alpha_1", "a2": r"\alpha_2", "a3": r"\alpha_3",
+}  # fmt: skip
+INDEXED = re.compile(r"([a-zA-Z])([0-9]{1,2}|[a-zA-Z][0-9]?)")
 LONG = 90  # characters of LaTeX that a line of a formula holds, about
 SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
 WORDS = {HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"}
 FORMULAS = "$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$"
 RESULT = "**Result**%s\n\n```text\n%s\n```"
+
+
+def symbol(name: str) -> str:
+    """Return a name as LaTeX: Greek where that is the custom, an index where there is one, else upright."""
+    if name in SYMBOLS:
+        return SYMBOLS[name]
+    if name.endswith("_deg"):
+        return rf"{symbol(name[:-4])}^{{\circ}}"
+    if len(name) == 1:
+        return name
+    if found := INDEXED.fullmatch(name):
+        return f"{found[1]}_{{{found[2]}}}"
+    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
 
 
 class Explanation:
@@ -202,7 +241,7 @@ def _aligned(item: SheetStep | MatrixLine) -> list[str]:
         name = item.name.replace("'", r"^{\prime}")
         parts = [*filter(None, [item.latex]), " ".join(map(_matrix, item.parts))]
     else:
-        name, parts = item.latex_name, list(item.latex)
+        name, parts = symbol(item.name), equals(item, as_latex, symbol, latex_number)
     if sum(map(len, parts)) <= LONG:
         parts = [" = ".join(parts)]
     elif sum(map(len, parts[1:])) <= 2 * LONG:

@@ -1,6 +1,6 @@
 """Sheets are played: `sheets.txt` holds what a reader sees of a derivation, a `Sheet` fills in the numbers of this run.
 
-Also the steps that several sheets share, of angles and lengths, and how the names of formulas are written in LaTeX.
+Also the steps that several sheets share, of angles and lengths.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid
-from frametool.explain.formula_tree import Value, as_latex, as_text, evaluated, holds, latex_number, parsed
+from frametool.explain.formula_tree import Value, evaluated, holds, parsed
 from frametool.geometry import floats
 from frametool.geometry import matrix as kernel
 from frametool.geometry.quaternion import to_matrix
@@ -27,13 +27,6 @@ if TYPE_CHECKING:
     Values = dict[str, float]
     Matrix = list[list[float]]
 
-SYMBOLS = {
-    "roll": r"\phi", "pitch": r"\theta", "yaw": r"\psi", "angle": r"\vartheta", "arc": r"\Omega", "pi": r"\pi",
-    "bearing": r"\beta", "det": r"\det R", "norm": r"\lVert q \rVert", "tr": r"\operatorname{tr} R",
-    "dot": r"a \cdot b", "ww": "4 w^2", "xx": "4 x^2", "yy": "4 y^2", "zz": "4 z^2", "pp": r"\lvert p \rvert^2",
-    "a1": r"\alpha_1", "a2": r"\alpha_2", "a3": r"\alpha_3",
-}  # fmt: skip
-INDEXED = re.compile(r"([a-zA-Z])([0-9]{1,2}|[a-zA-Z][0-9]?)")
 ENTRIES = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
 TINY, HUGE = 1e-140, 1e140  # beyond, squares leave the range of a double
 TWO_TURNS = 720.0  # degrees: the half angle inside has turned once
@@ -74,19 +67,6 @@ def nested(lines: Sequence[str]) -> list[Line]:
     return [Line(text, nested(body)) for text, body in found]
 
 
-def symbol(name: str) -> str:
-    """Return a name as LaTeX: Greek where that is the custom, an index where there is one, else upright."""
-    if name in SYMBOLS:
-        return SYMBOLS[name]
-    if name.endswith("_deg"):
-        return rf"{symbol(name[:-4])}^{{\circ}}"
-    if len(name) == 1:
-        return name
-    if found := INDEXED.fullmatch(name):
-        return f"{found[1]}_{{{found[2]}}}"
-    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
-
-
 class Words(NamedTuple):
     """A line of words: a heading with its number, a sentence, or a caveat, which is what is easily got wrong."""
 
@@ -95,12 +75,16 @@ class Words(NamedTuple):
 
 
 class SheetStep(NamedTuple):
-    """A name and what it equals: formula, formula with numbers, value; each as text and as LaTeX."""
+    """A name and what it equals: formula, formula with numbers, value.
+
+    shown: the formula whose numbers are shown, "" for a value that is chosen
+    numbers: those of the names in it, as they are written, and its own
+    """
 
     name: str
-    texts: Sequence[str]
-    latex_name: str
-    latex: Sequence[str]
+    formula: str
+    shown: str
+    numbers: Mapping[str, str]
     unit: str = ""
 
 
@@ -274,17 +258,8 @@ class Sheet:
         exactly: constants that are the value exactly, where the formula with rounded numbers would only be near it
         """
         value = values[name] = self._value(exactly or formula, values)
-        tree, shown = parsed(formula), parsed(exactly or formula)
-        digits = {each: self.number(number) for each, number in values.items()}
-        texts = [as_text(tree, lambda each: each), as_text(shown, lambda each: digits.get(each, each))]
-        latex = [
-            as_latex(tree, symbol),
-            as_latex(shown, lambda each: latex_number(digits[each]) if each in digits else symbol(each)),
-        ]
-        if texts[1] in (texts[0], digits[name]):
-            del texts[1], latex[1]
-        texts, latex = [*texts, digits[name]], [*latex, latex_number(digits[name])]
-        self.items.append(SheetStep(name, texts, symbol(name), latex, unit))
+        numbers = {each: self.number(number) for each, number in values.items()}
+        self.items.append(SheetStep(name, formula, exactly or formula, numbers, unit))
         return value
 
     def grid(self, name: str, text: str, latex: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
@@ -355,8 +330,7 @@ class Sheet:
     def chosen(self, values: Values, name: str, value: str, unit: str) -> None:
         """Add a value that is chosen, not derived."""
         values[name] = float(value)
-        text = self.number(values[name])
-        self.items.append(SheetStep(name, [text], symbol(name), [text], f"{unit} (chosen)"))
+        self.items.append(SheetStep(name, "", "", {name: self.number(values[name])}, f"{unit} (chosen)"))
 
     def angle(self, values: Values, name: str) -> None:
         """Take an angle as it is written; one in degrees becomes radians."""
