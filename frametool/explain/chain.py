@@ -75,7 +75,9 @@ def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
         return printable(parent), child, a
     sheet.reached(b[:3])
     with sheet.about(edge):
-        values = sheet.play("two samples", spans(begin_ns, end_ns, at_ns), a=_line(sheet, a), b=_line(sheet, b), **words)
+        values = sheet.play(
+            "two samples", spans(begin_ns, end_ns, at_ns), a=_line(sheet, a), b=_line(sheet, b), **words
+        )
         return printable(parent), child, between(sheet, a, b, values["f"])
 
 

@@ -167,7 +167,9 @@ def convert(
         return found if change is None else operations.with_other_axes(sheet, found, change)
 
     title = "identity" if pose.notation is None else pose.notation.spec
-    return derived_pose(plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", Result(own or pose.pose), way)
+    return derived_pose(
+        plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", Result(own or pose.pose), way
+    )
 
 
 def _written(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
@@ -201,7 +203,8 @@ def invert(plan: DerivationStyle, pose: Given) -> Explanation:
     target, source = frames_of([pose.pose])
 
     def way(sheet: Sheet) -> Rigid:
-        return operations.inverse(sheet, *_written(sheet, [pose], [(target, source)]), target, source)
+        (found,) = _written(sheet, [pose], [(target, source)])
+        return operations.inverse(sheet, found, target, source)
 
     return derived_pose(plan, f"{source}_from_{target}", own, way)
 
@@ -240,10 +243,11 @@ def _three_frames(a: Given, b: Given) -> tuple[str, str, str]:
     return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
 
 
-def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> list[Rigid]:
+def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
     """Add the way from what is written to both poses."""
     world, first, second = frames
-    return _written(sheet, [a, b], [(world, first), (world, second)])
+    one, other = _written(sheet, [a, b], [(world, first), (world, second)])
+    return one, other
 
 
 def lookup(
@@ -334,9 +338,7 @@ def _move_vectors(sheet: Sheet, pose: Rigid, record: Moved) -> None:
     sheet.reached(record.numbers)
     found, own = operations.moved(sheet, record.kind, pose, record.numbers, record.frames), record.result
     check_vector(sheet, found, own[: len(found)])
-    rows = [
-        row(label, "xyz", own[3 * at : 3 * at + 3], unit) for at, (label, unit) in enumerate(LABELS[record.kind])
-    ]
+    rows = [row(label, "xyz", own[3 * at : 3 * at + 3], unit) for at, (label, unit) in enumerate(LABELS[record.kind])]
     if record.covariance:
         _check_covariance(sheet, operations.twist_covariance(sheet, pose, record.covariance), own[len(found) :])
         rows += _rows("covariance", own[len(found) :], 6)

@@ -115,7 +115,8 @@ def _law(sheet: Sheet, step: FollowStep, values: Values) -> None:
     behind = bearing * step.angular * step.gains[1] < 0.0 and abs(abs(bearing) - math.pi) < 1e-9
     values |= {"behind": float(behind), "arrived": step.arrived}
     values |= {"slow": float(step.limits[0] < math.inf), "steady": float(step.limits[1] < math.inf)}
-    words = dict(zip(("linear", "angular", "max_linear", "max_angular"), map(_text, step.gains + step.limits), strict=True))
+    names = ("linear", "angular", "max_linear", "max_angular")
+    words = dict(zip(names, map(_text, step.gains + step.limits), strict=True))
     sheet.play("follow law", values, follower=printable(step.follower), **words)
     _compare(step, values["d"], values["linear_x"], values["angular_z"])
 

@@ -76,7 +76,9 @@ def to_quaternion(sheet: Sheet, numbers: Sequence[float], form: Notation, *, deg
     """Add the way from the numbers of a notation to the quaternion."""
     names, name = names_of(block_of(form).written, form, degrees=degrees), sheet_of(form)
     values: Values = dict(zip(names, numbers, strict=True))
-    words = {**UNITS[degrees], **(_axes_written(form.bound_axes()) if name == "euler" else {})}
+    words = UNITS[degrees].copy()
+    if name == "euler":
+        words |= _axes(form.bound_axes(), values) | _elementary(form.bound_axes())
     is_plain = name in ("wxyz", "quaternion")
     sheet.play("quaternion to" if is_plain else f"{name} to", values, order=ORDERS.get(name, ORDERS[""]), **words)
     return quaternion_of(values)
@@ -88,38 +90,34 @@ def from_quaternion(sheet: Sheet, q: Quaternion, form: Notation, *, degrees: boo
     x, y, z, w = q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
-    words: dict[str, str] = UNITS[degrees].copy()
+    words = UNITS[degrees].copy()
     if form.representation.name in ("rpy", "euler"):
         axes = form.bound_axes() if form.representation.name == "euler" else "sxyz"
         values["locked"] = float(euler.locked(*q, axes))
-        values["symmetric"] = float(euler.AXES[axes][4])
-        words |= _axes_found(axes) | dict(zip(("a1", "a2", "a3"), block_of(form).found.split(), strict=True))
+        words |= _axes(axes, values) | dict(zip(("a1", "a2", "a3"), block_of(form).found.split(), strict=True))
     sheet.play(f"{sheet_of(form)} from", values, **words)
     return [values[name] for name in names]
 
 
-def _about(axes: str) -> dict[str, str]:
-    """Say about which axes three angles turn."""
-    about = "the fixed axes" if axes[0] == "s" else "the axes as they turn along,"
-    return {"axes": axes, "about": about, "turns": ", then ".join(axes[1:])}
+def _axes(axes: str, values: Values) -> dict[str, str]:
+    """Add what kind of axes a convention has; return their names for the sheets."""
+    i, j, k, parity, symmetric, fixed = euler.AXES[axes]
+    values |= {"odd": float(parity < 0.0), "symmetric": float(symmetric), "fixed": float(fixed)}
+    return {"axes": axes, "turns": ", then ".join(axes[1:]), "i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k]}
 
 
-def _axes_written(axes: str) -> dict[str, str]:
-    """Return the words of a convention for the way to the quaternion, with the two products of elementary ones."""
-    fixed = axes[0] == "s"
-    first, second, third = (3, 2, 1) if fixed else (1, 2, 3)
-    way = "right to left: what is done first stands rightmost" if fixed else "left to right, in the order of the turns"
-    other = "turning axes read left to right" if fixed else "fixed axes read right to left"
-    words = {"first": str(first), "second": str(second), "third": str(third), "way": way, "other": other}
-    words |= {"A": axes[first], "B": axes[second], "C": axes[third]}
-    one = _times_elementary({"w": f"c{first}", axes[first]: f"s{first}"}, axes[second], second)
+def _elementary(axes: str) -> dict[str, str]:
+    """Return the words for the product of three elementary quaternions: the formulas of the first two, then of all."""
+    first, third = (3, 1) if axes[0] == "s" else (1, 3)
+    words = {"first": str(first), "third": str(third), "A": axes[first], "B": axes[2], "C": axes[third]}
+    one = _times_elementary({"w": f"c{first}", axes[first]: f"s{first}"}, axes[2], 2)
     both = _times_elementary({part: f"p{part}" for part in "xyzw"}, axes[third], third)
-    return _about(axes) | words | {f"p{part}": one[part] for part in one} | {f"q{part}": both[part] for part in both}
+    return words | {f"p{part}": one[part] for part in one} | {f"q{part}": both[part] for part in both}
 
 
 def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, str]:
     """Return the formulas of p times the quaternion (s along an axis, c): parts of p that are 0 are left out."""
-    after, last = "xyzxy"["xyz".index(axis) + 1 :][:2]
+    after, last = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}[axis]
     sine, cosine = f"s{number}", f"c{number}"
     terms = {
         axis: ((axis, cosine, "+"), ("w", sine, "+")),
@@ -130,15 +128,6 @@ def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, st
     texts = {name: "".join(f" {sign} {p[part]}*{factor}" for part, factor, sign in each if part in p)
              for name, each in terms.items()}  # fmt: skip
     return {name: text[3:] if text.startswith(" +") else f"-{text[3:]}" for name, text in texts.items()}
-
-
-def _axes_found(axes: str) -> dict[str, str]:
-    """Return the words of a convention for the way from the quaternion."""
-    i, j, k, parity, _, static = euler.AXES[axes]
-    plus, minus = "+-" if parity > 0.0 else "-+"
-    fall, rise = "-+" if static else "+-"
-    words = {"i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k], "signed_k": "xyz"[k] if parity > 0.0 else f"-{'xyz'[k]}"}
-    return _about(axes) | words | {"plus": plus, "minus": minus, "fall": fall, "rise": rise, "turn": "-" * static}
 
 
 def named(prefix: str, numbers: Sequence[float]) -> Values:
@@ -198,9 +187,7 @@ def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
     return *vector_of(line, "t"), *quaternion_of(arc, "q")
 
 
-def moved(
-    sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], frames: tuple[str, str]
-) -> list[float]:
+def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], frames: tuple[str, str]) -> list[float]:
     """Move a point, a vector, a twist or a wrench from one frame to another: `frames` are target and source."""
     values = named("t", pose[:3]) | named("q", pose[3:])
     for at, letter in enumerate(MOVERS[kind]):

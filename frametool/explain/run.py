@@ -235,18 +235,20 @@ class Sheet:
             words[name] = words_text
         elif kind[0] == "@":
             HELPERS[kind](self, values, *text.split())
+        elif kind == ":":
+            self.matrix_step(values, text)
+        elif kind == "let":
+            name, formula, _ = _parts(text)
+            values[name] = self.value(formula, values)
         else:
-            STEPS.get(kind, Sheet._any_step)(self, values, text if kind in STEPS else self._filled(line, values, words))
+            name, formula, unit = _parts(self._filled(line, values, words))
+            self.step(values, name, formula, unit)
 
-    def _any_step(self, values: Values, text: str) -> None:
-        name, formula, unit = _parts(text)
-        self.step(values, name, formula, unit)
+    def value(self, formula: str, values: Values) -> float:
+        """Return the value of a formula as the steps after it take it.
 
-    def _let(self, values: Values, text: str) -> None:
-        name, formula, _ = _parts(text)
-        values[name] = self._value(formula, values)
-
-    def _value(self, formula: str, values: Values) -> float:
+        Raises ValueInvalid for one that is not finite.
+        """
         try:
             return self.settled(evaluated(parsed(formula), values))
         except ArithmeticError:
@@ -257,7 +259,7 @@ class Sheet:
 
         exactly: constants that are the value exactly, where the formula with rounded numbers would only be near it
         """
-        value = values[name] = self._value(exactly or formula, values)
+        value = values[name] = self.value(exactly or formula, values)
         numbers = {each: self.number(number) for each, number in values.items()}
         self.items.append(SheetStep(name, formula, exactly or formula, numbers, unit))
         return value
@@ -267,7 +269,7 @@ class Sheet:
         shown = [part if isinstance(part, str) else [[self.number(v) for v in row] for row in part] for part in parts]
         self.items.append(MatrixLine(name, text, latex, shown, unit))
 
-    def _matrix_step(self, values: Values, line: str) -> None:
+    def matrix_step(self, values: Values, line: str) -> None:
         """Add a matrix, or a step of matrices: a product of them, with a sign before it or a vector added."""
         if " = " not in line:
             self.grid(line, "", "", [rows([values[each] for each in ENTRIES])])
@@ -389,9 +391,7 @@ class Sheet:
         off = kernel.defect(*kernel.nine(entry for row in here for entry in row), floats)
         if off <= kernel.ORTHONORMAL:
             return
-        self.heading("The nearest rotation")
-        self.say(f"The rows are orthonormal only to {off:.1e}. Newton's way to the nearest rotation (Higham 1986): the "
-                 "mean of M and of its inverse transposed, again and again; each step doubles the right digits.")  # fmt: skip
+        self.play("nearest rotation", {"off": off})
         for count in range(1, MOST_STEPS + 1):
             there = rows(kernel.newton(*kernel.nine(part for row in here for part in row)))
             other = [[2.0 * b - a for a, b in zip(*pair, strict=True)] for pair in zip(here, there, strict=True)]
@@ -408,7 +408,6 @@ class Sheet:
 WRITERS: dict[str, Callable[[Sheet, str], None]] = {
     HEADING: Sheet.heading, SENTENCE: Sheet.say, CAVEAT: Sheet.caveat,
 }  # fmt: skip
-STEPS: dict[str, Callable[[Sheet, Values, str], None]] = {":": Sheet._matrix_step, "let": Sheet._let}
 HELPERS: dict[str, Callable[..., object]] = {
     "@angle": Sheet.angle, "@half": Sheet.half, "@direction": Sheet.direction, "@length": Sheet.length,
     "@columns": Sheet.columns, "@nearest": Sheet.nearest, "@chosen": Sheet.chosen,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(frametool.__file__).parent
 LAYERS = [
-    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "stream", "fit", "explain",
+    "errors", "sizes", "geometry", "frames", "text", "documents", "grammar", "ros", "formats", "lint", "explain", "stream", "fit",
     "calc", "sim", "view", "cli",
 ]  # fmt: skip
 HOMES = {"click": "cli", "rich": "view", "yaml": "documents"}
