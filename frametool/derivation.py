@@ -11,7 +11,7 @@ from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain import derive
 from frametool.explain.derive import ByTree, DerivationStyle
 from frametool.explain.follow import FollowStep, derive_follow
-from frametool.explain.operations import Given
+from frametool.explain.operations import WrittenPose
 from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames
 from frametool.geometry.representations import notation, notations
@@ -19,7 +19,7 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
-from frametool.stream.written import derive_record, given_poses
+from frametool.stream.written import derive_record, written_poses
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,17 +56,17 @@ def explain(
     except TypeError as error:
         raise ValueInvalid(f"explain {operation}: {error}") from None
     poses = POSES.get(operation, 0)
-    given = [_pose(each, degrees=degrees) for each in operands[:poses]]
-    return OPERATIONS[operation](plan, *given, *operands[poses:], **options)
+    written = [_pose(each, degrees=degrees) for each in operands[:poses]]
+    return OPERATIONS[operation](plan, *written, *operands[poses:], **options)
 
 
-def _pose(value: Any, *, degrees: bool) -> Given:
+def _pose(value: Any, *, degrees: bool) -> WrittenPose:
     """Take one pose: a mapping, its text, a Transform or a Rotation.
 
     Raises ValueInvalid, FormatError.
     """
     if isinstance(value, (str, dict, list)):
-        found = given_poses(_source(value), degrees=degrees)
+        found = written_poses(_source(value), degrees=degrees)
         if len(found) != 1:
             raise ValueInvalid(f"a derivation is of one pose, {INLINE} holds {len(found)}")
         return found[0]
@@ -74,7 +74,7 @@ def _pose(value: Any, *, degrees: bool) -> Given:
         raise ValueInvalid(f"expected one pose: a mapping, its text, a Transform or a Rotation; found {value!r:.60}")
     pose = Pose.of(value.components) if isinstance(value, Transform) else Pose(None, value.components)
     x, y, z, *rotation = pose.components
-    return Given(pose, notation("quaternion"), rotation, position=(x, y, z))
+    return WrittenPose(pose, notation("quaternion"), rotation, position=(x, y, z))
 
 
 def _source(value: Any) -> Source:
@@ -91,7 +91,7 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
     degrees = plan.style.degrees
     if by_tree:
         tree, target, *source, record = operands
-        way: ByTree | Given = ByTree(tree, target, source[0] if source else None, at_ns)
+        way: ByTree | WrittenPose = ByTree(tree, target, source[0] if source else None, at_ns)
     else:
         pose, record = operands
         way = _pose(pose, degrees=degrees)

@@ -64,7 +64,7 @@ def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
     child = printable(track.child)
     if track.standing:
         return printable(track.parent), child, track.components
-    (begin_ns, parent, a), after = around(track, at_ns)
+    (begin_ns, parent, a), after = samples_around(track, at_ns)
     sheet.reached(a[:3])
     edge, is_between = _named(parent, track.child), after is not None and begin_ns != at_ns
     end_ns, other, b = after or (begin_ns, parent, a)
@@ -81,7 +81,7 @@ def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
         return printable(parent), child, between(sheet, a, b, values["f"])
 
 
-def around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | None]:
+def samples_around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | None]:
     """Return the last sample that is not after a time, else the first one; and the next one, if there is one."""
     samples = list(track.walk())
     at = max(bisect_right(samples, at_ns, key=itemgetter(0)), 1)

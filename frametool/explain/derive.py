@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain import operations
 from frametool.explain.chain import chain
-from frametool.explain.operations import Given, frames_of
+from frametool.explain.operations import WrittenPose, frames_of
 from frametool.explain.render import Explanation
 from frametool.explain.run import DIGITS, Row, Sheet
 from frametool.frames.lookups import Frames
-from frametool.geometry import floats, quaternion
-from frametool.geometry.representations import notation
+from frametool.geometry import floats, quaternion, representations
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
@@ -55,7 +54,7 @@ class DerivationStyle(NamedTuple):
     @property
     def notations(self) -> Sequence[Notation]:
         """Return the notations of the result."""
-        return self.style.notations or (notation("quaternion"),)
+        return self.style.notations or (representations.notation("quaternion"),)
 
 
 def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
@@ -87,22 +86,24 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
     end(sheet, own, plan)
 
 
-def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle) -> None:
+def check_rotation(
+    sheet: Sheet, notation: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle
+) -> None:
     """Compare numbers of a notation with the result's as rotations, also near lock; say how a pose is written in it.
 
     Raises DerivationWrong.
     """
-    degrees = plan.style.in_degrees(form)
+    degrees = plan.style.in_degrees(notation)
     target = quaternion.unit(*own.pose.components[3:], floats)
-    found = form.to_quaternion(tuple(numbers), floats, degrees=degrees)
+    found = notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
     if not off <= CLOSE * sheet.stretch:
-        raise DerivationWrong(f"the derivation in {form.spec} is off by {off:.3g} rad from the result; {REPORT}")
-    final = form.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
+        raise DerivationWrong(f"the derivation in {notation.spec} is off by {off:.3g} rad from the result; {REPORT}")
+    final = notation.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
     turn = 180.0 if degrees else math.pi
-    if any(abs(numbers[at] - final[at]) > turn for at in form.representation.angles):
+    if any(abs(numbers[at] - final[at]) > turn for at in notation.representation.angles):
         sheet.caveat(TWO_NAMES)
-    if carries_position(form) and own.pose.position is not None:
+    if carries_position(notation) and own.pose.position is not None:
         sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
 
 
@@ -138,20 +139,20 @@ def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
     return [row(label * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)]
 
 
-def _rotation_rows(own: Result, form: Notation, style: Style) -> list[Row]:
+def _rotation_rows(own: Result, notation: Notation, style: Style) -> list[Row]:
     """Return the lines of one notation; a matrix has several, and so has an axis with its angle."""
-    _, numbers = pose_numbers(own.pose, form, style)
-    if form.representation.whole is not None:
-        return _rows(form.spec, numbers, math.isqrt(len(numbers)))
-    angles = form.representation.angles
+    _, numbers = pose_numbers(own.pose, notation, style)
+    if notation.representation.whole is not None:
+        return _rows(notation.spec, numbers, math.isqrt(len(numbers)))
+    angles = notation.representation.angles
     first = angles[0] if angles else len(numbers)
-    unit = DEGREES if style.in_degrees(form) else RADIANS
-    parts = [(form.names[:first], numbers[:first], ""), (form.names[first:], numbers[first:], unit)]
-    return [row(form.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
+    unit = DEGREES if style.in_degrees(notation) else RADIANS
+    parts = [(notation.names[:first], numbers[:first], ""), (notation.names[first:], numbers[first:], unit)]
+    return [row(notation.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
 
 
 def convert(
-    plan: DerivationStyle, pose: Given, *, own: Pose | None = None, change: OtherAxes | None = None
+    plan: DerivationStyle, pose: WrittenPose, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the notations asked for.
 
@@ -168,11 +169,11 @@ def convert(
 
     title = "identity" if pose.notation is None else pose.notation.spec
     return derived_pose(
-        plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", Result(own or pose.pose), way
+        plan, f"{title} to {', '.join(notation.spec for notation in plan.notations)}", Result(own or pose.pose), way
     )
 
 
-def _written(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
+def _written(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
     """List the poses as they are written, and add the way from there to each; `labels` are its target and source."""
     sheet.heading("Given")
     for each, label in zip(poses, labels, strict=True):
@@ -180,7 +181,7 @@ def _written(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, s
     return [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
 
 
-def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
+def compose(plan: DerivationStyle, *poses: WrittenPose) -> Explanation:
     """Derive the product of poses."""
     if not poses:
         raise ValueInvalid("compose takes at least one pose")
@@ -197,7 +198,7 @@ def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
     return derived_pose(plan, f"{names[0]}_from_{names[-1]}", own, way)
 
 
-def invert(plan: DerivationStyle, pose: Given) -> Explanation:
+def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
     """Derive the inverse of a pose."""
     own = Result(pose_algebra.inverse(pose.pose))
     target, source = frames_of([pose.pose])
@@ -209,7 +210,7 @@ def invert(plan: DerivationStyle, pose: Given) -> Explanation:
     return derived_pose(plan, f"{source}_from_{target}", own, way)
 
 
-def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
+def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanation:
     """Derive B seen from A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
     frames = _three_frames(a, b)
@@ -225,7 +226,7 @@ def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
     return derived_pose(plan, f"{frames[1]}_from_{frames[2]}", own, way)
 
 
-def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> Explanation:
+def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction: float) -> Explanation:
     """Derive the pose at a fraction of the way from A to B."""
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
@@ -237,13 +238,13 @@ def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> E
     return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
 
 
-def _three_frames(a: Given, b: Given) -> tuple[str, str, str]:
+def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[str, str, str]:
     """Name the frame that two poses are seen from, and the two that they are the poses of."""
     world = a.pose.parent or b.pose.parent or "world"
     return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
 
 
-def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
+def _both(sheet: Sheet, a: WrittenPose, b: WrittenPose, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
     """Add the way from what is written to both poses."""
     world, first, second = frames
     one, other = _written(sheet, [a, b], [(world, first), (world, second)])
@@ -284,7 +285,7 @@ class ByTree(NamedTuple):
     at_ns: int | None = None
 
 
-class Moved(NamedTuple):
+class MovedRecord(NamedTuple):
     """A record, and what the command makes of it.
 
     kind: point, vector, pose, twist or wrench; target, source: the frame it goes to, and that it is given in
@@ -299,7 +300,7 @@ class Moved(NamedTuple):
     numbers: Sequence[float]
     covariance: Sequence[float]
     result: Sequence[float]
-    pose: Given | None = None
+    pose: WrittenPose | None = None
 
     @property
     def frames(self) -> tuple[str, str]:
@@ -315,12 +316,12 @@ LABELS = {  # of the vectors of what is moved, and their units
 }
 
 
-def apply(plan: DerivationStyle, way: ByTree | Given, record: Moved) -> Explanation:
+def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord) -> Explanation:
     """Derive where a record is in the target's frame; the source and the time of a lookup are those of the record."""
     target, source = record.frames
 
     def write(sheet: Sheet) -> None:
-        if isinstance(way, Given):
+        if isinstance(way, WrittenPose):
             (pose,) = _written(sheet, [way], [record.frames])
         else:
             pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
@@ -333,7 +334,7 @@ def apply(plan: DerivationStyle, way: ByTree | Given, record: Moved) -> Explanat
     return explained(plan, f"{record.kind} in {target} of a {record.kind} in {source}", write)
 
 
-def _move_vectors(sheet: Sheet, pose: Rigid, record: Moved) -> None:
+def _move_vectors(sheet: Sheet, pose: Rigid, record: MovedRecord) -> None:
     """Move a point, a vector, a twist or a wrench, and end with the result."""
     sheet.reached(record.numbers)
     found, own = operations.moved(sheet, record.kind, pose, record.numbers, record.frames), record.result
@@ -345,13 +346,13 @@ def _move_vectors(sheet: Sheet, pose: Rigid, record: Moved) -> None:
     sheet.result(f"in {record.frames[0]}", rows)
 
 
-def _move_pose(sheet: Sheet, pose: Rigid, given: Given, record: Moved, plan: DerivationStyle) -> None:
+def _move_pose(sheet: Sheet, pose: Rigid, written: WrittenPose, record: MovedRecord, plan: DerivationStyle) -> None:
     """Move a pose, and end with the result."""
-    (target, origin), name = record.frames, printable(given.pose.name or "it")
-    own = Result(Pose.of(record.result[:7], given.pose.name, record.target))
+    (target, origin), name = record.frames, printable(written.pose.name or "it")
+    own = Result(Pose.of(record.result[:7], written.pose.name, record.target))
     sheet.heading("The record")
-    given.say(sheet, origin, name)
-    derived = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
+    written.say(sheet, origin, name)
+    derived = operations.compose(sheet, pose, written.components(sheet, origin, name), (target, origin, name))
     if record.covariance:
         own.extras["covariance"] = record.result[7:]
         _check_covariance(sheet, operations.pose_covariance(sheet, pose, record.covariance), record.result[7:])

@@ -52,50 +52,53 @@ MOVERS = {"point": "p", "vector": "v", "twist": "vw", "wrench": "fm"}  # letters
 PARTS = {0: "position", 3: "rotation"}
 
 
-def block_of(form: Notation) -> Block:
+def block_of(notation: Notation) -> Block:
     """Return the names of a notation's numbers; raises ValueInvalid for a representation without sheets."""
-    name = form.representation.name
+    name = notation.representation.name
     if name not in BLOCKS:
         raise ValueInvalid(f"there is no derivation of {shown(name)}; derived are {', '.join(BLOCKS)}")
     return BLOCKS[name]
 
 
-def names_of(names: str, form: Notation, *, degrees: bool) -> list[str]:
+def names_of(names: str, notation: Notation, *, degrees: bool) -> list[str]:
     """Return the names of numbers, angles with their unit where it is the degree."""
     return [
-        f"{name}_deg" if degrees and at in form.representation.angles else name for at, name in enumerate(names.split())
+        f"{name}_deg" if degrees and at in notation.representation.angles else name
+        for at, name in enumerate(names.split())
     ]
 
 
-def sheet_of(form: Notation) -> str:
+def sheet_of(notation: Notation) -> str:
     """Return the first word of the names of a notation's sheets."""
-    return "quaternion" if form.representation.name == "xyzw" else form.representation.name
+    return "quaternion" if notation.representation.name == "xyzw" else notation.representation.name
 
 
-def to_quaternion(sheet: Sheet, numbers: Sequence[float], form: Notation, *, degrees: bool) -> Quaternion:
+def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
     """Add the way from the numbers of a notation to the quaternion."""
-    names, name = names_of(block_of(form).written, form, degrees=degrees), sheet_of(form)
+    names, name = names_of(block_of(notation).written, notation, degrees=degrees), sheet_of(notation)
     values: Values = dict(zip(names, numbers, strict=True))
     words = UNITS[degrees].copy()
     if name == "euler":
-        words |= _axes(form.bound_axes(), values) | _elementary(form.bound_axes())
+        words |= _axes(notation.bound_axes(), values) | _elementary(notation.bound_axes())
     is_plain = name in ("wxyz", "quaternion")
     sheet.play("quaternion to" if is_plain else f"{name} to", values, order=ORDERS.get(name, ORDERS[""]), **words)
     return quaternion_of(values)
 
 
-def from_quaternion(sheet: Sheet, q: Quaternion, form: Notation, *, degrees: bool, keep_sign: bool) -> Sequence[float]:
+def from_quaternion(
+    sheet: Sheet, q: Quaternion, notation: Notation, *, degrees: bool, keep_sign: bool
+) -> Sequence[float]:
     """Add the way from the quaternion to a notation; return its numbers."""
-    names = names_of(block_of(form).found, form, degrees=degrees)
+    names = names_of(block_of(notation).found, notation, degrees=degrees)
     x, y, z, w = q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
     words = UNITS[degrees].copy()
-    if form.representation.name in ("rpy", "euler"):
-        axes = form.bound_axes() if form.representation.name == "euler" else "sxyz"
+    if notation.representation.name in ("rpy", "euler"):
+        axes = notation.bound_axes() if notation.representation.name == "euler" else "sxyz"
         values["locked"] = float(euler.locked(*q, axes))
-        words |= _axes(axes, values) | dict(zip(("a1", "a2", "a3"), block_of(form).found.split(), strict=True))
-    sheet.play(f"{sheet_of(form)} from", values, **words)
+        words |= _axes(axes, values) | dict(zip(("a1", "a2", "a3"), block_of(notation).found.split(), strict=True))
+    sheet.play(f"{sheet_of(notation)} from", values, **words)
     return [values[name] for name in names]
 
 
@@ -245,7 +248,7 @@ def with_other_axes(sheet: Sheet, pose: Rigid, change: OtherAxes) -> Rigid:
     return *vector_of(values, "t"), *quaternion_of(values, "q")
 
 
-class Given(NamedTuple):
+class WrittenPose(NamedTuple):
     """A pose as it was written.
 
     pose: what it is, read as every command reads it
@@ -284,7 +287,7 @@ class Given(NamedTuple):
     def _named(self, target: str, source: str) -> str:
         return f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
 
-    def turned(self) -> Given:
+    def turned(self) -> WrittenPose:
         """Return the inverse: what is written stays, the pose and its frames are turned around."""
         return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
 

@@ -113,8 +113,11 @@ def _grid(grid: MatrixLine) -> list[str]:
     groups: list[list[str]] = []
     sign = ""
     for part in grid.parts:
+        if part == ")":
+            groups[-1] = _beside("", groups[-1], " )")
+            continue
         if isinstance(part, str):
-            sign += f"{part} "
+            sign = f"{part} "
             continue
         block = _beside(sign, _block(part), f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
         if groups and len(head) + len(groups[-1][0]) + 1 + max(map(len, block)) <= WIDTH:
@@ -130,9 +133,8 @@ def _grid(grid: MatrixLine) -> list[str]:
 
 def _beside(left: str, block: Sequence[str], right: str = "") -> list[str]:
     """Put words to the left and to the right of the middle row of a block."""
-    blank = " " * len(left)
-    middle = len(block) // 2
-    return [left + row + right if at == middle else blank + row for at, row in enumerate(block)]
+    before, behind, middle = " " * len(left), " " * len(right), len(block) // 2
+    return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]
 
 
 def _block(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -201,7 +203,7 @@ class Explanation:
         return text_of(self.items)
 
     def __repr__(self) -> str:
-        """Say what is derived."""
+        """Return in brief what is derived."""
         return f"<Explanation of {self.title}>"
 
     def markdown(self) -> str:

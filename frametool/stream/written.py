@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
 from frametool.explain import derive
-from frametool.explain.derive import LABELS, ByTree, Moved
-from frametool.explain.operations import Given
+from frametool.explain.derive import LABELS, ByTree, MovedRecord
+from frametool.explain.operations import WrittenPose
 from frametool.geometry import floats
 from frametool.stream.record_values import documents, pose_of
 from frametool.stream.request import Operation, Request
@@ -21,29 +21,31 @@ if TYPE_CHECKING:
     from frametool.stream.record import Record
 
 
-def given_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[Given]:
+def written_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[WrittenPose]:
     """Read the poses of a text as they are written; raises as `read_poses` does."""
     request = Request(kind=POSE, degrees=degrees, normalize=normalize)
-    return [_given(record, request) for record in _records(source, request)]
+    return [_written_pose(record, request) for record in _records(source, request)]
 
 
 def _records(source: Source, request: Request) -> list[Record]:
     return [record for _, found in documents(source, request) for record in found]
 
 
-def _given(record: Record, request: Request) -> Given:
+def _written_pose(record: Record, request: Request) -> WrittenPose:
     """Return a record as it is written."""
-    shape, form = record.shape, record.shape.notation
-    given = Given(pose_of(record, request), form, position=shape.position(record.values), inverse=shape.inverse)
-    if form is None:
-        return given
-    return given._replace(
-        numbers=shape.rotation(record.values), degrees=bool(form.representation.angles) and shape.degrees
+    shape, notation = record.shape, record.shape.notation
+    written = WrittenPose(
+        pose_of(record, request), notation, position=shape.position(record.values), inverse=shape.inverse
+    )
+    if notation is None:
+        return written
+    return written._replace(
+        numbers=shape.rotation(record.values), degrees=bool(notation.representation.angles) and shape.degrees
     )
 
 
 def derive_record(
-    plan: DerivationStyle, way: ByTree | Given, source: Source, *, kind: str = "", degrees: bool = False,
+    plan: DerivationStyle, way: ByTree | WrittenPose, source: Source, *, kind: str = "", degrees: bool = False,
     normalize: bool = False, counters: bool = True, timeless: bool = False,
 ) -> Explanation:  # fmt: skip
     """Derive where a record is in the target's frame.
@@ -60,7 +62,7 @@ def derive_record(
         what = f"of a {shape.kind}" + " with such a covariance" * bool(shape.covariance)
         raise ValueInvalid(f"no derivation {what}; leave --explain out")
     target, origin = _target_and_source(way, record.parent.text)
-    if isinstance(way, Given):
+    if isinstance(way, WrittenPose):
         return derive.apply(plan, way, _moved(record, request, target, origin, way.pose.components))
     at_ns = None if timeless or way.frames.latest(target, origin) is None else record.stamp_ns
     way = way._replace(source=origin, at_ns=at_ns if way.at_ns is None else way.at_ns)
@@ -68,22 +70,22 @@ def derive_record(
     return derive.apply(plan, way, _moved(record, request, target, origin, mover))
 
 
-def _moved(record: Record, request: Request, target: str, source: str, mover: Rigid) -> Moved:
+def _moved(record: Record, request: Request, target: str, source: str, mover: Rigid) -> MovedRecord:
     """Return a record with the result that its command has for it."""
     shape = record.shape
     numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]
     if shape.kind == POSE:
-        given = _given(record, request)
-        result = request.operation.pose([(*given.pose.components, *covariance)], mover, floats)
-        return Moved(POSE, target, source, (), covariance, result, given)
+        written = _written_pose(record, request)
+        result = request.operation.pose([(*written.pose.components, *covariance)], mover, floats)
+        return MovedRecord(POSE, target, source, (), covariance, result, written)
     start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
     result = request.operation.move(shape, start, covariance, mover)
-    return Moved(shape.kind, target, source, start, covariance, result)
+    return MovedRecord(shape.kind, target, source, start, covariance, result)
 
 
-def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
+def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str, str]:
     """Return target and source for a record; where it names its own frame, that must be the source."""
-    if isinstance(way, Given):
+    if isinstance(way, WrittenPose):
         target, source = way.pose.parent or "a", way.pose.name
     else:
         target, source = way.target, way.source

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.explain.derive import ByTree, DerivationStyle
-    from frametool.explain.operations import Given
+    from frametool.explain.operations import WrittenPose
     from frametool.formats.load import Rules
     from frametool.geometry.types import Components
     from frametool.stream.request import Request
@@ -195,7 +195,7 @@ class Way(NamedTuple):
     from_frame: Callable[[str | None, int | None], Components]
     at_times: Callable[[str | None, Any], Components] | None
     moves: Callable[[str | None], bool]
-    explained: Callable[[], ByTree | Given]
+    explained: Callable[[], ByTree | WrittenPose]
     has_source: bool
     counters: bool = True
     uncertain: bool = False
