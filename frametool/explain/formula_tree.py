@@ -29,6 +29,7 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
 COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
+CALLS = {"sqrt": r"\sqrt{%s}", "abs": r"\left\lvert %s \right\rvert", "atan2": r"\operatorname{atan2}\left(%s\right)"}
 PI = "pi"
 EXPONENT = re.compile(r"e([+-]?)0*(\d+)$")
 
@@ -158,12 +159,4 @@ def latex_number(text: str) -> str:
 
 
 def _call(name: str, arguments: Iterable[str], *, latex: bool) -> str:
-    inside = ", ".join(arguments)
-    if not latex:
-        return f"{name}({inside})"
-    if name == "sqrt":
-        return rf"\sqrt{{{inside}}}"
-    if name == "abs":
-        return rf"\left\lvert {inside} \right\rvert"
-    operator = r"\operatorname{atan2}" if name == "atan2" else rf"\{name}"
-    return rf"{operator}\left({inside}\right)"
+    return (CALLS.get(name, rf"\{name}\left(%s\right)") if latex else f"{name}(%s)") % ", ".join(arguments)

@@ -241,7 +241,9 @@ def _aligned(item: SheetStep | MatrixLine) -> list[str]:
     """Return the lines of a formula, aligned at the first sign of equality of each."""
     if isinstance(item, MatrixLine):
         name = item.name.replace("'", r"^{\prime}")
-        parts = [*filter(None, [item.latex]), " ".join(map(_matrix, item.parts))]
+        formula = re.sub(r"(?<!\+) (?!\+)", r"\\,", re.sub(r"\b([a-zM])([a-z\d])\b", r"\1_\2", item.text))
+        formula = re.sub(r"\^(-?)T", r"^{\1\\mathsf T}", formula).replace("1/2", r"\tfrac{1}{2}")
+        parts = [*filter(None, [formula]), " ".join(map(_matrix, item.parts))]
     else:
         name, parts = symbol(item.name), equals(item, as_latex, symbol, latex_number)
     if sum(map(len, parts)) <= LONG:

@@ -38,7 +38,6 @@ TOO_LARGE = "the numbers are too large or too small for a derivation: a step is 
 LAST_STEP = 1e-9  # the convergence is quadratic: what comes after such a step is rounding
 MOST_STEPS = 60
 STEP = re.compile(r"(\S+) = (.*?)(?:  \[(.*)\])?")
-NEAREST = r"\tfrac{1}{2}\left(M + M^{-\mathsf{T}}\right)"
 
 
 class Line(NamedTuple):
@@ -93,7 +92,6 @@ class MatrixLine(NamedTuple):
 
     name: str
     text: str
-    latex: str
     parts: Sequence[str | Sequence[Sequence[str]]]
     unit: str = ""
 
@@ -264,15 +262,15 @@ class Sheet:
         self.items.append(SheetStep(name, formula, exactly or formula, numbers, unit))
         return value
 
-    def grid(self, name: str, text: str, latex: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
+    def grid(self, name: str, text: str, parts: Sequence[str | Matrix], unit: str = "") -> None:
         """Add matrices side by side; the last one is the value."""
         shown = [part if isinstance(part, str) else [[self.number(v) for v in row] for row in part] for part in parts]
-        self.items.append(MatrixLine(name, text, latex, shown, unit))
+        self.items.append(MatrixLine(name, text, shown, unit))
 
     def matrix_step(self, values: Values, line: str) -> None:
         """Add a matrix, or a step of matrices: a product of them, with a sign before it or a vector added."""
         if " = " not in line:
-            self.grid(line, "", "", [rows([values[each] for each in ENTRIES])])
+            self.grid(line, "", [rows([values[each] for each in ENTRIES])])
             return
         name, formula, unit = _parts(line)
         product, _, shift = formula.removeprefix("-").partition(" + ")
@@ -285,10 +283,8 @@ class Sheet:
         signs: list[str | Matrix] = ["-"] if formula.startswith("-") else []
         if signs:
             found = [[0.0 - entry for entry in row] for row in found]
-        latex = re.sub(r"\b([a-z])([a-z])\b", r"\1_\2", re.sub(r"(?<!\+) (?!\+)", r"\\,", formula))
-        latex = latex.replace("^T", r"^{\mathsf T}")
         plus: list[str | Matrix] = ["+", *added] if shift else []
-        self.grid(name, formula, latex, [*signs, *factors, *plus, "=", found], unit)
+        self.grid(name, formula, [*signs, *factors, *plus, "=", found], unit)
         if len(found[0]) > 1:
             self.matrices[name] = found
         else:
@@ -382,7 +378,7 @@ class Sheet:
     def columns(self, values: Values, *letters: str) -> None:
         """Add the matrix of three columns."""
         entries = [[values[letter + each] for letter in letters] for each in "xyz"]
-        self.grid("R", "(u v w)", r"(u\ v\ w)", [entries])
+        self.grid("R", "(u v w)", [entries])
         values.update(zip(ENTRIES, [entry for row in entries for entry in row], strict=True))
 
     def nearest(self, values: Values) -> None:
@@ -397,7 +393,7 @@ class Sheet:
             other = [[2.0 * b - a for a, b in zip(*pair, strict=True)] for pair in zip(here, there, strict=True)]
             name = f"M{count - 1 or ''}"
             parts: list[str | Matrix] = ["1/2·(", here, "+", other, ")", "=", there]
-            self.grid(f"M{count}", f"1/2 ({name} + {name}^-T)", NEAREST, parts)
+            self.grid(f"M{count}", f"1/2 ({name} + {name}^-T)", parts)
             step = max(abs(a - b) for pair in zip(here, there, strict=True) for a, b in zip(*pair, strict=True))
             here = there
             if step < LAST_STEP:
