@@ -289,7 +289,7 @@ class MovedRecord(NamedTuple):
     """A record, and what the command makes of it.
 
     kind: point, vector, pose, twist or wrench; target, source: the frame it goes to, and that it is given in
-    numbers: as written, of what is no pose; covariance: 36 numbers, or none
+    mover: target_from_source; numbers: as written, of what is no pose; covariance: 36 numbers, or none
     result: the numbers of the result, then those of its covariance
     pose: a pose as it is written
     """
@@ -297,6 +297,7 @@ class MovedRecord(NamedTuple):
     kind: str
     target: str
     source: str
+    mover: Rigid
     numbers: Sequence[float]
     covariance: Sequence[float]
     result: Sequence[float]
@@ -326,6 +327,7 @@ def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord)
         else:
             pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
         sheet.reached(pose[:3])
+        check_vector(sheet, pose[:3], record.mover[:3])
         if record.pose is None:
             _move_vectors(sheet, pose, record)
         else:

@@ -77,10 +77,10 @@ def _moved(record: Record, request: Request, target: str, source: str, mover: Ri
     if shape.kind == POSE:
         written = _written_pose(record, request)
         result = request.operation.pose([(*written.pose.components, *covariance)], mover, floats)
-        return MovedRecord(POSE, target, source, (), covariance, result, written)
+        return MovedRecord(POSE, target, source, mover, (), covariance, result, written)
     start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
     result = request.operation.move(shape, start, covariance, mover)
-    return MovedRecord(shape.kind, target, source, start, covariance, result)
+    return MovedRecord(shape.kind, target, source, mover, start, covariance, result)
 
 
 def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str, str]:
