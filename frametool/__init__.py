@@ -18,13 +18,13 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool import covariance as covariance
     from frametool.calc.api import calc as calc
+    from frametool.derivation import explain as explain
     from frametool.earth import earth_pose as earth_pose
     from frametool.earth import ecef_from_lla as ecef_from_lla
     from frametool.earth import lla_from_ecef as lla_from_ecef
     from frametool.earth import lla_from_utm as lla_from_utm
     from frametool.earth import utm_from_lla as utm_from_lla
     from frametool.errors import FrametoolError as FrametoolError
-    from frametool.explain.api import explain as explain
     from frametool.fit.api import align as align
     from frametool.fit.api import compare as compare
     from frametool.fit.api import resample as resample

@@ -1,6 +1,6 @@
 """Expressions over poses, points and numbers, whose frames are checked like units.
 
-The room is a function too, because `frametool.calc(..)` and `frametool.calc.evaluate` share a name.
+The room is a function too, because `frametool.calc(..)` and `frametool.calc.api` share a name.
 """
 
 from __future__ import annotations
@@ -9,4 +9,5 @@ import sys
 
 from frametool.explain import CallableRoom
 
+entry = "frametool.calc.api"
 sys.modules[__name__].__class__ = CallableRoom

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
-    from frametool.explain.given import Given
+    from frametool.explain.operations import WrittenPose
     from frametool.explain.render import Explanation
     from frametool.stream.request import Request
 
@@ -118,7 +118,7 @@ class PoseTask:
         refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "edges"} - {"given", "quiet"}))
         return DerivationStyle(self.output.style, significant(self._precision))
 
-    def written(self, argument: str | Source | None, *, warned: bool = False) -> Given:
+    def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
         """Read the one pose of an argument as it is written.
 
         warned: its warnings are on stderr already
@@ -127,13 +127,13 @@ class PoseTask:
             argument, is_inverse = without_inverse(argument)
             if is_inverse:
                 return self.written(argument, warned=warned).turned()
-        from frametool.explain.given import given_poses
+        from frametool.stream.written import written_poses
 
         request = self.request()
         try:
             source = pose_source(one_argument(argument), request)
             with heard_by(lambda *_: None) if warned else nullcontext():
-                found = given_poses(source, degrees=request.degrees, normalize=request.normalize)
+                found = written_poses(source, degrees=request.degrees, normalize=request.normalize)
         except FormatError as error:
             raise usage_if_inline(error) from None
         if len(found) != 1:
@@ -150,7 +150,7 @@ class PoseTask:
 
 def significant(precision: int | None) -> int | None:
     """Return how many significant digits --precision asks for; None for all."""
-    from frametool.explain.sheet import DIGITS
+    from frametool.explain.run import DIGITS
 
     if precision == 0:
         raise click.UsageError("--precision counts significant digits with --explain; give 1 or more, or full")

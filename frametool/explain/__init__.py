@@ -1,6 +1,6 @@
 """How a result came about: the derivation step by step with the numbers of this run, as text or Markdown.
 
-The room is a function too, because `frametool.explain(..)` and `frametool.explain.api` share a name.
+The room is a function too: `frametool.explain(..)` is that of `frametool.derivation`.
 """
 
 from __future__ import annotations
@@ -9,15 +9,19 @@ import sys
 from types import ModuleType
 from typing import Any
 
+entry = "frametool.derivation"
+
 
 class CallableRoom(ModuleType):
-    """A package that can be called: it runs the function of its own name, which stands in its module `api`."""
+    """A package that can be called: it runs the function of its own name, which stands in the module `entry`."""
+
+    entry: str
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function."""
         from importlib import import_module
 
-        return getattr(import_module(f"{self.__name__}.api"), self.__name__.rpartition(".")[2])(*arguments, **options)
+        return getattr(import_module(self.entry), self.__name__.rpartition(".")[2])(*arguments, **options)
 
 
 sys.modules[__name__].__class__ = CallableRoom

@@ -13,31 +13,24 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FrametoolError, ValueInvalid, printable, shown
 from frametool.explain import operations
 from frametool.explain.chain import chain
-from frametool.explain.from_quaternion import blocks_of, run
-from frametool.explain.given import Given, frames_of, given_of
+from frametool.explain.operations import WrittenPose, frames_of
 from frametool.explain.render import Explanation
-from frametool.explain.sheet import DEGREES, DIGITS, METRES, RADIANS, Row, Sheet
+from frametool.explain.run import DIGITS, Row, Sheet
 from frametool.frames.lookups import Frames
-from frametool.geometry import floats, quaternion
-from frametool.geometry.representations import notation
+from frametool.geometry import floats, quaternion, representations
 from frametool.grammar import pose_algebra
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import looked_up, looked_up_across
 from frametool.grammar.result import Result, Style, carries_position, pose_numbers
-from frametool.stream.record_values import documents
-from frametool.stream.request import Operation, Request
-from frametool.stream.row_layout import PARTS, POSE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Quaternion
-    from frametool.stream.record import Record
 
+METRES, RADIANS, DEGREES = "m", "rad", "deg"
 CLOSE = 1e-12  # radians; and of positions, relative to the largest of them or a metre
 TWO_NAMES = "Half a turn has two names: +180 and -180 deg are the same angle; the result shows the other one."
 REPORT = "this is a mistake in frametool, please report it"
@@ -61,7 +54,7 @@ class DerivationStyle(NamedTuple):
     @property
     def notations(self) -> Sequence[Notation]:
         """Return the notations of the result."""
-        return self.style.notations or (notation("quaternion"),)
+        return self.style.notations or (representations.notation("quaternion"),)
 
 
 def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
@@ -77,38 +70,40 @@ def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None])
     return Explanation(title, sheet.items)
 
 
+def derived_pose(plan: DerivationStyle, title: str, own: Result, way: Callable[[Sheet], Rigid]) -> Explanation:
+    """Write the way to a pose, then that to its notations; `own` is what the command makes of it."""
+    return explained(plan, title, lambda sheet: end_with_pose(sheet, way(sheet), own, plan))
+
+
 def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationStyle) -> None:
     """Go on from the quaternion to the notations asked for, check both, and end with the command's own result."""
     if own.pose.position is not None:
         check_vector(sheet, derived[:3], own.pose.position)
     for each in plan.notations:
-        check_rotation(sheet, each, written(sheet, derived[3:], each, plan), own, plan)
+        degrees, keep_sign = plan.style.in_degrees(each), plan.style.keep_sign
+        found = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=keep_sign)
+        check_rotation(sheet, each, found, own, plan)
     end(sheet, own, plan)
 
 
-def written(sheet: Sheet, q: Quaternion, form: Notation, plan: DerivationStyle) -> Sequence[float]:
-    """Add the way from the quaternion to a notation; return its numbers."""
-    block, style = blocks_of(form).from_quaternion, plan.style
-    numbers: Sequence[float] = run(block, sheet, q, form, degrees=style.in_degrees(form), keep_sign=style.keep_sign)
-    return numbers
-
-
-def check_rotation(sheet: Sheet, form: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle) -> None:
+def check_rotation(
+    sheet: Sheet, notation: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle
+) -> None:
     """Compare numbers of a notation with the result's as rotations, also near lock; say how a pose is written in it.
 
     Raises DerivationWrong.
     """
-    degrees = plan.style.in_degrees(form)
+    degrees = plan.style.in_degrees(notation)
     target = quaternion.unit(*own.pose.components[3:], floats)
-    found = form.to_quaternion(tuple(numbers), floats, degrees=degrees)
+    found = notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
     if not off <= CLOSE * sheet.stretch:
-        raise DerivationWrong(f"the derivation in {form.spec} is off by {off:.3g} rad from the result; {REPORT}")
-    final = form.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
+        raise DerivationWrong(f"the derivation in {notation.spec} is off by {off:.3g} rad from the result; {REPORT}")
+    final = notation.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
     turn = 180.0 if degrees else math.pi
-    if any(abs(numbers[at] - final[at]) > turn for at in form.representation.angles):
+    if any(abs(numbers[at] - final[at]) > turn for at in notation.representation.angles):
         sheet.caveat(TWO_NAMES)
-    if carries_position(form) and own.pose.position is not None:
+    if carries_position(notation) and own.pose.position is not None:
         sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
 
 
@@ -144,128 +139,116 @@ def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
     return [row(label * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)]
 
 
-def _rotation_rows(own: Result, form: Notation, style: Style) -> list[Row]:
+def _rotation_rows(own: Result, notation: Notation, style: Style) -> list[Row]:
     """Return the lines of one notation; a matrix has several, and so has an axis with its angle."""
-    _, numbers = pose_numbers(own.pose, form, style)
-    if form.representation.whole is not None:
-        return _rows(form.spec, numbers, math.isqrt(len(numbers)))
-    angles = form.representation.angles
+    _, numbers = pose_numbers(own.pose, notation, style)
+    if notation.representation.whole is not None:
+        return _rows(notation.spec, numbers, math.isqrt(len(numbers)))
+    angles = notation.representation.angles
     first = angles[0] if angles else len(numbers)
-    unit = DEGREES if style.in_degrees(form) else RADIANS
-    parts = [(form.names[:first], numbers[:first], ""), (form.names[first:], numbers[first:], unit)]
-    return [row(form.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
+    unit = DEGREES if style.in_degrees(notation) else RADIANS
+    parts = [(notation.names[:first], numbers[:first], ""), (notation.names[first:], numbers[first:], unit)]
+    return [row(notation.spec * (at == 0), *part) for at, part in enumerate(each for each in parts if each[1])]
 
 
 def convert(
-    plan: DerivationStyle, pose: Given, *, own: Pose | None = None, change: OtherAxes | None = None
+    plan: DerivationStyle, pose: WrittenPose, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
     """Derive one pose or rotation in the notations asked for.
 
     own: what the command makes of it.  change: of its axes.
     """
-    result = Result(own or pose.pose)
 
-    def write(sheet: Sheet) -> None:
+    def way(sheet: Sheet) -> Rigid:
         sheet.reached(pose.position)
-        hub = _hub(sheet, pose, change)
-        if result.pose.position is not None:
-            check_vector(sheet, hub[:3], result.pose.position)
-        for form in plan.notations:
-            check_rotation(sheet, form, written(sheet, hub[3:], form, plan), result, plan)
-        end(sheet, result, plan)
+        x, y, z = pose.position
+        found: Rigid = (x, y, z, *pose.quaternion(sheet))
+        if pose.inverse:
+            found = operations.inverse(sheet, found, "child", "parent")
+        return found if change is None else operations.with_other_axes(sheet, found, change)
 
     title = "identity" if pose.notation is None else pose.notation.spec
-    return explained(plan, f"{title} to {', '.join(form.spec for form in plan.notations)}", write)
+    return derived_pose(
+        plan, f"{title} to {', '.join(notation.spec for notation in plan.notations)}", Result(own or pose.pose), way
+    )
 
 
-def _hub(sheet: Sheet, given: Given, change: OtherAxes | None) -> Rigid:
-    """Add the way from what is written to the position and the quaternion."""
-    q = given.quaternion(sheet)
-    x, y, z = given.position
-    pose: Rigid = (x, y, z, *q)
-    if given.inverse:
-        pose = operations.inverse(sheet, pose, "child", "parent")
-    return pose if change is None else operations.with_other_axes(sheet, pose, change)
-
-
-def _say_given(sheet: Sheet, poses: Sequence[Given], labels: Sequence[tuple[str, str]]) -> None:
-    """List the poses as they are written."""
+def _written(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
+    """List the poses as they are written, and add the way from there to each; `labels` are its target and source."""
     sheet.heading("Given")
-    for each, (target, source) in zip(poses, labels, strict=True):
-        each.say(sheet, target, source)
+    for each, label in zip(poses, labels, strict=True):
+        each.say(sheet, *label)
+    return [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
 
 
-def compose(plan: DerivationStyle, *poses: Given) -> Explanation:
+def compose(plan: DerivationStyle, *poses: WrittenPose) -> Explanation:
     """Derive the product of poses."""
     if not poses:
         raise ValueInvalid("compose takes at least one pose")
     own = Result(reduce(pose_algebra.product, [each.pose for each in poses]))
-    names = frames_of(len(poses) + 1, [each.pose for each in poses])
+    names = frames_of([each.pose for each in poses])
     labels = list(itertools.pairwise(names))
 
-    def write(sheet: Sheet) -> None:
-        _say_given(sheet, poses, labels)
-        factors = [each.components(sheet, *label) for each, label in zip(poses, labels, strict=True)]
-        pose = factors[0]
-        for at, factor in enumerate(factors[1:], 1):
-            pose = operations.compose(sheet, pose, factor, (names[0], names[at], names[at + 1]))
-        end_with_pose(sheet, pose, own, plan)
+    def way(sheet: Sheet) -> Rigid:
+        pose, *factors = _written(sheet, poses, labels)
+        for factor, (middle, last) in zip(factors, labels[1:], strict=True):
+            pose = operations.compose(sheet, pose, factor, (names[0], middle, last))
+        return pose
 
-    return explained(plan, f"{names[0]}_from_{names[-1]}", write)
+    return derived_pose(plan, f"{names[0]}_from_{names[-1]}", own, way)
 
 
-def invert(plan: DerivationStyle, pose: Given) -> Explanation:
+def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
     """Derive the inverse of a pose."""
     own = Result(pose_algebra.inverse(pose.pose))
-    target, source = frames_of(2, [pose.pose])
+    target, source = frames_of([pose.pose])
 
-    def write(sheet: Sheet) -> None:
-        _say_given(sheet, [pose], [(target, source)])
-        found = operations.inverse(sheet, pose.components(sheet, target, source), target, source)
-        end_with_pose(sheet, found, own, plan)
+    def way(sheet: Sheet) -> Rigid:
+        (found,) = _written(sheet, [pose], [(target, source)])
+        return operations.inverse(sheet, found, target, source)
 
-    return explained(plan, f"{source}_from_{target}", write)
+    return derived_pose(plan, f"{source}_from_{target}", own, way)
 
 
-def relative(plan: DerivationStyle, a: Given, b: Given) -> Explanation:
+def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanation:
     """Derive B seen from A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
     frames = _three_frames(a, b)
 
-    def write(sheet: Sheet) -> None:
+    def way(sheet: Sheet) -> Rigid:
         pose = operations.relative(sheet, *_both(sheet, a, b, frames), frames)
         found = operations.extent(sheet, pose, frames[1])
         for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
-        end_with_pose(sheet, pose, own, plan)
+        return pose
 
-    return explained(plan, f"{frames[1]}_from_{frames[2]}", write)
+    return derived_pose(plan, f"{frames[1]}_from_{frames[2]}", own, way)
 
 
-def interpolate(plan: DerivationStyle, a: Given, b: Given, fraction: float) -> Explanation:
+def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction: float) -> Explanation:
     """Derive the pose at a fraction of the way from A to B."""
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     frames = _three_frames(a, b)
 
-    def write(sheet: Sheet) -> None:
-        end_with_pose(sheet, operations.between(sheet, *_both(sheet, a, b, frames), fraction), own, plan)
+    def way(sheet: Sheet) -> Rigid:
+        return operations.between(sheet, *_both(sheet, a, b, frames), fraction)
 
-    return explained(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", write)
+    return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
 
 
-def _three_frames(a: Given, b: Given) -> tuple[str, str, str]:
+def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[str, str, str]:
     """Name the frame that two poses are seen from, and the two that they are the poses of."""
     world = a.pose.parent or b.pose.parent or "world"
     return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
 
 
-def _both(sheet: Sheet, a: Given, b: Given, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
+def _both(sheet: Sheet, a: WrittenPose, b: WrittenPose, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
     """Add the way from what is written to both poses."""
     world, first, second = frames
-    _say_given(sheet, [a, b], [(world, first), (world, second)])
-    return a.components(sheet, world, first), b.components(sheet, world, second)
+    one, other = _written(sheet, [a, b], [(world, first), (world, second)])
+    return one, other
 
 
 def lookup(
@@ -280,22 +263,17 @@ def lookup(
     else:
         own = looked_up_across(tree, target, at_ns, source, source_at_ns, fixed)
 
-    def write(sheet: Sheet) -> None:
+    def way(sheet: Sheet) -> Rigid:
         if fixed is None:
-            pose = chain(sheet, tree, target, source, at_ns)
-        else:
-            with sheet.about("where the target was"):
-                first = chain(sheet, tree, target, fixed, at_ns)
-            with sheet.about("where the source was"):
-                second = chain(sheet, tree, fixed, source, source_at_ns)
-            sheet.say("The fixed frame counts as standing between the two times.")
-            pose = operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
-        end_with_pose(sheet, pose, own, plan)
+            return chain(sheet, tree, target, source, at_ns)
+        with sheet.about("where the target was"):
+            first = chain(sheet, tree, target, fixed, at_ns)
+        with sheet.about("where the source was"):
+            second = chain(sheet, tree, fixed, source, source_at_ns)
+        sheet.play("across", {})
+        return operations.compose(sheet, first, second, (printable(target), printable(fixed), printable(source)))
 
-    return explained(plan, f"{printable(target)}_from_{printable(source)}", write)
-
-
-UNITS = {"point": ("m",), "vector": ("",), "twist": ("m/s", "rad/s"), "wrench": ("N", "Nm")}
+    return derived_pose(plan, f"{printable(target)}_from_{printable(source)}", own, way)
 
 
 class ByTree(NamedTuple):
@@ -307,98 +285,79 @@ class ByTree(NamedTuple):
     at_ns: int | None = None
 
 
-def apply(
-    plan: DerivationStyle, way: ByTree | Given, source: Source, *, kind: str = "", degrees: bool = False,
-    normalize: bool = False, counters: bool = True, timeless: bool = False,
-) -> Explanation:  # fmt: skip
-    """Derive where a record is in the target's frame.
+class MovedRecord(NamedTuple):
+    """A record, and what the command makes of it.
 
-    way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
+    kind: point, vector, pose, twist or wrench; target, source: the frame it goes to, and that it is given in
+    mover: target_from_source; numbers: as written, of what is no pose; covariance: 36 numbers, or none
+    result: the numbers of the result, then those of its covariance
+    pose: a pose as it is written
     """
-    request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, frame_is_counter=counters)
-    records = [record for _, found in documents(source, request) for record in found]
-    if len(records) != 1:
-        raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
-    record = records[0]
-    if record.shape.kind not in (POSE, *UNITS) or {*record.shape.covariance} - {36} or len(record.shape.covariance) > 1:
-        what = f"of a {record.shape.kind}" + " with such a covariance" * bool(record.shape.covariance)
-        raise ValueInvalid(f"no derivation {what}; leave --explain out")
-    names = _target_and_source(way, record.parent.text)
-    target, origin = map(printable, names)
-    at_ns = None if timeless else record.stamp_ns
-    if isinstance(way, Given):
-        mover = way.pose.components
-    else:
-        at_ns = None if way.frames.latest(*names) is None else at_ns
-        at_ns = at_ns if way.at_ns is None else way.at_ns
-        mover = way.frames.lookup(*names, at_ns).components
+
+    kind: str
+    target: str
+    source: str
+    mover: Rigid
+    numbers: Sequence[float]
+    covariance: Sequence[float]
+    result: Sequence[float]
+    pose: WrittenPose | None = None
+
+    @property
+    def frames(self) -> tuple[str, str]:
+        """Return the names of target and source as they are printed."""
+        return printable(self.target), printable(self.source)
+
+
+LABELS = {  # of the vectors of what is moved, and their units
+    "point": (("point", METRES),),
+    "vector": (("vector", ""),),
+    "twist": (("linear", "m/s"), ("angular", "rad/s")),
+    "wrench": (("force", "N"), ("torque", "Nm")),
+}
+
+
+def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord) -> Explanation:
+    """Derive where a record is in the target's frame; the source and the time of a lookup are those of the record."""
+    target, source = record.frames
 
     def write(sheet: Sheet) -> None:
-        if isinstance(way, Given):
-            _say_given(sheet, [way], [(target, origin)])
-            pose = way.components(sheet, target, origin)
+        if isinstance(way, WrittenPose):
+            (pose,) = _written(sheet, [way], [record.frames])
         else:
-            pose = chain(sheet, way.frames, *names, at_ns)
+            pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
         sheet.reached(pose[:3])
-        check_vector(sheet, pose[:3], mover[:3])
-        if record.shape.kind == POSE:
-            _move_pose(sheet, pose, given_of(record, request), record, mover, names, plan)
+        check_vector(sheet, pose[:3], record.mover[:3])
+        if record.pose is None:
+            _move_vectors(sheet, pose, record)
         else:
-            _move_vectors(sheet, pose, record, mover, (target, origin))
+            _move_pose(sheet, pose, record.pose, record, plan)
 
-    return explained(plan, f"{record.shape.kind} in {target} of a {record.shape.kind} in {origin}", write)
-
-
-def _target_and_source(way: ByTree | Given, own: str | None) -> tuple[str, str]:
-    """Return target and source for a record; where it names its own frame, that must be the source."""
-    if isinstance(way, Given):
-        target, source = way.pose.parent or "a", way.pose.name
-    else:
-        target, source = way.target, way.source
-        if own and own.startswith("/") and own not in way.frames.frames:
-            own = own[1:]
-    if own and source is not None and own != source:
-        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}")
-    if not own and source is None and isinstance(way, ByTree):
-        raise ValueInvalid("a record does not say its frame; name SOURCE, or write {frame: .., point: [..]}")
-    return target, own or source or "b"
+    return explained(plan, f"{record.kind} in {target} of a {record.kind} in {source}", write)
 
 
-def _move_vectors(sheet: Sheet, pose: Rigid, record: Record, mover: Rigid, frames: tuple[str, str]) -> None:
+def _move_vectors(sheet: Sheet, pose: Rigid, record: MovedRecord) -> None:
     """Move a point, a vector, a twist or a wrench, and end with the result."""
-    shape = record.shape
-    numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]
-    start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
-    own = Operation(moves=True).move(shape, start, covariance, mover)
-    sheet.reached(start)
-    found = operations.MOVERS[shape.kind](sheet, pose, start, *frames)
+    sheet.reached(record.numbers)
+    found, own = operations.moved(sheet, record.kind, pose, record.numbers, record.frames), record.result
     check_vector(sheet, found, own[: len(found)])
-    labels = PARTS.get(shape.kind, (shape.kind,))
-    rows = [
-        row(label, "xyz", own[3 * at : 3 * at + 3], unit)
-        for at, (label, unit) in enumerate(zip(labels, UNITS[shape.kind], strict=True))
-    ]
-    if shape.covariance:
-        _check_covariance(sheet, operations.twist_covariance(sheet, pose, covariance), own[len(found) :])
+    rows = [row(label, "xyz", own[3 * at : 3 * at + 3], unit) for at, (label, unit) in enumerate(LABELS[record.kind])]
+    if record.covariance:
+        _check_covariance(sheet, operations.twist_covariance(sheet, pose, record.covariance), own[len(found) :])
         rows += _rows("covariance", own[len(found) :], 6)
-    sheet.result(f"in {frames[0]}", rows)
+    sheet.result(f"in {record.frames[0]}", rows)
 
 
-def _move_pose(
-    sheet: Sheet, pose: Rigid, given: Given, record: Record, mover: Rigid, names: tuple[str, str], plan: DerivationStyle
-) -> None:
+def _move_pose(sheet: Sheet, pose: Rigid, written: WrittenPose, record: MovedRecord, plan: DerivationStyle) -> None:
     """Move a pose, and end with the result."""
-    target, origin = map(printable, names)
-    name = printable(given.pose.name or "it")
-    covariance = tuple(record.values[record.shape.own_size :])
-    moved = Operation(moves=True).pose([(*given.pose.components, *covariance)], mover, floats)
-    own = Result(Pose.of(moved[:7], given.pose.name, names[0]))
+    (target, origin), name = record.frames, printable(written.pose.name or "it")
+    own = Result(Pose.of(record.result[:7], written.pose.name, record.target))
     sheet.heading("The record")
-    given.say(sheet, origin, name)
-    derived = operations.compose(sheet, pose, given.components(sheet, origin, name), (target, origin, name))
-    if record.shape.covariance:
-        own.extras["covariance"] = moved[7:]
-        _check_covariance(sheet, operations.pose_covariance(sheet, pose, covariance), own.extras["covariance"])
+    written.say(sheet, origin, name)
+    derived = operations.compose(sheet, pose, written.components(sheet, origin, name), (target, origin, name))
+    if record.covariance:
+        own.extras["covariance"] = record.result[7:]
+        _check_covariance(sheet, operations.pose_covariance(sheet, pose, record.covariance), record.result[7:])
     end_with_pose(sheet, derived, own, plan)
 
 

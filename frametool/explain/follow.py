@@ -9,18 +9,15 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import printable
-from frametool.explain.chain import fraction
-from frametool.explain.derive import CLOSE, REPORT, DerivationStyle, DerivationWrong, explained, row
-from frametool.explain.sheet import METRES, RADIANS
+from frametool.explain.chain import spans
+from frametool.explain.derive import CLOSE, METRES, RADIANS, REPORT, DerivationStyle, DerivationWrong, explained, row
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.explain.render import Explanation
-    from frametool.explain.sheet import Sheet, Values
-
-CUT = "The target is straight behind: y is 0 to rounding, and its last bit decides which way round the follower turns."
+    from frametool.explain.run import Sheet, Values
 
 
 class PlanarSample(NamedTuple):
@@ -86,77 +83,42 @@ def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explana
 def _seen(sheet: Sheet, step: FollowStep) -> Values:
     """Add where the target is in the follower's frame, as x and y."""
     follower, leader, target = map(printable, (step.follower, step.leader, step.target))
-    sheet.heading(f"Step {step.number}, {format_stamp(step.t_ns)[:-6]} s: {target} seen from {follower}")
     way = f"world_from_{leader}" + (f" @ {leader}_from_{target}" if step.carrot else "")
-    sheet.say(
-        f"{follower}_from_{target} = (world_from_{follower})^-1 @ {way}; in the plane: the difference, turned back by "
-        f"the heading h of {follower}."
-    )
-    values: Values = {}
+    words = {"follower": follower, "target": target, "way": way, "t": "t" if step.carrot else "1"}
+    sheet.play("follow seen", {}, number=step.number, time=format_stamp(step.t_ns)[:-6], **words)
+    values: Values = {"carrot": float(step.carrot is not None)}
     _place(sheet, values, step.led, leader, "1", turns=step.carrot is not None)
     _place(sheet, values, step.own, follower, "2", turns=True)
-    x, y = "x1", "y1"
     if step.carrot:
         _place(sheet, values, step.carrot, f"{target} in {leader}", "c", turns=False)
-        x, y = "xt", "yt"
-        sheet.say(f"{target} in the world:")
-        sheet.step(values, x, "x1 + cos(h1)*xc - sin(h1)*yc", METRES)
-        sheet.step(values, y, "y1 + sin(h1)*xc + cos(h1)*yc", METRES)
-    sheet.step(values, "x", f"cos(h2)*({x} - x2) + sin(h2)*({y} - y2)", METRES)
-    sheet.step(values, "y", f"cos(h2)*({y} - y2) - sin(h2)*({x} - x2)", METRES)
-    return values
+    return sheet.play("follow target", values, **words)
 
 
 def _place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
     """Add where a frame was: as published, or between two samples."""
-    before, after = seen.before, seen.after
+    before, after, at = seen.before, seen.after, format_stamp(seen.at_ns)
     if after is None:
-        parts = [("x", before.x, METRES), ("y", before.y, METRES), ("h", before.theta, RADIANS)][: 2 + turns]
-        values.update({letter + index: value for letter, value, _ in parts})
-        texts = [f"{letter}{index} {sheet.number(value)} {unit}" for letter, value, unit in parts]
-        sheet.say(f"{name} at {format_stamp(seen.at_ns)} s: {', '.join(texts)}")
+        values |= dict(zip((f"x{index}", f"y{index}", f"h{index}"), before[1 : 3 + turns], strict=False))
+        texts = [f"{letter}{index} {sheet.number(values[letter + index])} {unit}" for letter, unit in
+                 (("x", METRES), ("y", METRES), ("h", RADIANS))[: 2 + turns]]  # fmt: skip
+        sheet.say(f"{name} at {at} s: {', '.join(texts)}")
         return
-    sheet.say(f"{name}, a before and b after:")
-    found = {
-        "ax": before.x, "ay": before.y, "ah": before.theta, "bx": after.x, "by": after.y, "bh": after.theta,
-        "f": fraction(sheet, before.stamp_ns, after.stamp_ns, seen.at_ns),
-    }  # fmt: skip
-    for letter in "xy":
-        values[letter + index] = sheet.step(found, letter + index, f"a{letter} + f*(b{letter} - a{letter})", METRES)
-    if turns:
-        values[f"h{index}"] = sheet.step(found, f"h{index}", "ah + f*atan2(sin(bh - ah), cos(bh - ah))", RADIANS)
+    values |= dict(zip(("ax", "ay", "ah", "bx", "by", "bh"), (*before[1:], *after[1:]), strict=True))
+    values |= spans(before.stamp_ns, after.stamp_ns, seen.at_ns) | {"turns": float(turns)}
+    begin, end = format_stamp(before.stamp_ns), format_stamp(after.stamp_ns)
+    sheet.play("follow between", values, name=name, i=index, at=at, begin=begin, end=end)
 
 
 def _law(sheet: Sheet, step: FollowStep, values: Values) -> None:
     """Add the command of a target at x, y, and compare it with the follower's."""
-    sheet.heading(f"The command of {printable(step.follower)}")
-    distance = sheet.step(values, "d", "sqrt(x**2 + y**2)", METRES)
-    if distance < step.arrived:
-        sheet.say(f"Nearer than {step.arrived:g} m: arrived. The bearing is rounding noise there; the follower stands.")
-        _compare(step, distance, 0.0, 0.0)
-        return
     bearing = math.atan2(values["y"], values["x"])
     behind = bearing * step.angular * step.gains[1] < 0.0 and abs(abs(bearing) - math.pi) < 1e-9
-    if behind:
-        sheet.caveat(CUT)
-    sheet.step(values, "bearing", "-atan2(y, x)" if behind else "atan2(y, x)", RADIANS)
-    linear = _command(sheet, values, ("linear_x", "d", "m/s"), step.gains[0], step.limits[0])
-    angular = _command(sheet, values, ("angular_z", "bearing", "rad/s"), step.gains[1], step.limits[1])
-    sheet.caveat(
-        f"{_text(step.gains[0])} and {_text(step.gains[1])} are gains with the unit 1/s: so much of the distance, and "
-        "of the bearing, in a second."
-    )
-    _compare(step, distance, linear, angular)
-
-
-def _command(sheet: Sheet, values: Values, names: tuple[str, str, str], gain: float, limit: float) -> float:
-    """Add a gain times what is seen, and the limit if there is one."""
-    name, seen, unit = names
-    if limit == math.inf:
-        return sheet.step(values, name, f"{_text(gain)}*{seen}", unit)
-    sheet.step(values, name[0], f"{_text(gain)}*{seen}", unit)
-    sheet.say(f"Limited to {_text(limit)} {unit} either way:")
-    return sheet.step(values, name, f"max(-{_text(limit)}, min({_text(limit)}, {name[0]}))", unit)
+    values |= {"behind": float(behind), "arrived": step.arrived}
+    values |= {"slow": float(step.limits[0] < math.inf), "steady": float(step.limits[1] < math.inf)}
+    names = ("linear", "angular", "max_linear", "max_angular")
+    words = dict(zip(names, map(_text, step.gains + step.limits), strict=True))
+    sheet.play("follow law", values, follower=printable(step.follower), **words)
+    _compare(step, values["d"], values["linear_x"], values["angular_z"])
 
 
 def _text(value: float) -> str:

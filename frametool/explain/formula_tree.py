@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import math
+import operator
 import re
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,6 +26,10 @@ TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt, "atan2": math.atan2, "abs": abs, "min": min, "max": max,
 }  # fmt: skip
+COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+}  # fmt: skip
+CALLS = {"sqrt": r"\sqrt{%s}", "abs": r"\left\lvert %s \right\rvert", "atan2": r"\operatorname{atan2}\left(%s\right)"}
 PI = "pi"
 EXPONENT = re.compile(r"e([+-]?)0*(\d+)$")
 
@@ -64,14 +69,23 @@ def evaluated(node: ast.expr, values: Mapping[str, float]) -> Value:
     raise ValueError(ast.dump(node))
 
 
-def _joined(operator: ast.operator, left: Value, right: Value) -> Value:
+def holds(condition: str, values: Mapping[str, float]) -> bool:
+    """Return True if a comparison is true of the numbers as they are, or if a lone one is not 0."""
+    node = parsed(condition)
+    if not isinstance(node, ast.Compare):
+        return evaluated(node, values).number != 0.0
+    left, right = (evaluated(each, values).number for each in (node.left, *node.comparators))
+    return COMPARISONS[type(node.ops[0])](left, right)
+
+
+def _joined(sign: ast.operator, left: Value, right: Value) -> Value:
     """Apply an operator, and to first order what rounding does to its result."""
     (a, size_a), (b, size_b) = left, right
-    if isinstance(operator, (ast.Add, ast.Sub)):
-        return Value(a + b if isinstance(operator, ast.Add) else a - b, max(size_a, size_b))
-    if isinstance(operator, ast.Mult):
+    if isinstance(sign, (ast.Add, ast.Sub)):
+        return Value(a + b if isinstance(sign, ast.Add) else a - b, max(size_a, size_b))
+    if isinstance(sign, ast.Mult):
         return Value(a * b, max(size_a * abs(b), abs(a) * size_b))
-    if isinstance(operator, ast.Div):
+    if isinstance(sign, ast.Div):
         return Value(a / b, max(size_a / abs(b), abs(a / b) * size_b / abs(b)))
     number = a ** int(b)
     return Value(number, max(abs(number), b * size_a * abs(a) ** (int(b) - 1)))
@@ -145,12 +159,4 @@ def latex_number(text: str) -> str:
 
 
 def _call(name: str, arguments: Iterable[str], *, latex: bool) -> str:
-    inside = ", ".join(arguments)
-    if not latex:
-        return f"{name}({inside})"
-    if name == "sqrt":
-        return rf"\sqrt{{{inside}}}"
-    if name == "abs":
-        return rf"\left\lvert {inside} \right\rvert"
-    operator = r"\operatorname{atan2}" if name == "atan2" else rf"\{name}"
-    return rf"{operator}\left({inside}\right)"
+    return (CALLS.get(name, rf"\{name}\left(%s\right)") if latex else f"{name}(%s)") % ", ".join(arguments)

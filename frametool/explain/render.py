@@ -5,21 +5,23 @@ A line that begins with = + - or · goes on with the one before.
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.explain.formula_tree import latex_number
-from frametool.explain.sheet import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
+from frametool.explain.formula_tree import as_latex, as_text, latex_number, parsed
+from frametool.explain.run import CAVEAT, HEADING, SENTENCE, MatrixLine, SheetResult, SheetStep, Words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.explain.sheet import Item, Row
+    from frametool.explain.run import Item, Row
 
 WIDTH = 80
 INDENT = "   "
+GLUE, CUT = "\u00a0", "\v"  # a blank where no line ends, and a place where one may
 INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
 
 
@@ -45,94 +47,99 @@ def _lines(item: Item) -> list[str]:
 
 def _wrapped(text: str, first: str, further: str) -> list[str]:
     return wrap(
-        text, WIDTH, initial_indent=first, subsequent_indent=further, break_long_words=False, break_on_hyphens=False
-    )
+        text, WIDTH, initial_indent=first, subsequent_indent=further, break_long_words=False, break_on_hyphens=False,
+        replace_whitespace=False,
+    )  # fmt: skip
+
+
+def equals(
+    step: SheetStep, write: Callable[..., str], name: Callable[[str], str], number: Callable[[str], str]
+) -> list[str]:
+    """Return what a step's name equals: its formula, the same with numbers, its value.
+
+    write, name, number: how a tree, a name and a number's text are written
+    """
+    value = number(step.numbers[step.name])
+    if not step.formula:
+        return [value]
+    formula, shown = parsed(step.formula), parsed(step.shown)
+    plain = as_text(shown, lambda each: step.numbers.get(each, each))
+    is_said = plain in (as_text(formula, str), step.numbers[step.name])  # by the formula or by the value
+    with_numbers = write(shown, lambda each: number(step.numbers[each]) if each in step.numbers else name(each))
+    return [write(formula, name), *[with_numbers] * (not is_said), value]
 
 
 def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
     """Write successive steps with their signs of equality below one another."""
     width = max(len(step.name) for step in steps)
     for step in steps:
-        texts = [*step.texts[:-1], f"{step.texts[-1]} {step.unit}".rstrip()]
         head = f"{INDENT}{step.name:<{width}} = "
-        if len(line := head + " = ".join(texts)) <= WIDTH:
-            yield line
-            continue
-        yield from _broken(head, texts[0])
-        head = " " * (len(head) - 2) + "= "
-        if len(line := head + " = ".join(texts[1:])) <= WIDTH:
-            yield line
-            continue
-        for formula in texts[1:-1]:
-            yield from _broken(head, formula)
-        yield head + texts[-1]
+        hang, room = " " * (len(head) - 2) + "= ", WIDTH - len(head)
+        texts = equals(step, as_text, str, str)
+        texts[-1] = f"{texts[-1]} {step.unit}".rstrip()
+        first, rest = texts[:1], [" = ".join(texts[1:])] * (len(texts) > 1)
+        if len(whole := " = ".join(texts)) <= room:
+            texts = [whole]
+        elif len("".join(rest)) <= room:
+            texts = [*first, *rest]
+        for at, text in enumerate(texts):
+            yield from _broken(hang if at else head, text)
 
 
-def _broken(head: str, formula: str) -> Iterator[str]:
-    """Write a formula; one that is too long goes on before its plus and minus signs."""
-    line = head
-    for piece in _pieces(formula, WIDTH - len(head)):
-        if len(line) + len(piece) > WIDTH and line != head and line.strip():
-            yield line.rstrip()
-            line = " " * len(head) + piece.lstrip()
-        else:
-            line += piece
-    yield line.rstrip()
+def _broken(head: str, formula: str) -> list[str]:
+    """Write a formula; one that is too long goes on before its plus and minus signs, the outer ones first."""
+    lines = [head + formula]
+    for glued in (*(_glued(formula, deepest) for deepest in range(4)), formula.replace("·", f"{CUT}·")):
+        if max(map(len, lines)) <= WIDTH:
+            break
+        lines = _wrapped(glued, head, " " * len(head))
+    return [line.replace(GLUE, " ").replace(CUT, "") for line in lines]
 
 
-# where a formula is cut, the best places first: signs, and how deep in parentheses they stand (None: wherever)
-CUTS = ((0, (" + ", " - ")), (0, ("·(",)), (1, (" + ", " - ")), (None, (" + ", " - ")), (None, ("·",)))
-
-
-def _pieces(formula: str, room: int, cuts: Sequence[tuple[int | None, tuple[str, ...]]] = CUTS) -> Iterator[str]:
-    """Cut a formula before its signs; a piece that has no room is cut again, at the next best places."""
-    places: list[int] = []
-    depth = 0
-    for at, letter in enumerate(formula):
-        if cuts[0][0] in (depth, None) and formula.startswith(cuts[0][1], at):
-            places.append(at)
+def _glued(formula: str, deepest: int) -> str:
+    """Glue together what stands between plus and minus signs at most so deep in parentheses."""
+    depth, letters = 0, []
+    for letter, after in zip(formula, formula[1:] + " ", strict=True):
         depth += (letter == "(") - (letter == ")")
-    for begin, end in zip([0, *places], [*places, len(formula)], strict=True):
-        is_long = len(formula[begin:end].strip()) > room and len(cuts) > 1
-        yield from _pieces(formula[begin:end], room, cuts[1:]) if is_long else (formula[begin:end],)
+        is_cut = after in "+-" and depth <= deepest
+        letters.append(GLUE if letter == " " and not is_cut else letter)
+    return "".join(letters)
 
 
 def _grid(grid: MatrixLine) -> list[str]:
     """Write matrices side by side, as many as the width holds."""
     lines = [f"{INDENT}{grid.name} = {grid.text}"] if grid.text else []
     head = f"{INDENT}{' ' * len(grid.name) if grid.text else grid.name} = "
-    groups: list[list[list[str]]] = [[]]
-    used = len(head)
-    blocks = [[part] if isinstance(part, str) else _block(part) for part in grid.parts]
-    for block, after in zip(blocks, [*blocks[1:], [grid.unit]], strict=True):
-        size = len(block[0]) + 1 + (len(grid.unit) + 1) * (block is blocks[-1] and bool(grid.unit))
-        needed = size + (len(after[0]) + 1) * (len(block) == 1)  # a sign stays with what it is before
-        if used + needed > WIDTH and any(len(each) > 1 for each in groups[-1]):
-            groups.append([])
-            used = len(head)
-        groups[-1].append(block)
-        used += size
-    for at, group in enumerate(groups):
-        lead = head if at == 0 else " " * len(head)
-        lines += _side_by_side(lead, group, grid.unit if at == len(groups) - 1 else "")
+    groups: list[list[str]] = []
+    sign = ""
+    for part in grid.parts:
+        if part == ")":
+            groups[-1] = _beside("", groups[-1], " )")
+            continue
+        if isinstance(part, str):
+            sign = f"{part} "
+            continue
+        block = _beside(sign, _block(part), f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
+        if groups and len(head) + len(groups[-1][0]) + 1 + max(map(len, block)) <= WIDTH:
+            groups[-1] = [f"{left} {right}" for left, right in zip(groups[-1], block, strict=True)]
+        else:
+            groups.append(block)
+        sign = ""
+    for group in groups:
+        lines += [line.rstrip() for line in _beside(head, group)]
+        head = " " * len(head)
     return lines
+
+
+def _beside(left: str, block: Sequence[str], right: str = "") -> list[str]:
+    """Put words to the left and to the right of the middle row of a block."""
+    before, behind, middle = " " * len(left), " " * len(right), len(block) // 2
+    return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]
 
 
 def _block(rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(len(row[at]) for row in rows) for at in range(len(rows[0]))]
     return [f"[{' '.join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))}]" for row in rows]
-
-
-def _side_by_side(head: str, blocks: list[list[str]], unit: str) -> list[str]:
-    height = max(map(len, blocks))
-    middle = height // 2
-    lines = []
-    for row in range(height):
-        cells = [block[row] if len(block) == height else (block[0] if row == middle else " " * len(block[0]))
-                 for block in blocks]  # fmt: skip
-        line = (head if row == middle else " " * len(head)) + " ".join(cells)
-        lines.append((line + (f" {unit}" if unit and row == middle else "")).rstrip())
-    return lines
 
 
 def result_lines(rows: Sequence[Row]) -> list[str]:
@@ -153,11 +160,31 @@ def result_lines(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
+SYMBOLS = {
+    "roll": r"\phi", "pitch": r"\theta", "yaw": r"\psi", "angle": r"\vartheta", "arc": r"\Omega", "pi": r"\pi",
+    "bearing": r"\beta", "det": r"\det R", "norm": r"\lVert q \rVert", "tr": r"\operatorname{tr} R",
+    "dot": r"a \cdot b", "ww": "4 w^2", "xx": "4 x^2", "yy": "4 y^2", "zz": "4 z^2", "pp": r"\lvert p \rvert^2",
+    "a1": r"\alpha_1", "a2": r"\alpha_2", "a3": r"\alpha_3",
+}  # fmt: skip
+INDEXED = re.compile(r"([a-zA-Z])([0-9]{1,2}|[a-zA-Z][0-9]?)")
 LONG = 90  # characters of LaTeX that a line of a formula holds, about
 SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
 WORDS = {HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"}
 FORMULAS = "$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$"
 RESULT = "**Result**%s\n\n```text\n%s\n```"
+
+
+def symbol(name: str) -> str:
+    """Return a name as LaTeX: Greek where that is the custom, an index where there is one, else upright."""
+    if name in SYMBOLS:
+        return SYMBOLS[name]
+    if name.endswith("_deg"):
+        return rf"{symbol(name[:-4])}^{{\circ}}"
+    if len(name) == 1:
+        return name
+    if found := INDEXED.fullmatch(name):
+        return f"{found[1]}_{{{found[2]}}}"
+    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
 
 
 class Explanation:
@@ -176,7 +203,7 @@ class Explanation:
         return text_of(self.items)
 
     def __repr__(self) -> str:
-        """Say what is derived."""
+        """Return in brief what is derived."""
         return f"<Explanation of {self.title}>"
 
     def markdown(self) -> str:
@@ -214,9 +241,11 @@ def _aligned(item: SheetStep | MatrixLine) -> list[str]:
     """Return the lines of a formula, aligned at the first sign of equality of each."""
     if isinstance(item, MatrixLine):
         name = item.name.replace("'", r"^{\prime}")
-        parts = [*filter(None, [item.latex]), " ".join(map(_matrix, item.parts))]
+        formula = re.sub(r"(?<!\+) (?!\+)", r"\\,", re.sub(r"\b([a-zM])([a-z\d])\b", r"\1_\2", item.text))
+        formula = re.sub(r"\^(-?)T", r"^{\1\\mathsf T}", formula).replace("1/2", r"\tfrac{1}{2}")
+        parts = [*filter(None, [formula]), " ".join(map(_matrix, item.parts))]
     else:
-        name, parts = item.latex_name, list(item.latex)
+        name, parts = symbol(item.name), equals(item, as_latex, symbol, latex_number)
     if sum(map(len, parts)) <= LONG:
         parts = [" = ".join(parts)]
     elif sum(map(len, parts[1:])) <= 2 * LONG:

@@ -91,7 +91,7 @@ def test_a_derivation_loads_no_numpy_and_without_one_its_modules_are_not_loaded(
         plain = loaded(*arguments)
         explained = loaded(*arguments, *(["--explain-step", "0"] if arguments[0] == "sim" else ["--explain"]))
         assert not {name for name in plain if name.startswith("frametool.explain")}
-        assert "frametool.explain.sheet" in explained
+        assert "frametool.explain.run" in explained
         assert "numpy" not in explained
 
 

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from recheck import recheck
 
 import frametool
 from frametool import TransformBuffer, explain
+from frametool.explain import derive
+from frametool.explain.operations import BLOCKS
+from frametool.explain.run import sheets
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.explain.run import Line
 
 AXIS_ANGLE = """\
 1. Axis and angle to quaternion
@@ -219,3 +228,27 @@ def test_the_follower_s_law_its_limits_and_its_rest(options: dict[str, Any], spa
 def test_a_step_that_is_not_there_is_an_error(scene: dict[str, Any], number: int, message: str) -> None:
     with pytest.raises(frametool.FrametoolError, match=re.escape(message)):
         frametool.follow_steps(frametool.tutorial(**scene), number)
+
+
+def lines_of(body: Sequence[Line]) -> Iterator[str]:
+    """List the lines of a sheet, the indented ones too."""
+    for line in body:
+        yield line.text
+        yield from lines_of(line.body)
+
+
+LINES = {name: [*lines_of(body)] for name, body in sheets().items()}
+
+
+def test_what_a_sheet_uses_is_there_and_every_sheet_is_used() -> None:
+    used = {text.removeprefix("use ") for lines in LINES.values() for text in lines if text.startswith("use ")}
+    assert used <= set(LINES)
+    code = "".join(path.read_text(encoding="utf-8") for path in Path(derive.__file__).parent.glob("*.py"))
+    ways = {f"{name} {way}" for name in BLOCKS for way in ("to", "from")}
+    assert [name for name in LINES if name not in used | ways and f'"{name}"' not in code] == []
+
+
+def test_sentences_of_a_sheet_have_no_numbers_of_a_run() -> None:
+    """Numbers come in by name, so that they are written with the digits asked for."""
+    words = [text for lines in LINES.values() for text in lines if text[:2] in ("# ", "> ", "! ")]
+    assert [text for text in words if re.search(r"\d\.\d{3}", text)] == []

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from frametool.explain.derive import ByTree, DerivationStyle
-    from frametool.explain.given import Given
+    from frametool.explain.operations import WrittenPose
     from frametool.formats.load import Rules
     from frametool.geometry.types import Components
     from frametool.stream.request import Request
@@ -148,14 +148,14 @@ def _derived(
     task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str, *, timeless: bool
 ) -> int:
     """Write the derivation of one record; timeless: a time was chosen for all."""
-    from frametool.explain import derive
     from frametool.stream.request import Operation
+    from frametool.stream.written import derive_record
 
     asked = task.request(operation=Operation(moves=True))
     try:
         source = pose_source(record, asked)
-        made = derive.apply(plan, way.explained(), source, kind=kind, degrees=asked.degrees,
-                            normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
+        made = derive_record(plan, way.explained(), source, kind=kind, degrees=asked.degrees,
+                             normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
     except FormatError as error:
         raise usage_if_inline(error) from None
     return task.write(made)
@@ -195,7 +195,7 @@ class Way(NamedTuple):
     from_frame: Callable[[str | None, int | None], Components]
     at_times: Callable[[str | None, Any], Components] | None
     moves: Callable[[str | None], bool]
-    explained: Callable[[], ByTree | Given]
+    explained: Callable[[], ByTree | WrittenPose]
     has_source: bool
     counters: bool = True
     uncertain: bool = False

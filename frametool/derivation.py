@@ -6,22 +6,27 @@ import sys
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
+from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain import derive
 from frametool.explain.derive import ByTree, DerivationStyle
 from frametool.explain.follow import FollowStep, derive_follow
-from frametool.explain.given import given_pose, source_of
-from frametool.explain.sheet import DIGITS
+from frametool.explain.operations import WrittenPose
+from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames
-from frametool.geometry.representations import notations
+from frametool.geometry.representations import notation, notations
+from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
+from frametool.grammar.pose import Pose
 from frametool.grammar.result import Style
+from frametool.stream.written import derive_record, written_poses
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from frametool.documents.source import Source
-    from frametool.explain.given import Given
     from frametool.explain.render import Explanation
+
+INLINE = "argument"
 
 
 def explain(
@@ -44,15 +49,39 @@ def explain(
         raise ValueInvalid(f"no operation {shown(operation)}{alternatives(operation, OPERATIONS, 'operations')}")
     if precision is not None and precision < 1:
         raise ValueInvalid(f"precision counts significant digits, 1 or more; found {precision}")
-    chosen = tuple(form for spec in to.split(",") for form in notations(spec.strip()))
+    chosen = tuple(each for spec in to.split(",") for each in notations(spec.strip()))
     plan = DerivationStyle(Style("text", chosen, degrees=degrees, keep_sign=keep_sign), precision)
     try:
         signature(OPERATIONS[operation]).bind(plan, *operands, **options)
     except TypeError as error:
         raise ValueInvalid(f"explain {operation}: {error}") from None
     poses = POSES.get(operation, 0)
-    given = [given_pose(each, degrees=degrees) for each in operands[:poses]]
-    return OPERATIONS[operation](plan, *given, *operands[poses:], **options)
+    written = [_pose(each, degrees=degrees) for each in operands[:poses]]
+    return OPERATIONS[operation](plan, *written, *operands[poses:], **options)
+
+
+def _pose(value: Any, *, degrees: bool) -> WrittenPose:
+    """Take one pose: a mapping, its text, a Transform or a Rotation.
+
+    Raises ValueInvalid, FormatError.
+    """
+    if isinstance(value, (str, dict, list)):
+        found = written_poses(_source(value), degrees=degrees)
+        if len(found) != 1:
+            raise ValueInvalid(f"a derivation is of one pose, {INLINE} holds {len(found)}")
+        return found[0]
+    if not isinstance(value, (Transform, Rotation)) or value.shape:
+        raise ValueInvalid(f"expected one pose: a mapping, its text, a Transform or a Rotation; found {value!r:.60}")
+    pose = Pose.of(value.components) if isinstance(value, Transform) else Pose(None, value.components)
+    x, y, z, *rotation = pose.components
+    return WrittenPose(pose, notation("quaternion"), rotation, position=(x, y, z))
+
+
+def _source(value: Any) -> Source:
+    """Return a text, or a mapping or list as text."""
+    from frametool.documents.json import dump
+
+    return Source(INLINE, value if isinstance(value, str) else dump(value))
 
 
 def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind: str = "") -> Explanation:
@@ -60,25 +89,24 @@ def _apply(plan: DerivationStyle, *operands: Any, at_ns: int | None = None, kind
     if len(operands) not in ((3, 4) if by_tree else (2,)):
         raise ValueInvalid("apply takes TREE TARGET [SOURCE] RECORD, or POSE RECORD")
     degrees = plan.style.degrees
-    way: ByTree | Given
     if by_tree:
         tree, target, *source, record = operands
-        way = ByTree(tree, target, source[0] if source else None, at_ns)
+        way: ByTree | WrittenPose = ByTree(tree, target, source[0] if source else None, at_ns)
     else:
         pose, record = operands
-        way = given_pose(pose, degrees=degrees)
-    return derive.apply(plan, way, _record_source(record, kind), kind=kind, degrees=degrees)
+        way = _pose(pose, degrees=degrees)
+    return derive_record(plan, way, _record(record, kind), kind=kind, degrees=degrees)
 
 
-def _record_source(value: Any, kind: str) -> Source:
+def _record(value: Any, kind: str) -> Source:
     """Return the text of a record: three numbers, a mapping, or its text."""
     if isinstance(value, (str, dict)):
-        return source_of(value)
+        return _source(value)
     try:
         x, y, z = map(float, value)
     except (TypeError, ValueError):
         raise ValueInvalid(f"expected three numbers or a mapping, found {shown(value)}") from None
-    return source_of({kind or "point": [x, y, z]})
+    return _source({kind or "point": [x, y, z]})
 
 
 def _follow(plan: DerivationStyle, steps: Any) -> Explanation:
