@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused, settings
+from frametool.cli.inputs import option
 from frametool.cli.options import FULL, pose_reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of, without_inverse
-from frametool.cli.streaming import OPTIONS, Stream, stream_options
+from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import FormatError, heard_by, warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.inputs import Inputs
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.given import Given
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 FORMS = ("text", "markdown")
 ONE_RECORD = "--explain derives one record; write it as an argument"
-EXPLAIN = click.option(
+EXPLAIN = option(
     "--explain", type=click.Choice(FORMS), metavar="[=FORM]", help="derive the result step by step (help explain)",
 )  # fmt: skip
 
@@ -40,23 +41,25 @@ class PoseTask:
     derives: whether the derivation is wanted instead of the result
     """
 
-    def __init__(self, options: dict[str, Any], *what: str) -> None:
-        """Take the options out of a command's; `what` are the results that the command writes."""
-        self._form: str = options.pop("explain", None) or ""
-        self._precision: int | None = options["precision"]
+    def __init__(self, inputs: Inputs, *what: str) -> None:
+        """Look at what the options say; `what` are the results that the command writes."""
+        self.inputs = inputs
+        self._form: str = inputs.explain or ""
         self.derives = bool(self._form)
-        self.normalize: bool = options.pop("normalize")
-        self.stream = Stream(options)
-        self.output = Output(*what or ("poses",), **options)
+        self.normalize: bool = inputs.normalize
+        self.stream = Stream(inputs)
+        self.output = Output(inputs, *what or ("poses",))
 
     def request(self, **rest: Any) -> Request:
         """Return what is done with rows and records: they are read as the options say."""
         from frametool.stream.request import Request
 
         degrees = self.output.style.degrees
-        offset_ns = 0 if settings().reads_trees else settings().time_offset or 0
+        offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
         if rest.get("window") and rest.get("extra_column") is None:
             rest["extra_column"] = ""
+        if rest.get("poses") != 0:
+            self.inputs.ask("given")
         made = Request(
             given=self.stream.given, degrees=degrees, normalize=self.normalize, offset_ns=offset_ns, **rest
         )
@@ -66,8 +69,8 @@ class PoseTask:
 
     def at_places(self, request: Request) -> Request:
         """Add what the options say of places on the Earth, where they say anything."""
-        said, place = settings(), self.output.style.place
-        if not (place or self.stream.given_place or said.origin or said.local_axes or said.zone):
+        place = self.output.style.place
+        if not (place or self.stream.given_place or any(map(self.inputs.peek, ("origin", "local_axes", "zone")))):
             return request
         from frametool.cli.earth import earth
 
@@ -78,17 +81,12 @@ class PoseTask:
         """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
         return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
 
-    def only_arguments(self, arguments: Sequence[str | Source | None], *more: str) -> None:
-        """Refuse the options of streams where arguments are all that is read.
-
-        more: options of the command that are about streams too
-        """
-        names = {*OPTIONS, "edges", *more} - {"given", "quiet"}
-        if not settings().reads_trees:
-            names |= {"stamps", "camera_axes"}
-            if not any(isinstance(each, str) and os.path.exists(each) for each in arguments):
-                names.add("input_forms")
-        refuse_unused("is about rows; arguments are read here, and rows where - stands or nothing is", *names)
+    def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
+        """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
+        if self.stream.path is not None:
+            raise click.UsageError("-i FILE and arguments are two inputs; give one")
+        if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
+            self.inputs.ask("input_forms")
 
     def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
@@ -115,8 +113,7 @@ class PoseTask:
         if self.output.told not in (None, "text"):
             instead = f"{', '.join(FORMS)}, not {self.output.told}"
             raise click.UsageError(f"--explain writes {instead}; leave one of them out")
-        refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "edges"} - {"given", "quiet"}))
-        return DerivationStyle(self.output.style, significant(self._precision))
+        return DerivationStyle(self.output.style, significant(self.inputs.precision))
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> Given:
         """Read the one pose of an argument as it is written.

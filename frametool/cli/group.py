@@ -1,4 +1,4 @@
-"""How click is used: the group of all commands, what their options keep, their help, their calls and their misuse.
+"""How click is used: the group of all commands, their help, their calls and their misuse.
 
 Each command is imported when it is called; help and completion come from the table.
 """
@@ -22,78 +22,7 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from frametool.geometry.place import Earth
-
-SETTINGS = "frametool.settings"  # the keys in a context's `meta`
-EVERYTHING = "frametool.everything"
-
-
-class CommandSettings:
-    """What the options of the running command say about its inputs, each under its parameter's name.
-
-    These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
-    where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
-
-    row_order: no option of its own, but the --from of streams where it is the order of a quaternion
-    reads_trees: no option, but set when files of frames are opened: --in is then about these too
-    inputs: no option either, but the forms of what was read, each with what it asked of `OPEN`
-    """
-
-    all_versions = False
-    verbose = False
-    quiet = False
-    input_forms: Sequence[str] = ()
-    topics: Sequence[str] = ()
-    joints: Sequence[str] = ()
-    joint_files: Sequence[str] = ()
-    named_frames: Sequence[str] = ()
-    direction: str | None = None
-    camera_axes: str | None = None
-    dh: str | None = None
-    stamps: str | None = None
-    edges = False
-    array: str | None = None
-    messages: Sequence[str] = ()
-    topic_out: str | None = None
-    recorded_frames: str | None = None
-    origin: str | None = None
-    local_axes: str | None = None
-    zone: str | None = None
-    earth: Earth | None = None
-    order: str | None = None
-    row_order = ""
-    time_offset: int | None = None
-    reads_trees = False
-    inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
-
-
-def settings(context: click.Context | None = None) -> CommandSettings:
-    """Return the settings of a context, or of the running command; where none runs, nothing is set but --quiet."""
-    context = context or click.get_current_context(silent=True)
-    if context is not None:
-        found: CommandSettings = context.meta.setdefault(SETTINGS, CommandSettings())
-        return found
-    silent = CommandSettings()
-    silent.quiet = True
-    return silent
-
-
-def keep_setting(context: click.Context, option: click.Parameter, chosen: Any) -> Any:
-    """Keep the value of an option in the settings of its context (a callback of click)."""
-    setattr(settings(context), option.name or "", chosen)
-    return chosen
-
-
-def refuse_unused(why: str, *names: str, ctx: click.Context | None = None) -> None:
-    """Stop where the command line has one of these parameters of the running command: it would not be used."""
-    ctx = ctx or click.get_current_context()
-    named = [each.opts[-1] for each in ctx.command.get_params(ctx) if each.name in names and _is_told(ctx, each.name)]
-    if named:
-        raise click.UsageError(f"{', '.join(named)} {why}", ctx)
-
-
-def _is_told(ctx: click.Context, name: str) -> bool:
-    return ctx.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+EVERYTHING = "frametool.everything"  # a key in a context's `meta`
 
 
 def show_help(ctx: click.Context, *, everything: bool = False) -> None:
@@ -288,7 +217,7 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
     """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
     if chosen:
         with writing(None) as write:
-            write(f"frametool {__version__}\n{_surroundings() if settings(ctx).all_versions else ''}")
+            write(f"frametool {__version__}\n{_surroundings() if ctx.params.get('all_versions') else ''}")
         ctx.exit()
 
 
@@ -311,11 +240,11 @@ def _surroundings() -> str:
 
 
 @click.command(cls=Group, help=HELP)
-@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=keep_setting,
+@click.option("-v", "all_versions", is_flag=True, is_eager=True,
               help="with --version: of Python and of its packages too")  # fmt: skip
 @click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
               help="Show the version and exit.")  # fmt: skip
-def group() -> None:
+def group(all_versions: bool) -> None:
     """Hold the commands."""
 
 

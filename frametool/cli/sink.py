@@ -11,11 +11,14 @@ from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from frametool.cli.inputs import inputs
 from frametool.cli.signals import clean_up, whole_lines
 from frametool.errors import FileProblem, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from frametool.cli.inputs import Inputs
 
     Write = Callable[[str | bytes | memoryview], None]
 
@@ -32,18 +35,30 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
     system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
     Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
-    of a pipe is gone.
+    of a pipe is gone; a usage error for options that nobody has asked for.
     """
+    given = inputs()
     if path is None or path == "-":
-        yield writer_into(sys.stdout.buffer, "standard output")
+        yield _checked(writer_into(sys.stdout.buffer, "standard output"), given)
     elif (number := _own_stream(path)) is not None or is_special(path):
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
-            yield writer_into(special, path)
+            yield _checked(writer_into(special, path), given)
     else:
         with _replacing(path, force=force) as part:
-            yield writer_into(part, path)
+            yield _checked(writer_into(part, path), given)
+            given.refuse_idle()
+
+
+def _checked(write: Write, given: Inputs) -> Write:
+    """Return what writes only where each option that was given has been asked for."""
+
+    def write_checked(piece: str | bytes | memoryview) -> None:
+        given.refuse_idle()
+        write(piece)
+
+    return write_checked
 
 
 def refuse_existing(path: str | None, *, force: bool) -> None:

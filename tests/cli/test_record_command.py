@@ -65,7 +65,7 @@ REFUSED = {
     ("run.mcap", "--into", "map", "--topic", "/odd", "-o", "new.mcap"): (1, f"run.mcap: /odd holds my_msgs/msg/Odd; --into moves {KINDS}"),
     ("run.mcap", "--between", "2,1", "-o", "new.mcap"): (2, f"record: invalid value for '--between': 2 is after 1; START comes first{USAGE}"),
     ("run.mcap", "--between", "2", "-o", "new.mcap"): (2, f"record: invalid value for '--between': '2' is not START,STOP: two times with a comma between them{USAGE}"),
-    ("run.mcap", "--force"): (2, f"record: --force is not used without --output{USAGE}"),
+    ("run.mcap", "--force"): (2, f"record: --force needs --output{USAGE}"),
     ("tree.yaml", "-o", "new.mcap"): (1, "tree.yaml: YAML: trees, poses, documents parted by ---: no recording of messages; frametool tree, convert and lookup write one: -o NEW.mcap"),
     ("nope.mcap", "-o", "new.mcap"): (5, "nope.mcap: no such file or directory"),
     ("-", "-o", "new.mcap"): (5, "stdin: a recording cannot be read from a pipe; name its file"),

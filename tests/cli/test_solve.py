@@ -551,7 +551,7 @@ USAGE: tuple[tuple[str, str], ...] = (
     ("--hand-eye a b --names c,d", "--names takes four names, BASE,GRIPPER,CAMERA,TARGET"),
     ("--points a b --names c,c", "'c,c': names stand with commas between them, each once"),
     ("- -", "standard input can be read once; only one argument may be -"),
-    ("m.yaml --force", "--force is not used without --output"),
+    ("m.yaml --force", "--force needs --output"),
     ("m.yaml --report r.html", "'r.html': a report is written as .json or .csv"),
 )  # fmt: skip
 

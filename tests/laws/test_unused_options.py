@@ -42,7 +42,7 @@ MODES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
     (("lookup", "robot.yaml", "map", "tool"), (*ROWS, "--from=rpy", "--source-at=1", "--fixed=map", *OF_FILES)),
     (("lookup", "robot.yaml", "map", "tool", *BINARY), ("--precision=3",)),
     (("lookup", "drive.yaml", "map", "base_link", "--times", "1,2"), (*(each for each in ROWS if "on-error" not in each),)),
-    (("lookup", "robot.yaml", "map", "--source-column", "a", "-i", "joints.csv"), ("--times=1", "--from=rpy")),
+    (("lookup", "robot.yaml", "map", "--source-column", "a", "-i", "names.csv"), ("--times=1", "--from=rpy", "--columns=a")),
     (("apply", "robot.yaml", "map", "tool", "1", "2", "3"), (*ROWS, "--frame-column=f", "--time-column=t", "--array=x", *OF_FILES)),
     (("apply", "--transform", A, "1", "2", "3"), (*ROWS, "--at=1", "--time-column=t", "--stamps=walk.tum")),
     (("apply", "--transform", A), ("--columns=a,b,c", "--no-header", "--keep", "--prefix=q", "--array=x")),
@@ -61,6 +61,7 @@ CASES = [(command, option) for command, options in MODES for option in options]
 @pytest.mark.parametrize(("command", "option"), CASES, ids=lambda each: each if isinstance(each, str) else " ".join(each))
 def test_an_option_without_use(run: Run, command: tuple[str, ...], option: str) -> None:
     files: dict[str, str | bytes] = {name: (EXAMPLES / name).read_bytes() for name in FILES}
+    files["names.csv"] = "a\ntool\n"
     name, equals, value = option.partition("=")
     given = [name, value] if equals else [name]
     stdin = POINT if command == ("apply", "--transform", A) else ""
@@ -92,4 +93,4 @@ def test_to_replace_a_file_there_must_be_one(run: Run, command: str) -> None:
     arguments = arguments[:1] if command == "tree" else arguments
     done = run(command, *arguments, "--force", files={"robot.yaml": (EXAMPLES / "robot.yaml").read_bytes()})
     assert done.status == 2
-    assert "--force is not used without --output" in done.err
+    assert "--force needs --output" in done.err
