@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import inputs
+from frametool.cli.group import inputs
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -78,6 +78,7 @@ class BagOfClouds:
         from frametool.ros.point_clouds import read_clouds
 
         bad = self.stream.policy(self.path, "message")
+        inputs().refuse_idle()
         count = points = 0
         once: Any = cache(say_warning)
         with self.opened, heard_by(once):

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import inputs as running
-from frametool.cli.inputs import option
+from frametool.cli.group import inputs as running
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, Parsed, together
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
@@ -20,7 +20,7 @@ from frametool.stream.faults import MOST, STOP
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.fit.comparison import Comparison, Delta, Settings
     from frametool.frames.trajectory import Trajectory

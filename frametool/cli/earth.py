@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import inputs
+from frametool.cli.group import inputs
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid

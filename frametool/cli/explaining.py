@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FULL, pose_reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of, without_inverse
@@ -16,9 +16,9 @@ from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import FormatError, heard_by, warn
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.given import Given
@@ -27,11 +27,15 @@ if TYPE_CHECKING:
 
 FORMS = ("text", "markdown")
 ONE_RECORD = "--explain derives one record; write it as an argument"
-EXPLAIN = option(
-    "--explain", type=click.Choice(FORMS), metavar="[=FORM]", help="derive the result step by step (help explain)",
-)  # fmt: skip
 
 
+def explain_option(**rest: Any) -> Callable[[Any], Any]:
+    """Return --explain, with what it says of other options."""
+    about = "derive the result step by step (help explain)"
+    return option("--explain", type=click.Choice(FORMS), metavar="[=FORM]", help=about, **rest)
+
+
+EXPLAIN = explain_option()
 pose_stream_options = together(stream_options, pose_reading_options)
 
 

@@ -6,9 +6,8 @@ import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, BinaryIO
 
-from frametool.cli.inputs import inputs
 from frametool.cli.signals import clean_up
-from frametool.cli.sink import created, give_name, problems_of, refuse_existing, unnamed_beside, writer_into
+from frametool.cli.sink import check, created, give_name, problems_of, refuse_existing, unnamed_beside, writer_into
 from frametool.errors import FileProblem, printable, shown
 
 if TYPE_CHECKING:
@@ -40,10 +39,9 @@ def filling(path: str, *, force: bool) -> Iterator[Write]:
             if piece:  # nothing comes before the first name
                 writer_into(files[next(reversed(files))], path)(piece)
 
-    given = inputs()
     try:
         yield fill
-        given.refuse_idle()
+        check()
         with problems_of(path):
             part = part or created(place, os.mkdir)[0]
             for name, stream in files.items():

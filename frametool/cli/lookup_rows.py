@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import ColumnNames, together
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.cli.explaining import PoseTask
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.trees import CarriedSigmas
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree

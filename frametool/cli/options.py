@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import WithHelp
-from frametool.cli.inputs import INPUTS, Inputs, check_together, inputs, option
+from frametool.cli.group import INPUTS, Inputs, WithHelp, check_together, inputs, option
+from frametool.cli.sink import checked_by
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -77,7 +77,8 @@ class Command(WithHelp):
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
         given = ctx.meta[INPUTS] = Inputs.of(ctx)
-        result = ctx.invoke(self.callback or (lambda _: 0), given)
+        with checked_by(given.refuse_idle):
+            result = ctx.invoke(self.callback or (lambda _: 0), given)
         given.refuse_idle()
         _say_not_needed(given)
         return result
@@ -415,7 +416,7 @@ _PRECISION = option(
 )
 _PLACE = (
     option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
-    option("--force", is_flag=True, requires=("output",), help="let --output replace a file"),
+    option("--force", is_flag=True, requires=("output", "report"), help="let --output replace a file"),
 )
 
 

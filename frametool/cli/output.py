@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from contextlib import AbstractContextManager
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.sink import Write
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree

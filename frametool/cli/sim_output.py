@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, together
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.signals import clean_up
@@ -35,7 +35,7 @@ from frametool.sim.turtle import VARIANTS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.sink import Write
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene

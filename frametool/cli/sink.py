@@ -11,17 +11,16 @@ from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from frametool.cli.inputs import inputs
 from frametool.cli.signals import clean_up, whole_lines
 from frametool.errors import FileProblem, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.cli.inputs import Inputs
 
     Write = Callable[[str | bytes | memoryview], None]
 
+_checks: list[Callable[[], None]] = []
 OPEN_FILES = "/proc/self/fd"  # where Linux has the files of a process by their numbers
 LONGEST_NAME = 255  # bytes, on nearly every file system
 
@@ -35,30 +34,45 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
     system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
     Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
-    of a pipe is gone; a usage error for options that nobody has asked for.
+    of a pipe is gone; what a check finds wrong.
     """
-    given = inputs()
     if path is None or path == "-":
-        yield _checked(writer_into(sys.stdout.buffer, "standard output"), given)
+        yield _checked(writer_into(sys.stdout.buffer, "standard output"))
     elif (number := _own_stream(path)) is not None or is_special(path):
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
-            yield _checked(writer_into(special, path), given)
+            yield _checked(writer_into(special, path))
     else:
         with _replacing(path, force=force) as part:
-            yield _checked(writer_into(part, path), given)
-            given.refuse_idle()
+            yield _checked(writer_into(part, path))
+            check()
 
 
-def _checked(write: Write, given: Inputs) -> Write:
-    """Return what writes only where each option that was given has been asked for."""
+def _checked(write: Write) -> Write:
+    """Return what writes only where nothing is wrong with the call."""
 
     def write_checked(piece: str | bytes | memoryview) -> None:
-        given.refuse_idle()
+        check()
         write(piece)
 
     return write_checked
+
+
+@contextmanager
+def checked_by(each: Callable[[], None]) -> Iterator[None]:
+    """Let something be checked before anything is written."""
+    _checks.append(each)
+    try:
+        yield
+    finally:
+        _checks.pop()
+
+
+def check() -> None:
+    """Raise what a check finds wrong with the call."""
+    for each in _checks:
+        each()
 
 
 def refuse_existing(path: str | None, *, force: bool) -> None:

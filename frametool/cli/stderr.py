@@ -81,7 +81,7 @@ def say_warning(message: str, rule: str = "") -> None:
     With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
     """
     if rule == "slash":
-        from frametool.cli.inputs import inputs
+        from frametool.cli.group import inputs
 
         if inputs().quiet:
             return

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     STREAMED,
@@ -33,10 +33,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
     from typing import TypeVar
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.documents.source import Source
-    from frametool.geometry.representations import Notation
     from frametool.stream.request import Request
     from frametool.stream.run import Outcome
 
@@ -97,6 +96,7 @@ class Stream:
     def opened(self) -> BufferedReader:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
         if self._opened is None:
+            self.inputs.ask("input_path")
             self._opened = self.messages() or _opened(self.path)
             if not self._opened.seekable():
                 from frametool.text.lines import arrived
@@ -175,6 +175,7 @@ class Stream:
         """Run the stream and return its exit status."""
         from frametool.formats.detect import refuse_robots, with_hint
 
+        self.inputs.ask("input_path", "on_error", "max_errors")
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
@@ -196,7 +197,7 @@ class Stream:
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
         if form == "kitti" and self.given and not self.told_form():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
-        self.inputs.ask("input_path", "camera_axes", *FORMATS[form].asks)
+        self.inputs.ask("camera_axes", *FORMATS[form].asks)
         if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
         if tables_only and form in RECORDS:
@@ -315,11 +316,11 @@ class Stream:
 
         return pasted_stream(stream, self.name, request._replace(given=request.given or self.given))
 
-    @staticmethod
-    def _run_pasted(source: Source, request: Request, output: Output) -> int:
+    def _run_pasted(self, source: Source, request: Request, output: Output) -> int:
         """Write the results of a text that was pasted."""
         from frametool.stream.record_values import read_poses, results
 
+        self.inputs.ask("given")
         if request.gathered is not None:
             request.gathered.add(read_poses(source, request), source.name)
             return 0

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.inputs import inputs
+from frametool.cli.group import inputs
 from frametool.cli.options import Text, input_forms
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.comparing import comparisons, pairing_options, trajectory_options, write_trajectory
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, Command, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 

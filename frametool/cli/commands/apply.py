@@ -10,7 +10,7 @@ import click
 
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -39,7 +39,7 @@ from frametool.text.numbers import NotFinite, parse_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.explain.derive import ByTree, DerivationStyle
     from frametool.explain.given import Given
     from frametool.geometry.types import Components
@@ -121,6 +121,8 @@ def command(inputs: Inputs) -> int:
         status = stream.run(request, output)
     else:
         task.only_arguments(rest)
+        if stream.given_place:
+            inputs.ask("given")
         output.values(values_of(list(_sources(rest, kind, stream.given_place)), request, output))
     way.tell()
     return status

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, Command
 from frametool.cli.stderr import say
 from frametool.documents.source import opened
@@ -15,7 +15,7 @@ from frametool.stream.faults import SKIP, STOP
 EXIT_CODES = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="batch", epilog=EXIT_CODES)

@@ -16,7 +16,7 @@ from frametool.grammar.pose_algebra import turn_between
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.grammar.readers import Vector
 
 OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is left

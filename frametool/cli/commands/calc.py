@@ -12,7 +12,7 @@ from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import mentions_row, walk
 from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     ColumnNames,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from frametool.calc.parser import Line
     from frametool.calc.rows import RowExpressions
     from frametool.calc.values import Term
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.stream.request import Request
 
 KINDS = ("point", "vector", "pose")

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.group import EVERYTHING
-from frametool.cli.inputs import option
+from frametool.cli.group import EVERYTHING, option
 from frametool.cli.options import FILE, Command, Parsed, file_options
 from frametool.cli.output import in_colour
 from frametool.cli.sink import writing
@@ -24,7 +23,7 @@ from frametool.lint.tree_diff import Tolerance, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.formats.load import Recording
     from frametool.stream.measurements import Measurement
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import OPTIONAL, TEXT, Command, Parsed, list_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
@@ -19,7 +19,7 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.fit.comparison import Comparison
     from frametool.fit.limits import Limit
 

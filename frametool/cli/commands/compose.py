@@ -14,7 +14,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="compose")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import (
     TEXT,
     AxesName,
@@ -40,7 +40,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, TIME, Command, Parsed, at_ns, file_options, list_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
@@ -18,7 +18,7 @@ from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.formats.load import EdgePlace
     from frametool.lint.tree_diff import TreeComparison
 

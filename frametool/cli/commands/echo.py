@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, Command, Parsed, Skipped, Time, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
@@ -21,7 +21,7 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.frames.lookups import Replayed
     from frametool.grammar.result import Result
 

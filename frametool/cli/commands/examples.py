@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, Command, Text
 from frametool.cli.sink import refuse_existing, writing
 from frametool.errors import FileProblem, nearest, printable, shown
@@ -16,7 +16,7 @@ from frametool.errors import FileProblem, nearest, printable, shown
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 def folder() -> str:

@@ -26,7 +26,7 @@ from frametool.stream.joint_rows import JointRows, echoed, joint_poses, names_in
 from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="fk")

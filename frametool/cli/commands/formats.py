@@ -12,7 +12,7 @@ from frametool.formats.table import FORMATS
 from frametool.view.report_text import form_entry, write_form, write_forms
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="formats")

@@ -13,8 +13,7 @@ import click
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.examples import example
-from frametool.cli.group import GROUPS, option_groups, option_row, show_help, write_options
-from frametool.cli.inputs import option
+from frametool.cli.group import GROUPS, option, option_groups, option_row, show_help, write_options
 from frametool.cli.options import EXIT_CODES, Command, Text
 from frametool.cli.sink import writing
 from frametool.errors import any_near, shown
@@ -23,7 +22,7 @@ from frametool.formats.table import FORMATS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
 MADE = {  # topics that are no file of their own

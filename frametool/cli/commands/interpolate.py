@@ -18,7 +18,7 @@ from frametool.text.numbers import parse_number
 MOST = 1_000_000  # fractions of a range
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 def fractions_of(text: str) -> list[float]:

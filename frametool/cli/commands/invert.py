@@ -10,7 +10,7 @@ from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="invert")

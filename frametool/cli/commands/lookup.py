@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.explaining import EXPLAIN, PoseTask
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
     FILE,
@@ -36,7 +36,7 @@ from frametool.stream.faults import NULL, SKIP
 
 if TYPE_CHECKING:
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.frames.lookups import Frames
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import PoseTask, pose_stream_options
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
 from frametool.errors import ValueInvalid, warn
@@ -16,7 +16,7 @@ from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, TEXT, Command, file_options, offset_option, result_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say, say_error
@@ -15,7 +15,7 @@ from frametool.lint.monitor_report import clocks_differ, monitor
 
 if TYPE_CHECKING:
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.errors import FormatError
 
 FAILED = 1

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, LIMIT, TEXT, Command, Text, pose_options, reading_options, verbose_option
 from frametool.cli.output import opened_place
 from frametool.cli.recording import copied_as, folder_of, refuse_input
@@ -23,7 +23,7 @@ from frametool.view.progress import ProgressBar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
@@ -102,6 +102,7 @@ def command(inputs: Inputs) -> int:
         report=lambda error: say_error(error, in_json=False), normalize=normalize,
     )  # fmt: skip
     quiet = inputs.quiet
+    inputs.refuse_idle()
     with opened_place(copy, place, force=inputs.force) as write, opened_recording(path, form, tally) as opened:
         run = RecordRun(opened, request)
         with ProgressBar(2 * opened.size, quiet=quiet, counted="messages") as progress:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.explaining import EXPLAIN, PoseTask, one_argument, pose_stream_options
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, ColumnNames, Command, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among, without_inverse
 from frametool.cli.stderr import say
@@ -15,7 +15,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative_names
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="relative")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.comparing import forms_of, parse_every, read_span, trajectory, trajectory_options, write_trajectory
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import (
     TEXT,
     Command,
@@ -27,7 +27,7 @@ from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.frames.trajectory import Trajectory
 
 

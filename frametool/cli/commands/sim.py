@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.explaining import EXPLAIN, significant
-from frametool.cli.group import Group
-from frametool.cli.inputs import option
+from frametool.cli.explaining import explain_option, significant
+from frametool.cli.group import Group, option
 from frametool.cli.options import EXIT_CODES, TEXT, Command
 from frametool.cli.poses import source_of, usage_if_inline
 from frametool.cli.signals import clean_up
@@ -27,6 +26,7 @@ from frametool.cli.sim_output import (
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, ValueInvalid
+from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.sim.drivers import HEADINGS, KEYS, FollowController, Heading, Mailbox
 from frametool.sim.scene import duration_ns, tutorial
@@ -35,7 +35,7 @@ from frametool.sim.scene_file import read_scene
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
     from frametool.sim.turtle import Twist
@@ -81,7 +81,7 @@ SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim
 @follow_options("20")
 @output_options
 @option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
-@EXPLAIN
+@explain_option(requires=("explain_step",))
 def follow(inputs: Inputs) -> None:
     """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
 
@@ -106,14 +106,14 @@ def follow(inputs: Inputs) -> None:
 def _explain(inputs: Inputs) -> None:
     """Write the derivation of one control step of the followers."""
     scene = scene_of(inputs, leader_in(inputs))
-    style = style_of(inputs)
-    if style.form != "text":
-        raise click.UsageError(f"--explain-step derives one step in words; leave the format {style.form} out")
+    form = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
+    if form not in (None, "text"):
+        raise click.UsageError(f"--explain-step derives one step in words; leave the format {form} out")
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.follow import derive_follow
     from frametool.sim.followed import follow_steps
 
-    plan = DerivationStyle(style, significant(inputs.precision))
+    plan = DerivationStyle(style_of(inputs), significant(inputs.precision))
     text = derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text")
     with writing(inputs.output, force=bool(inputs.force)) as write:
         write(text)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from frametool.cli.comparing import read_span
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -30,11 +30,12 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.view.solution_text import Solution
 
 REPORTS = {".json": "json", ".csv": "csv"}
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
+SHAPES = ("hand_eye", "points")
 FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
 
 
@@ -53,13 +54,15 @@ def _read_names(text: str) -> list[str]:
 
 @click.command(cls=Command, name="solve", epilog=EXIT_CODES)
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
-@option("--root", type=TEXT, metavar="FRAME", help="that all others are given in  [default: never a child]")
-@option("--fix", type=FILE, multiple=True, metavar="TREE", help="exact edges, kept as they are; may be repeated")
-@option("--without", type=TEXT, multiple=True, metavar="FILE:LINE",
+@option("--root", excludes=SHAPES, type=TEXT, metavar="FRAME",
+        help="that all others are given in  [default: never a child]")  # fmt: skip
+@option("--fix", excludes=SHAPES, type=FILE, multiple=True, metavar="TREE",
+        help="exact edges, kept as they are; may be repeated")  # fmt: skip
+@option("--without", excludes=SHAPES, type=TEXT, multiple=True, metavar="FILE:LINE",
               help="leave this row out; may be repeated")  # fmt: skip
 @option("--hand-eye", excludes=("points",), is_flag=True, help="where a camera sits, from poses of gripper and target")
 @option("--eye-to-hand", requires=("hand_eye",), is_flag=True, help="the camera stands still, the target moves")
-@option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
+@option("--max-gap", "max_gap_ns", requires=("hand_eye",), type=Parsed("time", read_span), metavar="TIME",
               help="between stamps that are paired  [default: 50ms]")  # fmt: skip
 @option("--points", is_flag=True, help="A<-B from points that are the same in both")
 @option("--scale", requires=("points",), is_flag=True, help="of A to B too")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, Command, pose_result_options, reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
@@ -22,7 +22,7 @@ from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_posit
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.grammar.pose import Pose
 
 

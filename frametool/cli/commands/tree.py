@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, TIME, Command, at_ns, color_option, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 
 if TYPE_CHECKING:
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="tree")

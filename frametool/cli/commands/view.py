@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.inputs import option
+from frametool.cli.group import option
 from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
@@ -20,7 +20,7 @@ from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
 
-    from frametool.cli.inputs import Inputs
+    from frametool.cli.group import Inputs
     from frametool.view.frame_scene import FrameScene
 
     Eye = tuple[float, float]
