@@ -60,9 +60,13 @@ class PoseTask:
 
         degrees = self.output.style.degrees
         offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
+        if rest.get("window"):
+            self.inputs.ask("start", "stop")
         if rest.get("window") and rest.get("extra_column") is None:
             rest["extra_column"] = ""
-        if rest.get("poses") != 0:
+        said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
+        texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
+        if rest.get("poses") != 0 and not (texts and all(map(_says_all, texts))):
             self.inputs.ask("given")
         made = Request(
             given=self.stream.given, degrees=degrees, normalize=self.normalize, offset_ns=offset_ns, **rest
@@ -147,6 +151,12 @@ class PoseTask:
         """Write a derivation where the result would go."""
         self.output.text(explanation.render(self._form))
         return 0
+
+
+def _says_all(text: str) -> bool:
+    """Return True for a mapping, whose keys say what its numbers are."""
+    bare = without_inverse(text)[0].strip()
+    return bare.startswith("{") and ":" in bare
 
 
 def significant(precision: int | None) -> int | None:

@@ -608,8 +608,8 @@ color_option = option(
 
 
 def window_of(given: Inputs) -> tuple[int, int] | None:
-    """Return the first and the last nanosecond that --start and --stop leave, None without either."""
-    start, stop = given.start, given.stop
+    """Return the first and the last nanosecond that --start and --stop leave, None without either; nobody asks yet."""
+    start, stop = given.peek("start"), given.peek("stop")
     if start is not None and stop is not None and start > stop:
         raise click.UsageError("--start is after --stop")
     if start is stop is None:

@@ -197,7 +197,8 @@ class Stream:
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
         if form == "kitti" and self.given and not self.told_form():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
-        self.inputs.ask("camera_axes", *FORMATS[form].asks)
+        if request.poses:
+            self.inputs.ask("camera_axes", *FORMATS[form].asks)
         if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
         if tables_only and form in RECORDS:
@@ -350,9 +351,9 @@ class Stream:
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         told = self.inputs
-        if form not in RECORDS and output.told not in RECORDS:
+        if form not in RECORDS and output.told not in RECORDS and request.poses and request.gathered is None:
             request = request._replace(keep=told.keep)
-        if form not in RECORDS or request.operation.only_adds:
+        if (form not in RECORDS or request.operation.only_adds) and request.gathered is None:
             request = request._replace(prefix=told.prefix)
         if request.poses:
             told.ask("given")

@@ -324,9 +324,10 @@ class SaidAnswers(Answers):
 
     def __getattribute__(self, name: str) -> Any:
         """Ask for the options of a field."""
-        if name in ANSWERED:
+        value = super().__getattribute__(name)
+        if value and name in ANSWERED:
             inputs().ask(*ANSWERED[name])
-        return super().__getattribute__(name)
+        return value
 
 
 def _joints(texts: Sequence[str]) -> dict[str, str]:

@@ -70,7 +70,8 @@ def command(inputs: Inputs) -> int:
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
     """
-    files, measured, normalize, form = inputs.files, inputs.measured, inputs.normalize, inputs.form
+    files, measured, normalize = inputs.files, inputs.measured, inputs.normalize
+    form, strict = inputs.form, inputs.strict
     refuse_two_readers((*files, *measured))
     if inputs.each:
         findings = _one_by_one(files, normalize=normalize)
@@ -88,7 +89,7 @@ def command(inputs: Inputs) -> int:
     summary = ", ".join(f"{count} {level}{'s' * (count != 1)}" for level, count in counts.items() if count)
     if summary:
         say(summary)
-    return FAILED if counts["error"] or (inputs.strict and counts["warning"]) else 0
+    return FAILED if counts["error"] or (strict and counts["warning"]) else 0
 
 
 def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:

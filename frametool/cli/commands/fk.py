@@ -27,6 +27,7 @@ from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
     from frametool.cli.group import Inputs
+    from frametool.formats.load import Recording
 
 
 @click.command(cls=Command, name="fk")
@@ -56,14 +57,20 @@ def command(inputs: Inputs) -> int:
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
     rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
-    name = stream.path or "stdin"
+    with stream.opened():
+        return _added(stream, output, rows, file)
+
+
+def _added(stream: Stream, output: Output, rows: JointRows, file: Recording) -> int:
+    """Write the rows of a stream with their poses; the file is that of the robot."""
+    inputs, name = stream.inputs, stream.path or "stdin"
     begin = stream.opened().peek()
     form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
     if holds_arrays(form):
         raise click.UsageError(f"rows of joints are a table of text, records or messages, not {form}")
     names = names_in(begin, form, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
-    file.tally.about = f"{len(rows.columns)} of {len(robot.joints)} joints from the rows"
+    file.tally.about = f"{len(rows.columns)} of {len(rows.joints)} joints from the rows"
     state([file])
     echo_form = "" if form in RECORDS else echoed(begin)
     if not echo_form:

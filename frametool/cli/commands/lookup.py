@@ -139,6 +139,7 @@ def _many(
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
     asked = sample_stamps(frames, target, source) if times is None else read_times(times, skipped.add if skip else stop)
     if window is not None:
+        inputs.ask("start", "stop")
         asked = [stamp for stamp in asked if window[0] <= stamp <= window[1]]
         if not asked:
             raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")

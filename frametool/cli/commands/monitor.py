@@ -52,6 +52,7 @@ def command(inputs: Inputs) -> int:
     files = opened((inputs.recording, *inputs.more))
     clashes: list[FormatError] = []
     report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
+    inputs.ask("time_offset")
     state(files)
     most = MOST_TOLD + (len(clashes) == MOST_TOLD + 1)
     for error in clashes[:most]:
