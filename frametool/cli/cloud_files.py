@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused, settings
+from frametool.cli.group import inputs
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -21,7 +21,7 @@ from frametool.frames.stamps import format_stamp
 from frametool.stream.faults import Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
@@ -37,7 +37,6 @@ PLACES: dict[str, Callable[[PointCloud], str]] = {
     "frame": lambda cloud: cloud.frame,
 }  # {NAME} in -o -> what stands there
 _HEAD = 64
-_UNUSED = {"columns": "--columns", "keep": "--keep", "prefix": "--prefix", "given": "--from"}
 
 
 class BagOfClouds:
@@ -51,9 +50,8 @@ class BagOfClouds:
 
         self.path = path
         self.output = output
+        stream.inputs.ask("input_path")
         self.stream = stream
-        if unused := [option for name, option in _UNUSED.items() if stream.options.get(name)]:
-            raise click.UsageError(f"{', '.join(unused)}: clouds say themselves what their columns are")
         if output.path in (None, "-") or not holds_arrays(output.told or ""):
             forms = ", ".join(writers("arrays"))
             raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {forms}")
@@ -63,13 +61,13 @@ class BagOfClouds:
                 known = ", ".join(f"{{{each}}}" for each in PLACES)
                 raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
         self.tally = Tally()
-        chosen = settings().topics
+        chosen = inputs().topics
         with ExitStack() as opened:
             self.reader = opened.enter_context(opened_recording(path, self.tally))
             self.topics = cloud_topics(self.reader, chosen, path)
             self.opened = opened.pop_all()
         clouds = {topic.strip("/") for topic in self.topics}
-        settings().topics = tuple(topic for topic in chosen if topic.strip("/") not in clouds)
+        inputs().leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
         self.names: dict[str, int] = {}
 
     def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None) -> int:
@@ -80,6 +78,7 @@ class BagOfClouds:
         from frametool.ros.point_clouds import read_clouds
 
         bad = self.stream.policy(self.path, "message")
+        inputs().refuse_idle()
         count = points = 0
         once: Any = cache(say_warning)
         with self.opened, heard_by(once):
@@ -93,7 +92,7 @@ class BagOfClouds:
                 once(f"{self.path}: {told.message}", told.rule, FrametoolWarning)
         if not count:
             raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
-        if not self.stream.options["quiet"]:
+        if not self.stream.inputs.quiet:
             files = f"{len(self.names)} {'file' if len(self.names) == 1 else 'files'}"
             where = f" in {target}" if target else ""
             say(f"{self.path}: {points} points{where}, metres, in {files} ({', '.join(self.topics)})")
@@ -130,11 +129,6 @@ class BagOfClouds:
         return name
 
 
-_NOT_OF_SEVERAL = (
-    "columns", "keep", "prefix", "given", "header", "frame_column", "time_column", "kinds",
-)  # fmt: skip
-
-
 class SeveralClouds:
     """Clouds of several -i that become one: each is given in a frame of its own, or all in SOURCE."""
 
@@ -142,20 +136,18 @@ class SeveralClouds:
         """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
         self.output = output
         self.stream = stream
-        self.paths = stream.paths
-        refuse_unused("is not for several clouds; they are moved whole", *_NOT_OF_SEVERAL)
+        self.paths: Sequence[str] = stream.inputs.input_path
         if "-" in self.paths:
             raise click.UsageError("-i - among several: standard input holds one cloud; name files")
         if bags := [path for path in self.paths if is_bag(path)]:
             raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
-        forms = settings().input_forms
+        forms = inputs().input_forms
         told = [form for form in forms if "arrays" in FORMATS[form].reads]
         if len(told) not in (0, 1, len(self.paths)):
             raise click.UsageError(f"--in is given {len(told)} times for {len(self.paths)} clouds; once, or once each")
         self.forms = told * (len(self.paths) if len(told) == 1 else 1) or [""] * len(self.paths)
-        settings().input_forms = [form for form in forms if form not in told]
-        self.frames = [name.strip() for text in settings().named_frames for name in text.split(",")]
-        settings().named_frames = ()
+        self.frames = [name.strip() for text in inputs().named_frames for name in text.split(",")]
+        inputs().leave(input_forms=[form for form in forms if form not in told], named_frames=())
         if self.frames and len(self.frames) != len(self.paths):
             raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
 
@@ -182,7 +174,7 @@ class SeveralClouds:
             both = "SOURCE is one frame for all, --frames one for each; give one of them"
             each = f"say what each cloud is given in: --frames A,B (one for each of the {len(self.paths)}), or SOURCE"
             raise click.UsageError(both if has_source else each)
-        on_error = self.stream.options["on_error"]
+        on_error = self.stream.inputs.on_error
         with ExitStack() as opened:
             planned = []
             for path, told, frame in zip(self.paths, self.forms, self.frames or [""] * len(self.paths), strict=True):
@@ -211,7 +203,7 @@ class SeveralClouds:
                     status = max(status, run(merged.outcomes(at), write, policy, lambda _rows, _size: None))
                 for piece in merged.writer.end():
                     write(piece)
-        if not self.stream.options["quiet"]:
+        if not self.stream.inputs.quiet:
             where = f" in {target}" if target else ""
             froms = f", from {', '.join(self.frames)}" if self.frames else ""
             say(f"{len(self.paths)} clouds{where} as one{froms}; metres")

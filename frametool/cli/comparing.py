@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import settings
+from frametool.cli.group import inputs as running
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, Parsed, together
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
@@ -19,6 +20,7 @@ from frametool.stream.faults import MOST, STOP
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.fit.comparison import Comparison, Delta, Settings
     from frametool.frames.trajectory import Trajectory
@@ -113,44 +115,44 @@ def _read_lengths(text: str) -> tuple[float, ...]:
 
 ALIGN = ("se3", "sim3", "yaw", "origin", "none")
 pairing_options = together(
-    click.option("--match", type=click.Choice(("interpolate", "nearest")), metavar="HOW",
+    option("--match", type=click.Choice(("interpolate", "nearest")), metavar="HOW",
                  help="interpolate or nearest  [default: interpolate]"),
-    click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
+    option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
                  help="that is interpolated  [default: 3 median intervals]"),
-    click.option("--max-diff", "max_diff_ns", type=Parsed("time", read_span), metavar="TIME",
+    option("--max-diff", "max_diff_ns", type=Parsed("time", read_span), metavar="TIME",
                  help="of nearest stamps  [default: 10ms]"),
-    click.option("--min-match", type=Parsed("share", _read_share), metavar="SHARE",
+    option("--min-match", type=Parsed("share", _read_share), metavar="SHARE",
                  help="fewer partners are an error  [default: 10%]"),
-    click.option("--start", type=Parsed("time", _read_limit), metavar="TIME",
+    option("--start", type=Parsed("time", _read_limit), metavar="TIME",
                  help="first pair, a stamp of REF; +5s is after the first"),
-    click.option("--end", type=Parsed("time", _read_limit), metavar="TIME", help="last pair"),
-    click.option("--offset", type=Parsed("offset", _read_offset), metavar="TIME|auto",
+    option("--end", type=Parsed("time", _read_limit), metavar="TIME", help="last pair"),
+    option("--offset", type=Parsed("offset", _read_offset), metavar="TIME|auto",
                  help="what EST's clock is behind; auto:LIMIT finds it"),
-    click.option("--mount", type=TEXT, metavar="POSE|auto",
+    option("--mount", type=TEXT, metavar="POSE|auto",
                  help="REF's body in EST's; also FILE:BODY:POINT"),
-    click.option("--align", type=click.Choice(ALIGN), metavar="FIT",
+    option("--align", type=click.Choice(ALIGN), metavar="FIT",
                  help=f"{', '.join(ALIGN)}  [default: se3]"),
-    click.option("--align-first", type=Parsed("length", _read_first), metavar="N|10s|5m",
+    option("--align-first", type=Parsed("length", _read_first), metavar="N|10s|5m",
                  help="fit by the first pairs alone"),
-    click.option("--up", type=Parsed("axis", _read_up), metavar="AXIS",
+    option("--up", type=Parsed("axis", _read_up), metavar="AXIS",
                  help="of REF's world: z, -y ..  [default: z]"),
 )  # fmt: skip
 error_options = together(
-    click.option("--delta", "deltas", type=Parsed("deltas", _read_deltas), metavar="1m,5deg,..",
+    option("--delta", "deltas", type=Parsed("deltas", _read_deltas), metavar="1m,5deg,..",
                  help="of rpe: m, s, deg, frames  [default: 1m,10m,100m]"),
-    click.option("--all-pairs", is_flag=True, help="rpe from every pose, not in a chain"),
-    click.option("--tolerance", type=Parsed("share", _read_share), metavar="SHARE",
+    option("--all-pairs", is_flag=True, help="rpe from every pose, not in a chain"),
+    option("--tolerance", requires=("all_pairs",), type=Parsed("share", _read_share), metavar="SHARE",
                  help="of the delta of all pairs  [default: 10%]"),
-    click.option("--pairs-from", type=click.Choice(("reference", "estimate")), metavar="WHICH",
+    option("--pairs-from", type=click.Choice(("reference", "estimate")), metavar="WHICH",
                  help="reference or estimate  [default: reference]"),
-    click.option("--segments", type=Parsed("lengths", _read_lengths), metavar="100,200,..",
+    option("--segments", type=Parsed("lengths", _read_lengths), metavar="100,200,..",
                  help="of kitti, metres  [default: 100,200,..,800]"),
-    click.option("--segment-step", type=click.IntRange(1), metavar="N",
+    option("--segment-step", type=click.IntRange(1), metavar="N",
                  help="one from every N-th pair  [default: 10]"),
-    click.option("--as", "like", type=click.Choice(("evo",)), help="what evo does where nothing else is said"),
+    option("--as", "like", type=click.Choice(("evo",)), help="what evo does where nothing else is said"),
 )  # fmt: skip
 trajectory_options = together(
-    click.option("--on-error", type=click.Choice((STOP, "skip")), default=STOP, show_default=True, help="bad rows"),
+    option("--on-error", type=click.Choice((STOP, "skip")), default=STOP, show_default=True, help="bad rows"),
 )  # fmt: skip
 
 
@@ -169,9 +171,14 @@ def trajectory(
         made.append(BadRows(name, on_error, most=MOST, tell=partial(say_error, in_json=False)))
         return made[-1]
 
+    known = answers()
     found = read_trajectory(
-        argument, form=form, topics=settings().topics, answers=answers(), policy=policy, normalize=normalize
-    )
+        argument, form=form, topics=running().topics, answers=known._replace(time_offset=0), policy=policy,
+        normalize=normalize,
+    )  # fmt: skip
+    if found.stamps_ns is not None:
+        running().ask("time_offset")
+        found = found._replace(stamps_ns=found.stamps_ns + known.time_offset)
     file, inside = split_name(argument)
     name = ":".join(["stdin" if file == "-" else basename(file), *inside])
     return found, name, any(bad.count for bad in made)
@@ -179,21 +186,19 @@ def trajectory(
 
 def forms_of(files: int) -> list[str]:
     """Return the form of each of several files as --in says, the last for the rest; "" where it says none."""
-    forms = list(settings().input_forms)
+    forms = list(running().input_forms)
     if len(forms) > files:
         raise click.UsageError(f"--in is given {len(forms)} times for {files} files")
     return forms + (forms[-1:] * (files - len(forms)) or [""] * files)
 
 
-def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple[list[Comparison], bool]:
+def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
     """Compare estimates with a reference as the options say; tell what is worth it. Also: whether rows were skipped."""
     from frametool.fit.comparison import compare
 
     if [ref, *ests].count("-") > 1:
         raise click.UsageError("standard input can be read once; only one trajectory may be -")
-    on_error = options.pop("on_error")
-    forms = forms_of(1 + len(ests))
-    chosen = _settings(options)
+    on_error, forms, chosen = inputs.on_error, forms_of(1 + len(ests)), _settings(inputs)
     reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
     found = []
     for argument, form in zip(ests, forms[1:], strict=True):
@@ -208,21 +213,17 @@ def comparisons(ref: str, ests: Sequence[str], options: dict[str, Any]) -> tuple
     return found, skipped
 
 
-def _settings(options: dict[str, Any]) -> Settings:
+def _settings(inputs: Inputs) -> Settings:
     """Take what the options say; those not given are as evo has them, or as we do."""
     from frametool.fit.comparison import EVO, Settings
 
-    given = {name: options.pop(name) for name in Settings._fields if options.get(name) is not None}
-    for name in Settings._fields:
-        options.pop(name, None)
+    given = {name: value for name in Settings._fields if (value := getattr(inputs, name)) is not None}
     if "offset" in given:
         given["offset"], limit = given["offset"]
         given |= {} if limit is None else {"offset_limit_s": limit}
     if "mount" in given:
         given["mount"] = _mount(given["mount"])
-    if not given.get("all_pairs") and "tolerance" in given:
-        raise click.UsageError("--tolerance is of --all-pairs: how near to the delta two poses are")
-    base = EVO if options.pop("like", None) else Settings()
+    base = EVO if inputs.like else Settings()
     chosen = base._replace(**given)
     if "max_diff_ns" in given and chosen.match != "nearest":
         raise click.UsageError("--max-diff is of --match nearest; --max-gap is of interpolation")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import settings
+from frametool.cli.group import inputs
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
@@ -31,14 +31,37 @@ INLINE = "argument"
 
 def earth() -> Earth:
     """Return what the options say; raises click.UsageError for what is no place and no zone."""
-    said = settings()
+    said = inputs()
     if said.earth is None:
+        zone, origin = said.peek("zone"), said.peek("origin")
         try:
-            zone = None if said.zone is None else zone_number(said.zone)
+            number = None if zone is None else zone_number(zone)
         except ValueInvalid as error:
             raise click.UsageError(f"--zone: {error}") from None
-        said.earth = Earth(None if said.origin is None else _origin(said.origin), said.local_axes or "", zone)
+        said.earth = SaidEarth(None if origin is None else _origin(origin), said.peek("local_axes") or "", number)
     return said.earth
+
+
+class SaidEarth(Earth):
+    """What options say of places on the Earth; each counts as asked for where it is looked at."""
+
+    @property
+    def origin(self) -> Origin | None:
+        """Return what --origin says."""
+        inputs().ask("origin")
+        return self[0]
+
+    @property
+    def axes(self) -> str:
+        """Return what --local-axes says."""
+        inputs().ask("local_axes")
+        return self[1]
+
+    @property
+    def zone(self) -> float | None:
+        """Return what --zone says."""
+        inputs().ask("zone")
+        return self[2]
 
 
 def _origin(text: str) -> Origin:
@@ -65,7 +88,7 @@ def _origin(text: str) -> Origin:
 
 def _tell(place: Vector) -> None:
     lat, lon, alt = place
-    if not settings().quiet:
+    if not inputs().quiet:
         say(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
 
 
@@ -73,10 +96,7 @@ def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Plac
     """Part what --to names into rotations, and how positions are written; raises ValueInvalid for --to enu alone."""
     names = [each.representation.name for each in notations if each.representation.is_place]
     rest = tuple(each for each in notations if not each.representation.is_place)
-    place = Place.written(names, earth()) if names else None
-    if settings().origin == FIRST and not (place and place.is_local):
-        raise click.UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
-    return rest, place
+    return rest, Place.written(names, earth()) if names else None
 
 
 def mapping_of(texts: Sequence[str], name: str) -> str:

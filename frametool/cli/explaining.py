@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused, settings
+from frametool.cli.group import option
 from frametool.cli.options import FULL, pose_reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of, without_inverse
-from frametool.cli.streaming import OPTIONS, Stream, stream_options
+from frametool.cli.streaming import Stream, stream_options
 from frametool.errors import FormatError, heard_by, warn
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.operations import WrittenPose
@@ -26,11 +27,15 @@ if TYPE_CHECKING:
 
 FORMS = ("text", "markdown")
 ONE_RECORD = "--explain derives one record; write it as an argument"
-EXPLAIN = click.option(
-    "--explain", type=click.Choice(FORMS), metavar="[=FORM]", help="derive the result step by step (help explain)",
-)  # fmt: skip
 
 
+def explain_option(**rest: Any) -> Callable[[Any], Any]:
+    """Return --explain, with what it says of other options."""
+    about = "derive the result step by step (help explain)"
+    return option("--explain", type=click.Choice(FORMS), metavar="[=FORM]", help=about, **rest)
+
+
+EXPLAIN = explain_option()
 pose_stream_options = together(stream_options, pose_reading_options)
 
 
@@ -40,23 +45,29 @@ class PoseTask:
     derives: whether the derivation is wanted instead of the result
     """
 
-    def __init__(self, options: dict[str, Any], *what: str) -> None:
-        """Take the options out of a command's; `what` are the results that the command writes."""
-        self._form: str = options.pop("explain", None) or ""
-        self._precision: int | None = options["precision"]
+    def __init__(self, inputs: Inputs, *what: str) -> None:
+        """Look at what the options say; `what` are the results that the command writes."""
+        self.inputs = inputs
+        self._form: str = inputs.explain or ""
         self.derives = bool(self._form)
-        self.normalize: bool = options.pop("normalize")
-        self.stream = Stream(options)
-        self.output = Output(*what or ("poses",), **options)
+        self.normalize: bool = inputs.normalize
+        self.stream = Stream(inputs)
+        self.output = Output(inputs, *what or ("poses",))
 
     def request(self, **rest: Any) -> Request:
         """Return what is done with rows and records: they are read as the options say."""
         from frametool.stream.request import Request
 
         degrees = self.output.style.degrees
-        offset_ns = 0 if settings().reads_trees else settings().time_offset or 0
+        offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
+        if rest.get("window"):
+            self.inputs.ask("start", "stop")
         if rest.get("window") and rest.get("extra_column") is None:
             rest["extra_column"] = ""
+        said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
+        texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
+        if rest.get("poses") != 0 and not (texts and all(map(_says_all, texts))):
+            self.inputs.ask("given")
         made = Request(
             given=self.stream.given, degrees=degrees, normalize=self.normalize, offset_ns=offset_ns, **rest
         )
@@ -66,8 +77,8 @@ class PoseTask:
 
     def at_places(self, request: Request) -> Request:
         """Add what the options say of places on the Earth, where they say anything."""
-        said, place = settings(), self.output.style.place
-        if not (place or self.stream.given_place or said.origin or said.local_axes or said.zone):
+        place = self.output.style.place
+        if not (place or self.stream.given_place or any(map(self.inputs.peek, ("origin", "local_axes", "zone")))):
             return request
         from frametool.cli.earth import earth
 
@@ -78,17 +89,12 @@ class PoseTask:
         """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
         return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
 
-    def only_arguments(self, arguments: Sequence[str | Source | None], *more: str) -> None:
-        """Refuse the options of streams where arguments are all that is read.
-
-        more: options of the command that are about streams too
-        """
-        names = {*OPTIONS, "edges", *more} - {"given", "quiet"}
-        if not settings().reads_trees:
-            names |= {"stamps", "camera_axes"}
-            if not any(isinstance(each, str) and os.path.exists(each) for each in arguments):
-                names.add("input_forms")
-        refuse_unused("is about rows; arguments are read here, and rows where - stands or nothing is", *names)
+    def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
+        """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
+        if self.stream.path is not None:
+            raise click.UsageError("-i FILE and arguments are two inputs; give one")
+        if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
+            self.inputs.ask("input_forms")
 
     def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
@@ -115,8 +121,7 @@ class PoseTask:
         if self.output.told not in (None, "text"):
             instead = f"{', '.join(FORMS)}, not {self.output.told}"
             raise click.UsageError(f"--explain writes {instead}; leave one of them out")
-        refuse_unused(f"is about a stream; {ONE_RECORD}", *({*OPTIONS, "edges"} - {"given", "quiet"}))
-        return DerivationStyle(self.output.style, significant(self._precision))
+        return DerivationStyle(self.output.style, significant(self.inputs.precision))
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
         """Read the one pose of an argument as it is written.
@@ -146,6 +151,12 @@ class PoseTask:
         """Write a derivation where the result would go."""
         self.output.text(explanation.render(self._form))
         return 0
+
+
+def _says_all(text: str) -> bool:
+    """Return True for a mapping, whose keys say what its numbers are."""
+    bare = without_inverse(text)[0].strip()
+    return bare.startswith("{") and ":" in bare
 
 
 def significant(precision: int | None) -> int | None:

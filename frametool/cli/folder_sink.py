@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, BinaryIO
 
 from frametool.cli.signals import clean_up
-from frametool.cli.sink import created, give_name, problems_of, refuse_existing, unnamed_beside, writer_into
+from frametool.cli.sink import check, created, give_name, problems_of, refuse_existing, unnamed_beside, writer_into
 from frametool.errors import FileProblem, printable, shown
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def filling(path: str, *, force: bool) -> Iterator[Write]:
 
     try:
         yield fill
+        check()
         with problems_of(path):
             part = part or created(place, os.mkdir)[0]
             for name, stream in files.items():

@@ -1,4 +1,7 @@
-"""How click is used: the group of all commands, what their options keep, their help, their calls and their misuse.
+"""How click is used: the inputs of a command, the group of all commands, their help, their calls and their misuse.
+
+An option that was given, and that nobody has asked for when the first result is written, would be ignored: it is a
+usage error, and nothing is written.
 
 Each command is imported when it is called; help and completion come from the table.
 """
@@ -6,6 +9,7 @@ Each command is imported when it is called; help and completion come from the ta
 from __future__ import annotations
 
 import os
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -24,76 +28,120 @@ if TYPE_CHECKING:
 
     from frametool.geometry.place import Earth
 
-SETTINGS = "frametool.settings"  # the keys in a context's `meta`
-EVERYTHING = "frametool.everything"
+EVERYTHING = "frametool.everything"  # a key in a context's `meta`
+INPUTS = "frametool.inputs"  # the key in a context's `meta`
+# what stands for an option of several values in a command without it
+WITHOUT = {"input_forms": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
+# options that any way may ignore: they are about what is said, not about what is done
+OF_MESSAGES = ("quiet", "verbose")
 
 
-class CommandSettings:
-    """What the options of the running command say about its inputs, each under its parameter's name.
+class Inputs:
+    """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
 
-    These options are no parameters of the command's function: `keep_setting` is their callback, and `settings` is
-    where the rest of the command line asks. Like click's `meta`, a command shares them with its group.
-
-    row_order: no option of its own, but the --from of streams where it is the order of a quaternion
-    reads_trees: no option, but set when files of frames are opened: --in is then about these too
-    inputs: no option either, but the forms of what was read, each with what it asked of `OPEN`
+    forms_read: the forms of what was read, each with the options that say what it leaves open
+    reads_trees: whether files of frames are opened: --in is then about these too
+    earth: what the options say of places on the Earth, made when first needed
     """
 
-    all_versions = False
-    verbose = False
-    quiet = False
-    input_forms: Sequence[str] = ()
-    topics: Sequence[str] = ()
-    joints: Sequence[str] = ()
-    joint_files: Sequence[str] = ()
-    named_frames: Sequence[str] = ()
-    direction: str | None = None
-    camera_axes: str | None = None
-    dh: str | None = None
-    stamps: str | None = None
-    edges = False
-    array: str | None = None
-    messages: Sequence[str] = ()
-    topic_out: str | None = None
-    recorded_frames: str | None = None
-    origin: str | None = None
-    local_axes: str | None = None
-    zone: str | None = None
-    earth: Earth | None = None
-    order: str | None = None
-    row_order = ""
-    time_offset: int | None = None
-    reads_trees = False
-    inputs: Sequence[tuple[str, tuple[str, ...]]] = ()
+    def __init__(self, values: Mapping[str, Any], idle: dict[str, str] | None = None) -> None:
+        """Keep the values; idle: the options that were given, each as it is called."""
+        self._values = {**values}
+        self._idle = {} if idle is None else idle
+        self.forms_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
+        self.reads_trees = False
+        self.earth: Earth | None = None
+
+    @classmethod
+    def of(cls, context: click.Context) -> Inputs:
+        """Return what a context has parsed."""
+        idle = {name: called for name, called in told_options(context).items() if name not in OF_MESSAGES}
+        return cls(context.params, idle)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of an argument or option, which counts as asked for; None where the command has none."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        self._idle.pop(name, None)
+        return self._values.get(name, WITHOUT.get(name))
+
+    def peek(self, name: str) -> Any:
+        """Return a value that is looked at and not used."""
+        return self._values.get(name, WITHOUT.get(name))
+
+    def ask(self, *names: str) -> None:
+        """Count options as asked for."""
+        for name in names:
+            self._idle.pop(name, None)
+
+    def leave(self, **values: Any) -> None:
+        """Put what other readers have left in the place of what was given."""
+        self._values |= values
+
+    def but(self, **values: Any) -> Inputs:
+        """Return these inputs with other values."""
+        return Inputs(self._values | values, self._idle)
+
+    def idle(self) -> set[str]:
+        """Return the options that were given and that nobody has asked for."""
+        return {*self._idle}
+
+    def refuse_idle(self) -> None:
+        """Raise a usage error for options that were given and that nobody has asked for."""
+        if self._idle:
+            has = "has" if len(self._idle) == 1 else "have"
+            raise click.UsageError(f"{', '.join(self._idle.values())} {has} no effect here")
 
 
-def settings(context: click.Context | None = None) -> CommandSettings:
-    """Return the settings of a context, or of the running command; where none runs, nothing is set but --quiet."""
-    context = context or click.get_current_context(silent=True)
-    if context is not None:
-        found: CommandSettings = context.meta.setdefault(SETTINGS, CommandSettings())
-        return found
-    silent = CommandSettings()
-    silent.quiet = True
-    return silent
+class Option(click.Option):
+    """An option with what it says about other options of its command, by the names of their parameters.
+
+    excludes: those that cannot stand beside it
+    requires: without any of these it has no meaning
+    """
+
+    def __init__(
+        self, *names: Any, excludes: Sequence[str] = (), requires: Sequence[str] = (), **rest: Any
+    ) -> None:
+        """Keep both beside what click keeps."""
+        super().__init__(*names, **rest)
+        self.excludes, self.requires = excludes, requires
 
 
-def keep_setting(context: click.Context, option: click.Parameter, chosen: Any) -> Any:
-    """Keep the value of an option in the settings of its context (a callback of click)."""
-    setattr(settings(context), option.name or "", chosen)
-    return chosen
+option = partial(click.option, cls=Option)
 
 
-def refuse_unused(why: str, *names: str, ctx: click.Context | None = None) -> None:
-    """Stop where the command line has one of these parameters of the running command: it would not be used."""
-    ctx = ctx or click.get_current_context()
-    named = [each.opts[-1] for each in ctx.command.get_params(ctx) if each.name in names and _is_told(ctx, each.name)]
-    if named:
-        raise click.UsageError(f"{', '.join(named)} {why}", ctx)
+def told_options(context: click.Context) -> dict[str, str]:
+    """Return the options that stand on the command line, by their parameters, each as it is called."""
+    told = click.core.ParameterSource.COMMANDLINE
+    return {
+        each.name or "": each.opts[-1] for each in context.command.params
+        if isinstance(each, click.Option) and context.get_parameter_source(each.name or "") is told
+    }  # fmt: skip
 
 
-def _is_told(ctx: click.Context, name: str) -> bool:
-    return ctx.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+def check_together(context: click.Context) -> None:
+    """Raise a usage error for options that do not belong together."""
+    told = told_options(context)
+    known = {each.name: each for each in context.command.params if isinstance(each, Option)}
+    for name, called in told.items():
+        if name not in known:
+            continue
+        if other := next((told[each] for each in known[name].excludes if each in told), ""):
+            raise click.UsageError(f"{called} and {other} exclude each other", context)
+        needed = known[name].requires
+        if needed and told.keys().isdisjoint(needed):
+            choices = " or ".join(known[each].opts[-1] for each in needed if each in known)
+            raise click.UsageError(f"{called} needs {choices}", context)
+
+
+def inputs() -> Inputs:
+    """Return the inputs of the running command; where none runs, nothing is set but --quiet."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return Inputs({"quiet": True})
+    found: Inputs = context.meta.get(INPUTS) or Inputs(context.params)
+    return found
 
 
 def show_help(ctx: click.Context, *, everything: bool = False) -> None:
@@ -288,7 +336,7 @@ def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:
     """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
     if chosen:
         with writing(None) as write:
-            write(f"frametool {__version__}\n{_surroundings() if settings(ctx).all_versions else ''}")
+            write(f"frametool {__version__}\n{_surroundings() if ctx.params.get('all_versions') else ''}")
         ctx.exit()
 
 
@@ -311,11 +359,11 @@ def _surroundings() -> str:
 
 
 @click.command(cls=Group, help=HELP)
-@click.option("-v", "all_versions", is_flag=True, is_eager=True, expose_value=False, callback=keep_setting,
+@click.option("-v", "all_versions", is_flag=True, is_eager=True,
               help="with --version: of Python and of its packages too")  # fmt: skip
 @click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
               help="Show the version and exit.")  # fmt: skip
-def group() -> None:
+def group(all_versions: bool) -> None:
     """Hold the commands."""
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused
+from frametool.cli.group import option
 from frametool.cli.options import ColumnNames, together
 from frametool.cli.trees import frame_name
 from frametool.errors import UnknownFrame
@@ -18,32 +18,38 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.cli.explaining import PoseTask
+    from frametool.cli.group import Inputs
     from frametool.cli.trees import CarriedSigmas
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Components
 
 
-def _column_option(end: str) -> Callable[..., Any]:
-    about = f"column of a table with each row's {end.upper()}"
-    return click.option(f"--{end}-column", type=ColumnNames(), metavar="NAME", help=about)
+ONE_LOOKUP = ("times", "source_at", "fixed", "explain")  # which a table does not take
+
+
+def _column_option(end: str, *excludes: str) -> Callable[..., Any]:
+    about = f"column of a table with each row's {end}"
+    return option(
+        f"--{end.lower()}-column", excludes=(*ONE_LOOKUP, *excludes), type=ColumnNames(), metavar="NAME", help=about
+    )
 
 
 column_options = together(  # `RowFrames` takes them
-    _column_option("target"),
-    _column_option("source"),
-    click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column of a table with each row's time"),
+    _column_option("TARGET"),
+    _column_option("SOURCE"),
+    _column_option("time", "at"),
 )
 
 
 class RowFrames:
     """Which columns name the frames and the time of each row; true if one does."""
 
-    def __init__(self, options: dict[str, Any]) -> None:
-        """Take the options out of a command's."""
-        self.target: str | None = options.pop("target_column")
-        self.source: str | None = options.pop("source_column")
-        self.time: str | None = options.pop("time_column")
+    def __init__(self, inputs: Inputs) -> None:
+        """Take what the options say."""
+        self.target: str | None = inputs.target_column
+        self.source: str | None = inputs.source_column
+        self.time: str | None = inputs.time_column
 
     def __bool__(self) -> bool:
         """Return whether a column names a frame or a time."""
@@ -60,13 +66,11 @@ class RowFrames:
         from frametool.stream.request import Operation
         from frametool.stream.stamp_source import Timed
 
-        if self.time is not None and task.stream.options["columns"]:
-            refuse_unused("is not used: the pose is that of two frames", "columns")
         if self.target is not None and source is None:
             target, source = None, target
-        for name, column, option in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
+        for name, column, called in ((target, self.target, "TARGET"), (source, self.source, "SOURCE")):
             if (name is None) == (column is None):
-                raise click.UsageError(f"name {option} or its column, one of the two")
+                raise click.UsageError(f"name {called} or its column, one of the two")
         fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
         frames, place = tuple(name for name in (self.target, self.source) if name is not None), task.output.style.place
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.group import WithHelp, keep_setting, refuse_unused, settings
+from frametool.cli.group import INPUTS, Inputs, WithHelp, check_together, inputs, option
+from frametool.cli.sink import checked_by
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -34,10 +35,6 @@ NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translat
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
-
-
-# option -> those without which it would not be used
-NEEDS = {"force": ("output", "plot", "report", "view"), "tolerance": ("find",)}
 
 
 class Command(WithHelp):
@@ -70,18 +67,20 @@ class Command(WithHelp):
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
         if "inv" in args:
             args = _joined(args, ctx, always=self.name in OF_POSES)
-        for option in {*OPTIONAL}.intersection(args):
-            args = _with_value(args, option, *OPTIONAL[option])
+        for name in {*OPTIONAL}.intersection(args):
+            args = _with_value(args, name, *OPTIONAL[name])
         rest = super().parse_args(ctx, args)
-        for name, needed in NEEDS.items():
-            if needed[0] in ctx.params and not any(map(ctx.params.get, needed)):
-                refuse_unused(f"is not used without --{needed[0]}", name, ctx=ctx)
+        if not ctx.resilient_parsing:
+            check_together(ctx)
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command, then say if --camera-axes was of no use: only a result shows whether it was."""
-        result = super().invoke(ctx)
-        _say_not_needed()
+        """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
+        given = ctx.meta[INPUTS] = Inputs.of(ctx)
+        with checked_by(given.refuse_idle):
+            result = ctx.invoke(self.callback or (lambda _: 0), given)
+        given.refuse_idle()
+        _say_not_needed(given)
         return result
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -325,53 +324,49 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
     """Return what adds several options to a command, in this order in its help."""
 
     def add(function: Function) -> Function:
-        for option in reversed(options):
-            function = option(function)
+        for add_option in reversed(options):
+            function = add_option(function)
         return function
 
     return add
 
 
-def _setting(*names: str, **rest: Any) -> Callable[[Any], Any]:
-    return click.option(*names, expose_value=False, callback=keep_setting, **rest)
-
-
 # --- inputs --------------------------------------------------------------------------------------------------------
 
-verbose_option = _setting("-v", "--verbose", is_flag=True, help="say what each input was taken for")
-in_option = _setting(
+verbose_option = option("-v", "--verbose", is_flag=True, help="say what each input was taken for")
+in_option = option(
     "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
     help="form of the input (`frametool formats`), once a file",
 )  # fmt: skip
-_CAMERA_AXES = _setting(
+_CAMERA_AXES = option(
     "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
     help="what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
 )  # fmt: skip
-_STAMPS = _setting(
+_STAMPS = option(
     "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
 )
-_EDGES = _setting("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
-_TOPIC = _setting(
+_EDGES = option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
+_TOPIC = option(
     "--topic", "topics", type=TEXT, multiple=True, metavar="NAME", help="read only this topic; may be repeated"
 )
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
-    _setting("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
+    option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
              help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
-    _setting("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
+    option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
              help="values of joints: a map, JointState messages, CSV, MJCF:KEY"),
-    _setting("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
+    option("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
              help="names of frames that a form does not name; may be repeated, in the order of the files"),
-    _setting("--direction", "direction", type=click.Choice(DIRECTIONS),
+    option("--direction", "direction", type=click.Choice(DIRECTIONS),
              help="of matrices whose key does not say which frame they are seen from"),
     _CAMERA_AXES,
-    _setting("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
+    option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
     _STAMPS,
 )  # fmt: skip
 
 
-_ORDER = _setting("--from", "order", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
+_ORDER = option("--from", "order", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
 
 
 def reading_options(
@@ -384,7 +379,7 @@ def reading_options(
     """
     if streams:
         return together(_TOPIC, *_READING)
-    quiet = _setting("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
+    quiet = option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
     return together(in_option, quiet, *[_TOPIC] * topics, *_READING, *[_ORDER] * order)
 
 
@@ -393,7 +388,7 @@ def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
 
     streams: there is a stream; its form is the last one that can be streamed, "" if there is none
     """
-    forms = list(settings().input_forms)
+    forms = list(inputs().input_forms)
     streamed = [at for at, form in enumerate(forms) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
     of_stream = forms.pop(streamed[-1]) if streamed else ""
     return forms, of_stream
@@ -401,43 +396,32 @@ def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
 
 def say_if_verbose(text: str) -> None:
     """Write a line on stderr if the command was called with -v."""
-    if settings().verbose:
+    if inputs().verbose:
         say(text)
 
 
-def _say_not_needed() -> None:
+def _say_not_needed(given: Inputs) -> None:
     """Say on stderr which options change nothing, where only what was read or is written shows whether they do."""
-    inputs = settings().inputs
-    forms = " and ".join(dict.fromkeys(form for form, _ in inputs if form))
-    for ask, chosen in (("frames", settings().named_frames), ("camera_axes", settings().camera_axes)):
-        if chosen and not settings().quiet and not any(ask in asks for _, asks in inputs):
+    forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
+    for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
+        if chosen and not given.quiet and not any(ask in asks for _, asks in given.forms_read):
             why = f": {forms} does not leave that open" if forms else " here"
             say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
 
 
-def refuse_not_needed(forms: Collection[str], *asked: str) -> None:
-    """Refuse options that answer what none of these forms leaves open: they would change nothing."""
-    for ask in asked:
-        chosen = getattr(settings(), "named_frames" if ask == "frames" else ask)
-        if chosen and not any(ask in FORMATS[form].required_options for form in forms):
-            option = "--from" if ask == "order" else f"--{ask.replace('_', '-')}"
-            known = " and ".join(dict.fromkeys(forms))
-            raise click.UsageError(f"{option} changes nothing: {known} does not leave that open")
-
-
 # --- results -------------------------------------------------------------------------------------------------------
 
-_PRECISION = click.option(
+_PRECISION = option(
     "--precision", type=Digits(), metavar="N|full", help="digits after the point  [default: full; overviews 6]"
 )
 _PLACE = (
-    click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
-    click.option("--force", is_flag=True, help="let --output replace a file"),
+    option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
+    option("--force", is_flag=True, requires=("output", "report"), help="let --output replace a file"),
 )
 
 
 def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
-    return click.option("-f", "--format", "format_name", type=WrittenForm(("text", *forms)), help=text)
+    return option("-f", "--format", "format_name", type=WrittenForm(("text", *forms)), help=text)
 
 
 MESSAGES = ("pose", "tf", "path", "point", "fix")
@@ -453,12 +437,12 @@ def parse_messages(text: str) -> tuple[str, ...]:
 
 
 _RECORDING = (
-    _setting("--messages", "messages", type=Parsed("messages", parse_messages), metavar="KIND,..", default=(),
+    option("--messages", "messages", type=Parsed("messages", parse_messages), metavar="KIND,..", default=(),
              help=f"messages of a recording: {', '.join(MESSAGES)}  [default: as the rows are]"),
-    _setting("--topic-out", "topic_out", type=TEXT, metavar="NAME", help="the topic of a recording with one"),
+    option("--topic-out", "topic_out", type=TEXT, metavar="NAME", help="the topic of a recording with one"),
 )  # fmt: skip
 # of commands that have no --frames for what they read
-frames_out_option = _setting(
+frames_out_option = option(
     "--frames", "recorded_frames", type=TEXT, metavar="WORLD,BODY",
     help="what the frames of poses in a recording are called; adds /tf",
 )  # fmt: skip
@@ -481,22 +465,22 @@ def list_options(*more: str) -> Callable[[Function], Function]:
 
 # how rotations are written
 rotation_options = together(
-    click.option(
+    option(
         "--to", "notations", type=Notations(), metavar="REP[,REP..]",
         help="representations of the result  [default: quaternion]",
     ),
-    click.option("--deg", is_flag=True, help="angles in degrees"),
-    click.option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
-    _setting("--local-axes", "local_axes", type=click.Choice(("enu", "ned", "grid", "ecef")),
+    option("--deg", is_flag=True, help="angles in degrees"),
+    option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
+    option("--local-axes", "local_axes", type=click.Choice(("enu", "ned", "grid", "ecef")),
              help="what rotations at a place on the Earth are given in (help earth)"),
-    _setting("--origin", "origin", type=TEXT, metavar="PLACE|first", help="where east north up 0 0 0 is"),
-    _setting("--zone", "zone", type=TEXT, metavar="32N", help="the one zone of UTM"),
+    option("--origin", "origin", type=TEXT, metavar="PLACE|first", help="where east north up 0 0 0 is"),
+    option("--zone", "zone", type=TEXT, metavar="32N", help="the one zone of UTM"),
 )  # fmt: skip
 # how poses are read; commands have it with `rotation_options`
-pose_options = click.option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")
+pose_options = option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")
 
 
-scale_option = click.option("--scale", is_flag=True, help="take a matrix s R as a similarity of scale s")
+scale_option = option("--scale", is_flag=True, help="take a matrix s R as a similarity of scale s")
 
 
 def pose_result_options(*what: str) -> Callable[[Function], Function]:
@@ -595,37 +579,37 @@ def at_ns(chosen: int | str | None) -> int | None:
 
 # how moving frames are taken
 rules_options = together(
-    click.option("--moving", is_flag=True, help="an edge with one stamp answers only that instant"),
-    click.option(
+    option("--moving", is_flag=True, help="an edge with one stamp answers only that instant"),
+    option(
         "--cache", type=Time(latest=False), metavar="SECONDS", help="forget what is older  [default: nothing]"
     ),
 )
-times_option = click.option(
-    "--times", type=TEXT, metavar="TIMES", help="many: T,T,.., START:STOP:STEP, or the stamps of FILE"
+times_option = option(
+    "--times", excludes=("explain",), type=TEXT, metavar="TIMES",
+    help="many: T,T,.., START:STOP:STEP, or the stamps of FILE",
 )
 LIMIT = Time(latest=False)
-offset_option = _setting(
+offset_option = option(
     "--time-offset", "time_offset", type=LIMIT, metavar="SECONDS", help="add this to all stamps read"
 )
 limit_options = together(
     offset_option,
-    click.option("--start", type=LIMIT, metavar="TIME", help="leave out what is before"),
-    click.option("--stop", type=LIMIT, metavar="TIME", help="leave out what is after"),
+    option("--start", type=LIMIT, metavar="TIME", help="leave out what is before"),
+    option("--stop", type=LIMIT, metavar="TIME", help="leave out what is after"),
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
 moving_options = together(rules_options, offset_option, reading_options(order=False), verbose_option)
 tree_options = together(moving_options, _ORDER, pose_options, rotation_options)
-color_option = click.option(
+color_option = option(
     "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
     help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
 )  # fmt: skip
 
 
-def window_of(start: int | None, stop: int | None, column: str | None = None) -> tuple[int, int] | None:
-    """Return the first and the last nanosecond that --start and --stop leave, None without either."""
-    if column is not None and start is stop is None and not settings().time_offset:
-        raise click.UsageError("--time-column is for --time-offset, --start and --stop")
+def window_of(given: Inputs) -> tuple[int, int] | None:
+    """Return the first and the last nanosecond that --start and --stop leave, None without either; nobody asks yet."""
+    start, stop = given.peek("start"), given.peek("stop")
     if start is not None and stop is not None and start > stop:
         raise click.UsageError("--start is after --stop")
     if start is stop is None:
@@ -635,18 +619,14 @@ def window_of(start: int | None, stop: int | None, column: str | None = None) ->
     return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
 
 
-def rules(*, moving: bool, cache: int | None, normalize: bool = False) -> Rules:
+def rules(given: Inputs) -> Rules:
     """Collect what the options say about how frames are taken."""
-    if cache is not None and cache < 0:
+    keep_ns = given.cache
+    if keep_ns is not None and keep_ns < 0:
         raise click.UsageError("--cache takes seconds, not less than 0")
     from frametool.formats.load import Rules
 
-    return Rules(moving=moving, keep_ns=cache, normalize=normalize)
-
-
-def rules_of(options: dict[str, Any]) -> Rules:
-    """Take out of a command's options what they say about how frames are taken."""
-    return rules(**{name: options.pop(name) for name in ("moving", "cache", "normalize") if name in options})
+    return Rules(moving=bool(given.moving), keep_ns=keep_ns, normalize=bool(given.normalize))
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

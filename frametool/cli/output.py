@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from click import UsageError
 
-from frametool.cli.group import refuse_unused, settings
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from contextlib import AbstractContextManager
 
+    from frametool.cli.group import Inputs
     from frametool.cli.sink import Write
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
@@ -54,58 +54,47 @@ BLOCK = 1 << 13  # poses of a trajectory
 class Output:
     """Where results go and how they look: what the options of a command say."""
 
-    def __init__(
-        self,
-        *what: str,
-        format_name: str | None = None,
-        precision: int | None = None,
-        output: str | None = None,
-        force: bool = False,
-        notations: tuple[Notation, ...] | None = None,
-        deg: bool = False,
-        keep_sign: bool = False,
-        otherwise: str | None = None,
-    ) -> None:
+    def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe.
 
         otherwise: the form that stands in the place of these two
         """
-        self.path = output
-        self.force = force
-        if output is not None and format_name is None:
+        self._inputs = inputs
+        self.path: str | None = inputs.output
+        self.force: bool = self.path is not None and inputs.force
+        told: str | None = inputs.format_name
+        if self.path is not None and told is None:
             from frametool.formats.unsupported import refuse_suffix
 
-            refuse_suffix(output)
+            refuse_suffix(self.path)
         self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
-        self.told = format_name or (by_name(output, writers(*what)) if output is not None else None)
-        place = None
-        if settings().origin is not None or any(each.representation.is_place for each in notations or ()):
+        self.told = told or (by_name(self.path, writers(*what)) if self.path is not None else None)
+        notations, place = inputs.notations or (), None
+        if any(each.representation.is_place for each in notations):
             from frametool.cli.earth import places_of
 
-            notations, place = places_of(notations or ())
-        self.notations = notations or ()
+            notations, place = places_of(notations)
+        self.notations: tuple[Notation, ...] = notations
         self._form_is_default = not (self.told or otherwise)
-        form = self.told or otherwise or ("text" if output is None and sys.stdout.isatty() else "yaml")
+        form = self.told or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
         self._holds_arrays = holds_arrays(form)
         self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
         self._in_blocks = self.is_trajectory or self._holds_arrays or is_recording(form)
         self.holds_all = self._in_blocks or form == "csv"  # rows, of which there may be many
-        if has_no_text(form):
-            refuse_unused(f"is not used: {form} holds numbers, not their text", "precision")
-        if self._holds_arrays and output is None and sys.stdout.isatty():
+        if self._holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
         machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
         chosen = notations or ((notation("quaternion"),) if machine else ())
-        full = precision == FULL
-        digits = None if full else precision
-        self.style = Style(form, chosen, degrees=deg, precision=digits, full=full, keep_sign=keep_sign)
+        digits = inputs.peek("precision")
+        self.style = Style(
+            form, chosen, degrees=bool(inputs.deg), precision=None if digits == FULL else digits, full=digits == FULL,
+            keep_sign=bool(inputs.keep_sign),
+        )  # fmt: skip
         self.style.put_at(place)
         if is_recording(form):
             from frametool.cli.recording import recorded
 
-            self.style.recording = recorded(form, output)
-        else:
-            _refuse_recorded(form)
+            self.style.recording = recorded(inputs, form, self.path)
 
     def check_target(self, target: str) -> None:
         """Stop where places are asked for of what is seen from another frame than the Earth's."""
@@ -115,14 +104,15 @@ class Output:
 
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
         """Keep the axes of the camera that poses are of: as --camera-axes says, else as their form has them."""
-        stated = settings().camera_axes or ""
+        stated = self._inputs.peek("camera_axes") or ""
         self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style.in_camera = operation is not None and operation.looks_back
         if stated and self.style.axes and self.style.form in FORMATS and FORMATS[self.style.form].poses.axes:
-            settings().inputs = (*settings().inputs, ("", ("camera_axes",)))
+            self._inputs.forms_read = (*self._inputs.forms_read, ("", ("camera_axes",)))
 
     def take_axes_in(self, tree: Frames, source: str) -> None:
         """Keep the axes of a frame of a tree: where none is known to be a camera, --camera-axes is about this one."""
+        self._inputs.ask("camera_axes")
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
 
@@ -292,6 +282,8 @@ class Output:
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
         is_plain = self.style.form == "text"
+        if not has_no_text(self.style.form):
+            self._inputs.ask("precision")
         with self.opened() as write:
             for piece in pieces:
                 for_people = is_plain and isinstance(piece, str)
@@ -314,14 +306,6 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
-
-
-def _refuse_recorded(form: str) -> None:
-    """Stop where options are about recordings, and the form is none."""
-    chosen = settings()
-    about = (("messages", chosen.messages), ("topic-out", chosen.topic_out), ("frames", chosen.recorded_frames))
-    if told := [f"--{name}" for name, value in about if value]:
-        raise UsageError(f"{', '.join(told)} is about recordings, {form} is none; -f {'|'.join(writers('recording'))}")
 
 
 def in_colour(text: str, marks: Sequence[str]) -> str:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from click import UsageError
 
-from frametool.cli.group import settings
 from frametool.errors import FileProblem, printable, shown
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.grammar.result import Recorded
@@ -15,17 +14,19 @@ from frametool.grammar.result import Recorded
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from frametool.cli.group import Inputs
 
-def recorded(form: str, output: str | None) -> Recorded:
+
+def recorded(chosen: Inputs, form: str, output: str | None) -> Recorded:
     """Return what of results a recording of a form holds, as options say; raises UsageError."""
-    chosen, place = settings(), _place(form, output)
+    place = _place(form, output)
     told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
     frames = tuple(name.strip() for name in told.split(",")) if told else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
     if len({*frames}) < len(frames):
         raise UsageError(f"--frames {told}: no frame is its own parent; give two names")
-    chosen.inputs = (*chosen.inputs, *[("", ("frames",))] * bool(chosen.named_frames))
+    chosen.forms_read = (*chosen.forms_read, *[("", ("frames",))] * bool(chosen.named_frames))
     return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 

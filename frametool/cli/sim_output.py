@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli.group import option
 from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, together
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.signals import clean_up
@@ -34,6 +35,7 @@ from frametool.sim.turtle import VARIANTS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from frametool.cli.group import Inputs
     from frametool.cli.sink import Write
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
@@ -44,34 +46,34 @@ NUMBER = Number()
 SPAWN_TYPE = Parsed("x,y,theta", parse_spawn)
 SECONDS = Parsed("seconds", parse_seconds)
 DURATION = Parsed("seconds", lambda text: math.inf if text == "inf" else parse_seconds(text))
-LEADER = click.option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
+LEADER = option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
                       help="still, circle, square, figure8, random, a file of commands, or - for standard input")
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
     """Add to a command the options of followers; `duration` is how long it runs by default."""
     options = [
-        click.option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
+        option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
                      help="each follows the one before, the first follows turtle1"),
-        click.option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
+        option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
                      help="the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)"),
-        click.option("--rate", type=NUMBER, metavar="HZ", help="control steps a second"),
-        click.option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
-        click.option("--gain-angular", type=NUMBER, metavar="K", help="turn rate for each radian of bearing"),
-        click.option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]"),
-        click.option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]"),
-        click.option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
+        option("--rate", type=NUMBER, metavar="HZ", help="control steps a second"),
+        option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
+        option("--gain-angular", type=NUMBER, metavar="K", help="turn rate for each radian of bearing"),
+        option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]"),
+        option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]"),
+        option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
                      help="the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m"),
-        click.option("--delay", type=SECONDS, default=0.0, metavar="S",
+        option("--delay", type=SECONDS, default=0.0, metavar="S",
                      help="follow where the target was so long ago, looked up through world  [default: 0]"),
-        click.option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
+        option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
                      help="where turtle2 begins: metres, radians (or 90deg)"),
-        click.option("--duration", type=DURATION, default=duration, show_default=True, metavar="S",
+        option("--duration", type=DURATION, default=duration, show_default=True, metavar="S",
                      help="simulated seconds, or inf"),
-        click.option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
+        option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
                      help="whose turtlesim"),
-        click.option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
-        click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader"),
+        option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
+        option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader"),
     ]  # fmt: skip
     return together(*options)
 
@@ -79,21 +81,22 @@ def follow_options(duration: str) -> Callable[[Any], Any]:
 def output_options(function: Any) -> Any:
     """Add to a command the options that say what is shown of a run."""
     options = (
-        click.option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
+        option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
                      help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
-        click.option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
+        option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
                      help="metres that count as having come to the target"),
-        click.option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
-        click.option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
-        click.option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
-        click.option("-f", "--format", "format_name", type=click.Choice(FORMS),
+        option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
+        option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
+        option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
+        option("-f", "--format", "format_name", type=click.Choice(FORMS),
                      help="form of the records  [default: text on a terminal, yaml otherwise]"),
-        click.option("--precision", type=Digits(), metavar="N|full",
+        option("--precision", type=Digits(), metavar="N|full",
                      help="digits after the point  [default: the shortest text that reads back to the same bits]"),
-        click.option("-o", "--output", type=TEXT, metavar="FILE",
+        option("-o", "--output", type=TEXT, metavar="FILE",
                      help="write there instead of stdout, whole or not at all"),
-        click.option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
-        click.option("--force", is_flag=True, help="let --output and --plot replace existing files"),
+        option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
+        option("--force", requires=("output", "plot", "view"), is_flag=True,
+               help="let --output and --plot replace existing files"),
     )  # fmt: skip
     return together(*options)(function)
 
@@ -113,12 +116,14 @@ class SimOutput(NamedTuple):
     leaders: bool = False
 
     @classmethod
-    def of(cls, *, format_name: str | None, output: str | None, precision: int | None, **options: Any) -> SimOutput:
-        """Take a command's options, and check what can be checked before anything runs.
+    def of(cls, inputs: Inputs, *, leaders: bool = False) -> SimOutput:
+        """Take what the options say, and check what can be checked before anything runs.
 
         Raises click.UsageError, FileProblem.
         """
-        made = cls(style_of(format_name, output, precision), None if output == "-" else output, **options)
+        said = {name: getattr(inputs, name) for name in ("emit", "reach", "realtime", "live", "plot", "view", "force")}
+        path = None if inputs.output == "-" else inputs.output
+        made = cls(style_of(inputs), path, **said, leaders=leaders)
         if made.reach < 0.0:
             raise click.UsageError(f"--reach must be 0 or more, found {made.reach:g}")
         if made.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
@@ -214,10 +219,11 @@ def log_events() -> Watch:
     return watch
 
 
-def style_of(format_name: str | None, output: str | None, precision: int | None) -> Style:
+def style_of(inputs: Inputs) -> Style:
     """Choose the form: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    output, precision = inputs.output, inputs.precision
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
-    form = format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
+    form = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
     return Style(form, precision=None if precision == FULL else precision)
 
 

@@ -17,8 +17,10 @@ from frametool.errors import FileProblem, ValueInvalid, printable, shown
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+
     Write = Callable[[str | bytes | memoryview], None]
 
+_checks: list[Callable[[], None]] = []
 OPEN_FILES = "/proc/self/fd"  # where Linux has the files of a process by their numbers
 LONGEST_NAME = 255  # bytes, on nearly every file system
 
@@ -32,18 +34,45 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
     system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
     Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
-    of a pipe is gone.
+    of a pipe is gone; what a check finds wrong.
     """
     if path is None or path == "-":
-        yield writer_into(sys.stdout.buffer, "standard output")
+        yield _checked(writer_into(sys.stdout.buffer, "standard output"))
     elif (number := _own_stream(path)) is not None or is_special(path):
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
-            yield writer_into(special, path)
+            yield _checked(writer_into(special, path))
     else:
         with _replacing(path, force=force) as part:
-            yield writer_into(part, path)
+            yield _checked(writer_into(part, path))
+            check()
+
+
+def _checked(write: Write) -> Write:
+    """Return what writes only where nothing is wrong with the call."""
+
+    def write_checked(piece: str | bytes | memoryview) -> None:
+        check()
+        write(piece)
+
+    return write_checked
+
+
+@contextmanager
+def checked_by(each: Callable[[], None]) -> Iterator[None]:
+    """Let something be checked before anything is written."""
+    _checks.append(each)
+    try:
+        yield
+    finally:
+        _checks.pop()
+
+
+def check() -> None:
+    """Raise what a check finds wrong with the call."""
+    for each in _checks:
+        each()
 
 
 def refuse_existing(path: str | None, *, force: bool) -> None:

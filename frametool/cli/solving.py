@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import settings
+from frametool.cli.group import inputs
 from frametool.cli.stderr import say, say_error
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
@@ -30,7 +30,7 @@ UNSURE = 1.2  # times too small: given sigmas of which it is told
 
 def tell_taken(text: str) -> None:
     """Say how an input was taken, unless --quiet."""
-    if not settings().quiet:
+    if not inputs().quiet:
         say(text)
 
 
@@ -45,7 +45,7 @@ def solved_tree(
     measurements = _measurements(files, without, normalize=normalize)
     measured = dict.fromkeys(name for each in measurements for name in each[:2])
     fixed = _fixed_edges(fix, measured, normalize=normalize) if fix else []
-    with ProgressBar(SHARES, quiet=settings().quiet, counted="") as bar:
+    with ProgressBar(SHARES, quiet=inputs().quiet, counted="") as bar:
         found = solve_tree(
             measurements,
             root=root,

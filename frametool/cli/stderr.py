@@ -81,9 +81,9 @@ def say_warning(message: str, rule: str = "") -> None:
     With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
     """
     if rule == "slash":
-        from frametool.cli.group import settings
+        from frametool.cli.group import inputs
 
-        if settings().quiet:
+        if inputs().quiet:
             return
     _tell_folded(f"frametool: {_place()}warning: {message}")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import keep_setting, refuse_unused, settings
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     STREAMED,
@@ -19,7 +19,6 @@ from frametool.cli.options import (
     Notations,
     in_option,
     input_forms,
-    refuse_not_needed,
     say_if_verbose,
     together,
     verbose_option,
@@ -27,13 +26,14 @@ from frametool.cli.options import (
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD, has_line, has_record
 from frametool.errors import FileProblem, FormatError
-from frametool.formats.table import FORMATS, ORDERS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
+from frametool.formats.table import FORMATS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
     from typing import TypeVar
 
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.stream.request import Request
@@ -47,79 +47,56 @@ _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
 
 
-def _keep_order(context: click.Context, _option: click.Parameter, chosen: Any) -> Any:
-    """Keep --from for files of frames too, whose quaternions may stand in lists (a callback of click)."""
-    name = chosen[0].spec if chosen else ""
-    settings(context).row_order = name if name in ORDERS else ""
-    return chosen
-
-
-OPTIONS = {
-    "input_path": click.option(
-        "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
-    ),
-    "given": click.option(
-        "--from", "given", type=Notations(), metavar="REP", callback=_keep_order,
-        help="what unnamed numbers are",
-    ),
-    "columns": click.option(
-        "--columns", type=ColumnNames(), metavar="NAME,..", multiple=True,
-        help="our columns, by name or number; once for each pose",
-    ),
-    "keep": click.option("--keep", is_flag=True, help="add the result's columns, leave ours"),
-    "prefix": click.option(
-        "--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"
-    ),
-    "header": click.option(
-        "--no-header", "header", is_flag=True, callback=lambda _context, _option, chosen: not chosen,
-        help="a table without names; columns are numbered",
-    ),
-    "on_error": click.option(
-        "--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="bad rows"
-    ),
-    "max_errors": click.option(
-        "--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
-        help="report at most N bad rows, count all",
-    ),
-    "quiet": click.option(
-        "--quiet", is_flag=True, callback=keep_setting, help="no progress and no word on forms on stderr"
-    ),
-}  # fmt: skip
-
-
-SEVERAL = click.option(
+_ROWS = (
+    option("--from", "given", type=Notations(), metavar="REP", help="what unnamed numbers are"),
+    option("--columns", type=ColumnNames(), metavar="NAME,..", multiple=True,
+           help="our columns, by name or number; once for each pose"),
+    option("--keep", is_flag=True, help="add the result's columns, leave ours"),
+    option("--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"),
+    option("--no-header", "header", is_flag=True, callback=lambda _context, _option, chosen: not chosen,
+           help="a table without names; columns are numbered"),
+    option("--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="bad rows"),
+    option("--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
+           help="report at most N bad rows, count all"),
+    option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
+)  # fmt: skip
+_INPUT = option(
+    "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
+)
+SEVERAL = option(
     "-i", "--input", "input_path", type=FILE, multiple=True, metavar="FILE",
     help="stream this file, not stdin; several clouds become one",
 )  # fmt: skip
 
 
-def stream_options(function: Function, first: Any = OPTIONS["input_path"]) -> Function:
+def stream_options(function: Function, first: Any = _INPUT) -> Function:
     """Add to a command the options of streams; `Stream` takes them.  first: the option for the input."""
-    return together(first, in_option, *list(OPTIONS.values())[1:], verbose_option)(function)
+    return together(first, in_option, *_ROWS, verbose_option)(function)
 
 
 class Stream:
     """The stream of a command, as its options describe it."""
 
-    def __init__(self, options: dict[str, Any]) -> None:
-        """Take the stream's options out of a command's."""
-        self._tell = partial(say_error, in_json=options.get("format_name") == "json")
-        self.options = {name: options.pop(name) for name in OPTIONS if name in options}
-        self.given = one_notation(self.options.get("given"))
-        self.given_place = ""
-        if self.given is not None and self.given.representation.is_place:
-            self.given, self.given_place = None, self.given.representation.name
-        given = self.options.get("input_path")
+    def __init__(self, inputs: Inputs) -> None:
+        """Look at what the options say; each is asked for where it counts."""
+        self._tell = partial(say_error, in_json=inputs.peek("format_name") == "json")
+        self.inputs = inputs
+        given = inputs.peek("input_path")
         self.paths: Sequence[str] = given if isinstance(given, tuple) else (given,) if given else ()
         self.path: str | None = self.paths[0] if self.paths else None
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None
         self.within = ""  # the form of the records in a bag
+        self.given = one_notation(inputs.peek("given"))
+        self.given_place = ""
+        if self.given is not None and self.given.representation.is_place:
+            self.given, self.given_place = None, self.given.representation.name
 
     def opened(self) -> BufferedReader:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
         if self._opened is None:
+            self.inputs.ask("input_path")
             self._opened = self.messages() or _opened(self.path)
             if not self._opened.seekable():
                 from frametool.text.lines import arrived
@@ -152,9 +129,9 @@ class Stream:
         from frametool.grammar.edges import Tally
         from frametool.recordings.records import open_records
 
-        topics = settings().topics
-        self._opened = open_records(self.path, topics, Tally())
-        self.within, settings().topics = "json", ()
+        self._opened = open_records(self.path, self.inputs.topics, Tally())
+        self.within = "json"
+        self.inputs.leave(topics=())
         return self._opened
 
     def has_input(self) -> bool:
@@ -181,11 +158,10 @@ class Stream:
         self.path = path
         return True
 
-    @staticmethod
-    def told_form() -> str:
+    def told_form(self) -> str:
         """Return the form that --in names for the stream, "" if it names none."""
         others, form = input_forms(streams=True)
-        if others and not settings().reads_trees:
+        if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {form}: there is one stream"
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
         return form
@@ -199,6 +175,7 @@ class Stream:
         """Run the stream and return its exit status."""
         from frametool.formats.detect import refuse_robots, with_hint
 
+        self.inputs.ask("input_path", "on_error", "max_errors")
         with self.opened() as given:
             head = given.peek()
             if head.lstrip()[:1] == b"<":
@@ -220,7 +197,8 @@ class Stream:
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
         if form == "kitti" and self.given and not self.told_form():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
-        refuse_not_needed((form,), "stamps", "edges")
+        if request.poses:
+            self.inputs.ask("camera_axes", *FORMATS[form].required_options)
         if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
         if tables_only and form in RECORDS:
@@ -240,12 +218,12 @@ class Stream:
         way = self._way(form, request, output)
         keeps = ("camera_axes",) if way == self._as_text else FORMATS[form].required_options
         asked = tuple(ask for ask in FORMATS[form].required_options if ask in keeps)
-        settings().inputs = (*settings().inputs, (form, asked))
+        self.inputs.forms_read = (*self.inputs.forms_read, (form, asked))
         outcomes, about = way(stream, form, request, output)
         if request.gathered is not None:
             outcomes = request.gathered.placing(outcomes, self.policy(self.name, _counted(form)).place)
         status = self._write(outcomes, output, gathers=request.gathered is not None, counted=_counted(form))
-        if about is not None and (states := FORMATS[form].conventions) and not self.options["quiet"]:
+        if about is not None and (states := FORMATS[form].conventions) and not self.inputs.quiet:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
 
@@ -313,7 +291,7 @@ class Stream:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         request = request._replace(by_default=not output.notations)
         converted = FormatConverter(form, request, output.style.in_form(target), self.name, answers())
-        outcomes = converted.outcomes(stream, header=self.options["header"])
+        outcomes = converted.outcomes(stream, header=self.inputs.header)
         return outcomes, lambda: ", " * bool(converted.tally.about) + converted.tally.about
 
     def _as_text(self, stream: Any, form: str, request: Request, _output: Output) -> tuple[Generator[Outcome], None]:
@@ -326,12 +304,12 @@ class Stream:
             return run_records(stream, form, request, source=self.name), None
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, form, request, source=self.name, header=self.options["header"]), None
+        return run_table(stream, form, request, source=self.name, header=self.inputs.header), None
 
     def _says_columns(self) -> bool:
         """Tell whether an option says that the stream is a table."""
-        options = self.options
-        return bool(options["columns"] or options["keep"] or options["prefix"] or not options["header"])
+        looked = self.inputs.peek
+        return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
 
     def _pasted(self, stream: BufferedReader, request: Request) -> tuple[Source | None, BufferedReader]:
         """Look for what was pasted; the stream is then another, with the same in it."""
@@ -339,11 +317,11 @@ class Stream:
 
         return pasted_stream(stream, self.name, request._replace(given=request.given or self.given))
 
-    @staticmethod
-    def _run_pasted(source: Source, request: Request, output: Output) -> int:
+    def _run_pasted(self, source: Source, request: Request, output: Output) -> int:
         """Write the results of a text that was pasted."""
         from frametool.stream.record_values import read_poses, results
 
+        self.inputs.ask("given")
         if request.gathered is not None:
             request.gathered.add(read_poses(source, request), source.name)
             return 0
@@ -355,7 +333,7 @@ class Stream:
         """Write the results of records in another form than theirs."""
         from frametool.stream.record_results import stream_results
 
-        if self.options["on_error"] == NULL and output.told not in ("csv", *RECORDS):
+        if self.inputs.on_error == NULL and output.told not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
         bad = self.policy(self.name)
         request = request._replace(by_default=has_no_text(output.told or "") and not output.notations)
@@ -367,19 +345,22 @@ class Stream:
     def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
         return BadRows(
-            name, self.options["on_error"], most=self.options["max_errors"], tell=self._tell, counted=counted
+            name, self.inputs.on_error, most=self.inputs.max_errors, tell=self._tell, counted=counted
         )
 
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
-        options = self.options
-        prefix = options["prefix"] and not request.operation.only_adds
-        if (options["keep"] and output.told in RECORDS) or (form in RECORDS and (options["keep"] or prefix)):
-            raise click.UsageError("--keep and --prefix are for tables; a record holds one pose")
-        if form in RECORDS:
-            refuse_unused("is for tables; a record names its own numbers", "columns", "header")
-        if has_no_text(output.told or form) and request.gathered is None:
-            refuse_unused(f"is not used: {output.told or form} holds numbers, not their text", "precision")
+        told = self.inputs
+        if form not in RECORDS and output.told not in RECORDS and request.poses and request.gathered is None:
+            request = request._replace(keep=told.keep)
+        if (form not in RECORDS or request.operation.only_adds) and request.gathered is None:
+            request = request._replace(prefix=told.prefix)
+        if request.poses:
+            told.ask("given")
+        if request.poses and form not in RECORDS:
+            request = request._replace(columns=told.columns)
+        if not has_no_text(output.told or form):
+            told.ask("precision")
         return request._replace(
             given=request.given or self.given,
             notations=request.notations or output.notations,
@@ -387,10 +368,7 @@ class Stream:
             given_place=self.given_place,
             precision=output.style.precision,
             keep_sign=output.style.keep_sign,
-            columns=options["columns"],
-            keep=options["keep"],
-            prefix=options["prefix"],
-            on_error=options["on_error"],
+            on_error=told.on_error,
         )
 
     def _write(self, outcomes: Generator[Outcome], output: Output, *, gathers: bool, counted: str) -> int:
@@ -400,13 +378,14 @@ class Stream:
         from frametool.stream.run import run
         from frametool.view.progress import ProgressBar
 
+        bad = self.policy(self.name, counted)
         with (
             nullcontext(lambda _: None) if gathers else output.opened() as write,
-            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.options["quiet"]) as progress,
+            ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.inputs.quiet) as progress,
             self.opened(),  # closed before a file takes its place, which Windows asks for
             closing(outcomes),
         ):
-            return run(outcomes, write, self.policy(self.name, counted), progress.advance)
+            return run(outcomes, write, bad, progress.advance)
 
 
 def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.group import settings
-from frametool.cli.options import Text, input_forms, refuse_not_needed
+from frametool.cli.group import inputs
+from frametool.cli.options import Text, input_forms
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import noting_files, states_of
 from frametool.errors import FrametoolError, bare, listing, shown, warn
-from frametool.formats.table import FORMATS
+from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
 from frametool.grammar.names import EARTH_FRAMES
 
@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 
     Value = TypeVar("Value")
 
+# field of Answers -> the parameters that say it; what moves is asked whether --time-offset counts
+ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name != "time_offset"}
+ANSWERED |= {"frames": ("named_frames",), "order": ("order", "given")}
+OF_FILES = (*Answers._fields, "named_frames", "given", "input_forms", "topics", "quiet", "verbose")
 MOST = 32  # values
 MOST_BYTES = 1 << 28  # of the files and texts they were read from
 SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
@@ -144,13 +148,15 @@ def _loaded(
     from frametool.formats.load import load_sources  # not every command that may read trees does
 
     tree = load_sources(files, rules, places)
+    if tree.moves:
+        inputs().ask("time_offset")
     state(files, whole=places is None)
     return tree
 
 
 def tell_unused_sigmas(tree: Frames) -> None:
     """Say once that edges have covariances, where a command that could carry them was not asked to."""
-    if tree.covariances and not settings().quiet:
+    if tree.covariances and not inputs().quiet:
         say(f"sigmas of {bare(tree.name)} not used (--covariance)")
 
 
@@ -198,18 +204,15 @@ class CarriedSigmas:
         exact = len(self.edges - self.tree.covariances.keys())
         count = f"{exact} of {len(self.edges)}"
         none = f"{count} has no sigma and counts" if exact == 1 else f"{count} have no sigma and count"
-        if self.edges and not settings().quiet:
+        if self.edges and not inputs().quiet:
             say(f"edges count as independent{f'; {none} as exact' * bool(exact)}")
 
 
-OPEN_IN_TREES = ("frames", "direction", "dh", "stamps", "order")  # what forms of files of frames may leave open
-
-
 def refuse_idle(files: Sequence[FrameFile]) -> None:
-    """Refuse options about files that were read which none of them leaves open."""
-    refuse_not_needed([file.form for file in files], *OPEN_IN_TREES)
-    if settings().topics and not any(file.topics.counts or file.topics.seen for file in files):
-        raise click.UsageError(f"--topic is not used: no topic is named in {listing(file.name for file in files)}")
+    """Refuse --topic where the files that were read name none."""
+    if inputs().topics and not any(file.topics.counts or file.topics.seen for file in files):
+        named = listing(file.name for file in files)
+        raise click.UsageError(f"--topic has no effect here: no topic is named in {named}")
 
 
 def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]) -> Value:
@@ -221,11 +224,18 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     cache = None if context is None else context.find_object(TreeCache)
     if context is None or cache is None:
         return read()
-    chosen = settings(context)
-    chosen.reads_trees = True
+    given = inputs()
+    given.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    key = {name: value for name, value in vars(chosen).items() if name != "inputs"}
-    value, chosen.inputs = cache.read(named, f"{options} {key}", lambda: (read(), chosen.inputs))
+    before, idle = given.forms_read, given.idle()
+
+    def read_all() -> tuple[Value, Any, Any]:
+        return read(), given.forms_read[len(before) :], idle - given.idle()
+
+    key = [given.peek(name) for name in OF_FILES]
+    value, forms, asked = cache.read(named, f"{options} {key}", read_all)
+    given.forms_read = (*before, *forms)
+    given.ask(*asked)
     return value
 
 
@@ -237,9 +247,9 @@ def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
     if whole:
         refuse_idle(files)
     for file in files:
-        if settings().verbose:
+        if inputs().verbose:
             say(file.known)
-        if file.stated and not settings().quiet:
+        if file.stated and not inputs().quiet:
             say(file.stated)
 
 
@@ -258,9 +268,9 @@ def opened(
     refuse_two_readers(arguments)
     if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
-    chosen = settings()
+    chosen = inputs()
     chosen.reads_trees = True
-    forms, named = input_forms(streams=streams)[0], [*map(_frame_names, chosen.named_frames)]
+    forms, named = input_forms(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
     reads = ("tree", "drawing") if drawings else ("tree",)
     if other := [form for form in forms if {*reads}.isdisjoint(FORMATS[form].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
@@ -290,7 +300,7 @@ def opened(
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:
             say(f"note: --frames {','.join(names)} changes nothing: {file.name} names its own frames")
-    chosen.inputs = (*chosen.inputs, *((file.form, file.required_options) for file in found))
+    chosen.forms_read = (*chosen.forms_read, *((file.form, file.required_options) for file in found))
     return found
 
 
@@ -302,10 +312,22 @@ def refuse_two_readers(arguments: Sequence[str]) -> None:
 
 def answers() -> Answers:
     """Return what the options say about all files whose form leaves it open."""
-    chosen = settings()
-    named = {name: getattr(chosen, name) for name in Answers._fields if name not in ("joints", "frames")}
-    named["order"] = chosen.order or chosen.row_order
-    return Answers(joints=_joints(chosen.joints), **{name: value for name, value in named.items() if value})
+    chosen = inputs()
+    named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
+    given = chosen.peek("given")
+    named["order"] = named["order"] or next((each.spec for each in given or () if each.spec in ORDERS), "")
+    return SaidAnswers(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
+
+
+class SaidAnswers(Answers):
+    """What options say of files whose form leaves it open; each counts as asked for where a reader looks at it."""
+
+    def __getattribute__(self, name: str) -> Any:
+        """Ask for the options of a field."""
+        value = super().__getattribute__(name)
+        if value and name in ANSWERED:
+            inputs().ask(*ANSWERED[name])
+        return value
 
 
 def _joints(texts: Sequence[str]) -> dict[str, str]:

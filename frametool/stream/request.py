@@ -377,7 +377,7 @@ class Request(NamedTuple):
     @property
     def in_order(self) -> bool:
         """Tell whether a row's result depends on the rows before it."""
-        takes_first = self.earth is not None and self.earth.origin is not None and self.earth.origin.place is None
+        takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
         return self.unwrap or self.operation.looks_back or self.gathered is not None or takes_first
 
     @property

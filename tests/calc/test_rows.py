@@ -174,7 +174,7 @@ def test_a_row_without_a_power_says_why(row: str, told: str, run: Callable[..., 
     (["-e", "d=norm(row)", "-e", "d=1"], 2, "-e d= is given twice"),
     (["map<-base @ row", "--tree", DRIVE], 4, "unknown frame 'base'"),
     (["map<-base_link @ row", "--tree", DRIVE], 2, "no column looks like stamps; name it with --time-column"),
-    (["row", "--time-column", "k"], 2, "which no expression asks for"),
+    (["row", "--time-column", "k"], 2, "--time-column has no effect here"),
     (["inv(row)", "--as", "point"], 1, "inv() takes a pose, found a point"),
 ])  # fmt: skip
 def test_what_cannot_be_asked_of_rows_is_said_before_any_is_read(arguments: list[str], status: int, told: str, run: Callable[..., Any]) -> None:

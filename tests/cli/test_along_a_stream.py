@@ -266,7 +266,7 @@ def test_other_rows_than_those_wanted_may_be_bad(run: Run) -> None:
         (["--start", "2", "--stop", "1"], "", "--start is after --stop"),
         (["--start", "2"], "x,y,z,yaw\n1,2,3,4\n", "--start, --stop, --time-offset: no column looks like stamps"),
         (["--time-offset", "1", "{xyz: [1, 2, 3]}"], "", "--time-offset changes nothing: no stamps in it"),
-        (["--time-column", "t", "{xyz: [1, 2, 3]}"], "", "--time-column is for --time-offset, --start and --stop"),
+        (["--time-column", "t", "{xyz: [1, 2, 3]}"], "", "--time-column needs --time-offset or --start or --stop"),
     ],
 )
 def test_times_that_cannot_be_used_are_told(run: Run, arguments: list[str], stdin: str, said: str) -> None:

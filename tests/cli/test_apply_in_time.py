@@ -155,8 +155,8 @@ def test_the_cache_forgets_for_apply_too(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "complaint"),
     [
-        (["map", "base", "--at", "1"], 2, "leave --at out"),
-        (["map", "base", "1", "2", "3"], 2, "--time-column is for the rows of a stream"),
+        (["map", "base", "--at", "1"], 2, "exclude each other"),
+        (["map", "base", "1", "2", "3"], 2, "--time-column has no effect here"),
         (["map", "bse"], 4, "did you mean 'base'?"),
         (["map", "base", "--frame-column", "frme"], 2, "no column 'frme'"),
         (["map", "base", "-f", "tum"], 1, "tum holds poses"),

@@ -115,7 +115,7 @@ def test_there_and_back_is_the_same_pose(run: Run, there: str) -> None:
         (["--all-axes", "x,x,-y"],
          "--all-axes: 'x,x,-y' is no axes of one's own: x, y and z once each, with their signs, as x,-y,-z"),
         (["--all-axes", "unity_from_ros", "--axes", "flu_from_frd"],
-         "--axes is one side of what --all-axes changes; leave one of the two out"),
+         "--all-axes and --axes exclude each other"),
         (["--axes", "optical_from_blendr"],
          "'blender'? axes: flu, frd, optical, opengl, enu, ned, unity, unreal, ros, aircraft, opencv, blender, or "),
     ],

@@ -96,7 +96,7 @@ REFUSED = {
     ("drone-ref.tum", "line-est.tum", "--offset", "auto"): (1, "no clear clock offset (score 0.19); give one: --offset T"),
     (*DRONE, "--delta", "5"): (2, "'5' is no distance between poses; write a number with m, s, deg, frames"),
     (*DRONE, "--max-diff", "1ms"): (2, "--max-diff is of --match nearest; --max-gap is of interpolation"),
-    (*DRONE, "--tolerance", "5%"): (2, "--tolerance is of --all-pairs: how near to the delta two poses are"),
+    (*DRONE, "--tolerance", "5%"): (2, "--tolerance needs --all-pairs"),
     (*DRONE, "--fail", "ate>1", "--delta", "x"): (2, "'x' is no distance between poses"),
     (*DRONE, "--fail", "atee>1"): (2, "no number is called 'atee'; did you mean 'ate'?"),
     (*DRONE, "--fail", "kitti>1"): (2, "kitti>1: drone-est.tum has no such number; -f json shows those there are"),

@@ -165,7 +165,7 @@ def test_joints_without_a_column_are_told_by_options(run: Run) -> None:
         (("--no-header",), "1,2,3,4\n", 1, "the columns have no names"),
         ((), "", 1, "stdin: nothing in it"),
         ((), "[1, 2]\n", 1, "expected a mapping with a key for each joint"),
-        (("--columns", "1-3"), table(), 2, "columns of joints are found by their names"),
+        (("--columns", "1-3"), table(), 2, "--columns has no effect here"),
         (("--joints", "m.csv"), table(), 2, "--joints: elbow moves over time; stream that file with -i"),
         ((), table().replace("x\n", "x\n0,1\n", 1), 1, "stdin:3: expected 6 cells"),
         ((), table().replace("0.5", "north"), 1, "stdin:3:shoulder_lift: 'north' is not a number"),

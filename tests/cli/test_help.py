@@ -191,7 +191,7 @@ def test_examples_replace_nothing_without_being_told(run: Callable[..., Any], tm
         (("robto.yaml",), 2, "no example 'robto.yaml'; did you mean 'robot.svg' or 'robot.yaml'?"),
         (("xyzzy",), 2, "no example 'xyzzy'; `frametool examples` lists all"),
         (("-o", "-"), 2, "--output - prints one example; name it, or a folder for all"),
-        (("--force",), 2, "--force is not used without --output"),
+        (("--force",), 2, "--force needs --output"),
         (("-o", "file"), 5, "file: file exists"),
     ],
 )

@@ -147,12 +147,12 @@ def test_without_skipping_the_first_time_without_data_ends_it(ask: Run) -> None:
     [
         (["--at", "soon"], "'soon' is not a time"),
         (["--at", "0.1234567891"], "finer than a nanosecond"),
-        (["--source-at", "1"], "--source-at and --fixed belong together"),
-        (["--fixed", "map"], "--source-at and --fixed belong together"),
+        (["--source-at", "1"], "--source-at needs --fixed"),
+        (["--fixed", "map"], "--fixed needs --source-at"),
         (["--times", "0:1:0"], "STEP must be positive"),
         (["--times", "1:0:1"], "STEP must be positive and STOP not before START"),
         (["--times", "0:x:1"], "'x' is not a time"),
-        (["--times", "0:1:1", "--at", "1"], "--times says all the times"),
+        (["--times", "0:1:1", "--at", "1"], "--at and --times exclude each other"),
         (["--times", "0:1:1", "--on-error", "null"], "with --times it is stop or skip"),
         (["--cache", "-1"], "not less than 0"),
     ],
@@ -221,7 +221,7 @@ def test_rows_get_the_pose_at_their_own_times(run: Run) -> None:
     ]  # fmt: skip
     assert "rows.csv:4:t: no data for map -> base at 9.000000000" in outcome.err
     assert len(run(*command, "--stop", "1", files=files).out.splitlines()) == 2
-    assert "--at is one time for all rows" in run(*command, "--at", "1", files=files).err
+    assert "--time-column and --at exclude each other" in run(*command, "--at", "1", files=files).err
     assert "no column 'nix'" in run(*command[:6], "--time-column", "nix", files=files).err
 
 

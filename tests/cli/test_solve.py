@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import yaml
+from console import ROOT
 
 from frametool.formats.table import writers
 from frametool.geometry.rotation import Rotation
@@ -540,27 +541,32 @@ def test_bad_points_are_one_line_with_their_place(a: str, b: str, message: str, 
 # --- usage ---
 
 USAGE: tuple[tuple[str, str], ...] = (
-    ("m.yaml --scale", "--scale is not used without --hand-eye or --points"),
-    ("m.yaml --eye-to-hand --max-gap 5ms --names a,b", "--eye-to-hand, --max-gap, --names is not used without --hand-eye or --points"),
-    ("--hand-eye a b --root c --fix d --without e:1 --scale", "--root, --fix, --without, --scale is not used with --hand-eye"),
-    ("--hand-eye a --max-gap 5ms", "--max-gap is not used: SAMPLES are pairs, in YAML or JSON"),
-    ("--hand-eye a --in csv --dh modified", "--in, --dh is not used: SAMPLES are pairs"),
+    ("m.yaml --scale", "--scale needs --points"),
+    ("m.yaml --eye-to-hand --max-gap 5ms --names a,b", "--eye-to-hand needs --hand-eye"),
+    ("m.yaml --max-gap 5ms", "--max-gap needs --hand-eye"),
+    ("m.yaml --names a,b", "--names needs --hand-eye or --points"),
+    ("--hand-eye a b --root c", "--root and --hand-eye exclude each other"),
+    ("--hand-eye a b --fix c", "--fix and --hand-eye exclude each other"),
+    ("--points a b --without c:1", "--without and --points exclude each other"),
+    ("--hand-eye samples.json --max-gap 5ms --quiet", "--max-gap has no effect here"),
+    ("--hand-eye samples.json --in csv --dh modified --quiet", "--in, --dh have no effect here"),
     ("--hand-eye a b c", "--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found 3 files"),
     ("--points a", "--points takes two files, A B, found 1"),
-    ("--points a b --fix c --eye-to-hand --topic d", "--fix, --eye-to-hand, --topic is not used with --points"),
-    ("--points a b --hand-eye", "--hand-eye and --points are two things; give one"),
+    ("--points points_a.csv points_b.csv --topic d --quiet", "--topic has no effect here"),
+    ("--points a b --hand-eye", "--hand-eye and --points exclude each other"),
     ("--points a b --names c", "--names takes two names, A,B"),
     ("--hand-eye a b --names c,d", "--names takes four names, BASE,GRIPPER,CAMERA,TARGET"),
     ("--points a b --names c,c", "'c,c': names stand with commas between them, each once"),
     ("- -", "standard input can be read once; only one argument may be -"),
-    ("m.yaml --force", "--force is not used without --output"),
+    ("m.yaml --force", "--force needs --output"),
     ("m.yaml --report r.html", "'r.html': a report is written as .json or .csv"),
 )  # fmt: skip
 
 
 @pytest.mark.parametrize(("arguments", "message"), USAGE)
 def test_options_of_another_shape_are_usage_errors(arguments: str, message: str, run: Run) -> None:
-    done = run("solve", *arguments.split())
+    names = {"points_a.csv": "points_a.csv", "points_b.csv": "points_b.csv", "samples.json": "hand_eye_samples.json"}
+    done = run("solve", *arguments.split(), files={name: (ROOT / "examples" / file).read_bytes() for name, file in names.items()})
     assert (done.status, done.out) == (2, "")
     assert message in done.err
     assert done.err.count("\n") == 1

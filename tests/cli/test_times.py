@@ -149,6 +149,7 @@ def test_poses_written_in_batches_are_those_written_one_by_one(run: Run, form: s
 
 
 def test_the_machine_forms_of_echo_do_not_wait_for_the_end() -> None:
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.grammar.pose_algebra import result_at
 
@@ -162,7 +163,7 @@ def test_the_machine_forms_of_echo_do_not_wait_for_the_end() -> None:
 
     for form in ("json", "yaml", "csv", "ros2"):
         computed = 0
-        pieces = Output("poses", format_name=form)._batches(results())  # noqa: SLF001 - what `pieces` writes
+        pieces = Output(Inputs({"format_name": form}), "poses")._batches(results())  # noqa: SLF001 - what `pieces` writes
         for _ in range(20):
             next(pieces)
         assert computed <= 20 * 256

@@ -147,10 +147,10 @@ def test_a_form_has_a_place_for_covariances_or_says_so(form: str, run: Run) -> N
 
 
 REFUSED = {
-    "explain": (["--explain"], 2, "--explain derives poses; leave --covariance out"),
+    "explain": (["--explain"], 2, "--covariance and --explain exclude each other"),
     "across": (
         ["--fixed", "map", "--source-at", "0"], 2,
-        "--covariance is of one time; across two an edge counts twice, and not independently",
+        "--covariance and --fixed exclude each other",
     ),
     "far": (["--at", "9"], 4, "no data for map -> cart at 9.000000000"),
 }  # fmt: skip

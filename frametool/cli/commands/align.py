@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.comparing import comparisons, pairing_options, trajectory_options, write_trajectory
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, Command, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.stream.faults import ROWS_SKIPPED
 
-SHAPING = ("format_name", "precision", "output", "force", "notations", "keep_sign")
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
+
 
 
 @click.command(cls=Command, name="align")
 @click.argument("ref", type=TEXT)
 @click.argument("est", type=TEXT)
 @pairing_options
-@click.option("--names", type=TEXT, metavar="REF,EST", help="names of the two worlds  [default: as they are called]")
+@option("--names", type=TEXT, metavar="REF,EST", help="names of the two worlds  [default: as they are called]")
 @trajectory_options
 @reading_options()
 @rotation_options
 @result_options("poses")
-def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Print where EST's world is in REF's: the fit that `compare` makes, as an entry of a tree.
 
     \b
@@ -35,12 +38,10 @@ def command(ref: str, est: str, names: str | None, deg: bool, **options: Any) ->
     `frametool help trajectories` says what is fitted. The scale of sim3 is beside the pose: p' = scale R p + t; such
     an entry is no part of a tree.
     """
-    shaping = {name: options.pop(name) for name in SHAPING}
-    into = Output("poses", **shaping, deg=deg) if shaping["output"] else None
-    form = {"format_name": None if into else shaping["format_name"], "output": None, "force": False}
-    entry = Output("poses", **(shaping | form), deg=deg)
-    chosen = _names(names)
-    (found,), skipped = comparisons(ref, [est], options)
+    into = Output(inputs, "poses") if inputs.output else None
+    entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")
+    chosen = _names(inputs.names)
+    (found,), skipped = comparisons(inputs.ref, [inputs.est], inputs)
     from frametool.fit.numbers import whole_estimate, worlds
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result

@@ -10,6 +10,7 @@ import click
 
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -25,7 +26,7 @@ from frametool.cli.options import (
     scale_option,
 )
 from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
-from frametool.cli.streaming import SEVERAL, Stream, stream_options
+from frametool.cli.streaming import SEVERAL, stream_options
 from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown, warn
@@ -38,9 +39,9 @@ from frametool.text.numbers import NotFinite, parse_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.explain.derive import ByTree, DerivationStyle
     from frametool.explain.operations import WrittenPose
-    from frametool.formats.load import Rules
     from frametool.geometry.types import Components
     from frametool.stream.request import Request
 
@@ -49,8 +50,9 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 
 @click.command(cls=Command, name="apply")
 @click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
-@click.option("--transform", "pose", type=TEXT, metavar="POSE", help="move by this pose, not by a lookup")
-@click.option(
+@option("--transform", "pose", excludes=("at", "time_column"), type=TEXT, metavar="POSE",
+        help="move by this pose, not by a lookup")  # fmt: skip
+@option(
     "--as",
     "kinds",
     type=click.Choice(CHOICES),
@@ -58,32 +60,20 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
     metavar="KIND",
     help="point, vector, pose, twist, wrench; once a --columns",
 )
-@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
 @pose_result_options("points", "trajectory")
-@click.option("--covariance", is_flag=True, help="also that of the tree's edges, or of --transform")
+@option("--covariance", excludes=("explain",), is_flag=True, help="also that of the tree's edges, or of --transform")
 @scale_option
 @EXPLAIN
-@click.option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
-@click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of each row's own time")
-@click.option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
+@option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
+@option("--time-column", excludes=("at",), type=ColumnNames(), metavar="NAME",
+        help="column or key of each row's own time")  # fmt: skip
+@option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
 @rules_options
 @offset_option
 @reading_options(streams=True)
 @partial(stream_options, first=SEVERAL)
-def command(
-    arguments: tuple[str, ...],
-    pose: str | None,
-    more: Sequence[str],
-    kinds: tuple[str, ...],
-    frame_column: str | None,
-    time_column: str | None,
-    at: int | str | None,
-    moving: bool,
-    cache: int | None,
-    covariance: bool,
-    scale: bool,
-    **options: Any,
-) -> int:
+def command(inputs: Inputs) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 
     \b
@@ -95,50 +85,44 @@ def command(
     A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its
     frame. -i FILE or stdin holds many: rows, JSON lines, clouds, what `ros2 topic echo` prints.
     """
-    task = PoseTask(options, "points", "trajectory")
+    task = PoseTask(inputs, "points", "trajectory")
     stream, output = task.stream, task.output
     plan = task.plan() if task.derives else None
     several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
     clouds = clouds_of(stream, output) if stream.path and several is None else None
-    if pose is None:
-        chosen = rules(moving=moving, cache=cache, normalize=task.normalize)
-        if scale:
-            raise click.UsageError("--scale is about the matrix of --transform; frames of a tree have none")
-        numbers = bool(stream.given_place)
-        way, rest = _way_by_tree(arguments, more, chosen, at, uncertain=covariance, numbers=numbers)
-    elif time_column is not None or at is not None:
-        raise click.UsageError("--transform is the same at all times; leave --time-column and --at out")
+    if inputs.pose is None:
+        way, rest = _way_by_tree(inputs, numbers=bool(stream.given_place))
     else:
-        way, rest = _way_by_pose(pose, task, uncertain=covariance, multiples=scale), arguments
-    if time_column is not None:
-        _check_timed(rest, at)
+        way, rest = _way_by_pose(inputs, task), inputs.arguments
+    is_stream = rest in ((), ("-",))
     if clouds is not None:
-        if covariance:
+        if way.uncertain:
             raise click.UsageError("--covariance: clouds have no place for one")
-        if rest not in ((), ("-",)) or time_column or frame_column or kinds or plan is not None:
+        if not is_stream or plan is not None:
             raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
         return clouds.run(way.from_frame, way.target)
     if several is not None:
-        several.refuse_beside(is_more=covariance or plan is not None or rest not in ((), ("-",)))
+        several.refuse_beside(is_more=way.uncertain or plan is not None or not is_stream)
         return several.run(way.from_frame, way.target, has_source=way.has_source)
-    kind = _kind(kinds, stream)
+    kind = _kind(inputs)
     if plan is not None:
-        if covariance or scale:
-            raise click.UsageError("--explain derives without --covariance and --scale; leave them out")
         records = list(_sources(rest, kind))
-        if rest in ((), ("-",)) or len(records) != 1 or frame_column is not None:
+        if is_stream or len(records) != 1:
             raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
-        return _derived(task, plan, way, records[0], kind or "", timeless=at is not None)
-    request = way.request(frame_column, time_column)
+        return _derived(task, plan, way, records[0], kind or "", timeless=inputs.at is not None)
+    request = way.request(*((inputs.frame_column, inputs.time_column) if is_stream else (None, None)))
     request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
     request = task.at_places(request)
-    if (count := len(stream.options["columns"])) > 1:
-        request = request._replace(poses=count, kinds=(kinds if len(kinds) == count else (kind or "",) * count))
     status = 0
-    if rest in ((), ("-",)):
+    if is_stream:
+        if (count := len(inputs.peek("columns"))) > 1:
+            kinds = inputs.kinds if len(inputs.kinds) == count else (kind or "",) * count
+            request = request._replace(poses=count, kinds=kinds)
         status = stream.run(request, output)
     else:
-        task.only_arguments(rest, "frame_column", "time_column")
+        task.only_arguments(rest)
+        if stream.given_place:
+            inputs.ask("given")
         output.values(values_of(list(_sources(rest, kind, stream.given_place)), request, output))
     way.tell()
     return status
@@ -161,20 +145,12 @@ def _derived(
     return task.write(made)
 
 
-def _kind(kinds: tuple[str, ...], stream: Stream) -> str | None:
+def _kind(inputs: Inputs) -> str | None:
     """Return what all records are; None where --as does not say, or says it for each --columns."""
-    count = len(stream.options["columns"])
+    kinds, count = inputs.kinds, len(inputs.peek("columns"))
     if len(kinds) > 1 and len(kinds) != count:
         raise click.UsageError(f"--as is given {len(kinds)} times, --columns {count} times; each --columns has its own")
     return kinds[0] if len(kinds) == 1 else None
-
-
-def _check_timed(records: tuple[str, ...], at: int | str | None) -> None:
-    """Refuse what does not belong together with each row's own time."""
-    if at is not None:
-        raise click.UsageError("--time-column gives each row its own time; leave --at out")
-    if records not in ((), ("-",)):
-        raise click.UsageError("--time-column is for the rows of a stream; give records on the command line --at TIME")
 
 
 class Way(NamedTuple):
@@ -229,20 +205,18 @@ class Way(NamedTuple):
         )
 
 
-def _way_by_tree(
-    arguments: tuple[str, ...], more: Sequence[str], chosen_rules: Rules, chosen: int | str | None, *, uncertain: bool,
-    numbers: bool = False,
-) -> tuple[Way, tuple[str, ...]]:
+def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records.
 
-    chosen: the time of all lookups, where one was chosen; numbers: what looks like one is no frame's name
+    numbers: what looks like one is no frame's name
     """
+    arguments, chosen, uncertain = inputs.arguments, inputs.at, inputs.covariance
     if len(arguments) < 2:
         raise click.UsageError("name TREE and TARGET, or give --transform")
     is_named = len(arguments) > 2 and not _is_record(arguments[2]) and not (numbers and _begins_number(arguments[2]))
     named = arguments[2:3] if is_named else ()
     rest = arguments[2 + len(named) :]
-    tree = load_tree(arguments[0], more, chosen_rules, streams=rest in ((), ("-",)))
+    tree = load_tree(arguments[0], inputs.more, rules(inputs), streams=rest in ((), ("-",)))
     sigmas = CarriedSigmas(tree) if uncertain else None
     if sigmas is None:
         tell_unused_sigmas(tree)
@@ -288,12 +262,13 @@ def _way_by_tree(
     return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell), rest
 
 
-def _way_by_pose(argument: str, task: PoseTask, *, uncertain: bool, multiples: bool) -> Way:
+def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
     """Move everything by one pose; where it names its frames, records must be given in its name."""
     from frametool.stream.request import COMBINED
 
-    asked = task.request(operation=COMBINED._replace(similar=True, multiples=multiples))
-    source = pose_source(argument, asked)
+    uncertain = inputs.covariance
+    asked = task.request(operation=COMBINED._replace(similar=True, multiples=inputs.scale))
+    source = pose_source(inputs.pose, asked)
     pose = one_pose(source, asked)
 
     if uncertain and pose.covariance is None:

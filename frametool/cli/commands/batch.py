@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
+from frametool.cli.group import option
 from frametool.cli.options import FILE, Command
 from frametool.cli.stderr import say
 from frametool.documents.source import opened
@@ -11,12 +14,15 @@ from frametool.stream.faults import SKIP, STOP
 
 EXIT_CODES = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
 
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
+
 
 @click.command(cls=Command, name="batch", epilog=EXIT_CODES)
 @click.argument("file", default="-", type=FILE, metavar="[FILE]")
-@click.option("--on-error", "on_failure", type=click.Choice((STOP, SKIP)), default=STOP, show_default=True,
+@option("--on-error", "on_failure", type=click.Choice((STOP, SKIP)), default=STOP, show_default=True,
               help="end at a line that fails, or report it and go on")
-def command(file: str, on_failure: str) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Run the commands of FILE, or of standard input, in one process: one a line, as typed behind frametool.
 
     \b
@@ -42,7 +48,8 @@ def command(file: str, on_failure: str) -> int:  # fmt: skip
     """
     from frametool.cli.batch import CommandBatch
 
-    stream, skips = opened(file), on_failure == SKIP
+    file, skips = inputs.file, inputs.on_failure == SKIP
+    stream = opened(file)
     if file != "-":
         with stream:
             return CommandBatch(file, skips=skips).run(stream)

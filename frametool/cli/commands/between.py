@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,6 +16,7 @@ from frametool.grammar.pose_algebra import turn_between
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.grammar.readers import Vector
 
 OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is left
@@ -25,7 +26,7 @@ OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is lef
 @click.argument("vectors", nargs=-1, required=True, type=TEXT, metavar="V1 V2")
 @rotation_options
 @result_options("poses")
-def command(vectors: tuple[str, ...], deg: bool, **options: Any) -> None:
+def command(inputs: Inputs) -> None:
     """Print the shortest rotation that turns the direction V1 into the direction V2, and its angle.
 
     \b
@@ -36,8 +37,8 @@ def command(vectors: tuple[str, ...], deg: bool, **options: Any) -> None:
     A vector is three numbers or a mapping, of any length but 0. Between opposite directions every axis at right
     angles to them does; one is taken, and stderr says so.
     """
-    output = Output("poses", deg=deg, **options)
-    start, end = _directions(vectors)
+    output = Output(inputs, "poses")
+    start, end = _directions(inputs.vectors)
     result = turn_between(start, end)
     if result.extras["angle_deg"] > 180.0 - OPPOSITE:
         say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")

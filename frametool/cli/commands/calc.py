@@ -12,7 +12,7 @@ from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import mentions_row, walk
 from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
-from frametool.cli.group import settings
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     ColumnNames,
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from frametool.calc.parser import Line
     from frametool.calc.rows import RowExpressions
     from frametool.calc.values import Term
+    from frametool.cli.group import Inputs
     from frametool.stream.request import Request
 
 KINDS = ("point", "vector", "pose")
@@ -55,22 +56,19 @@ def _begins_with_minus(argument: str) -> bool:
 
 @click.command(cls=CalcCommand, name="calc")
 @click.argument("arguments", nargs=-1, type=Expression(), metavar="[NAME=FILE ..] [EXPR ..]")
-@click.option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
+@option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
               help="the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]")
-@click.option("-e", "expressions", multiple=True, type=Expression(), metavar="NAME=EXPR",
+@option("-e", "expressions", multiple=True, type=Expression(), metavar="NAME=EXPR",
               help="a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE")
-@click.option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
-@click.option("--time-column", "time_column", type=ColumnNames(), metavar="NAME",
+@option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
+@option("--time-column", "time_column", type=ColumnNames(), metavar="NAME",
               help="of the time of @ row  [default: the one that looks so]")
 @rotation_options
 @pose_options
 @result_options("points")
 @reading_options(streams=True)
 @stream_options
-def command(
-    arguments: tuple[str, ...], trees: tuple[str, ...], expressions: tuple[str, ...], kind: str | None,
-    time_column: str | None, deg: bool, normalize: bool, **options: Any,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Calculate with poses whose frames are checked like units.
 
     \b
@@ -84,23 +82,22 @@ def command(
     NAME=EXPR to a value. An expression with row is computed for each row of -i FILE or standard input and replaces
     what the row was. Without an expression a terminal gets a prompt; from a pipe one expression a line is read.
     """
-    stream = Stream(options)
-    output = Output("points", deg=deg, **options)
-    scope = Scope(degrees=deg, normalize=normalize)
-    said = settings()
-    if said.origin or said.local_axes or said.zone:
+    stream, output = Stream(inputs), Output(inputs, "points")
+    scope = Scope(degrees=inputs.deg, normalize=inputs.normalize)
+    if any(map(inputs.peek, ("origin", "local_axes", "zone"))):
         from frametool.cli.earth import earth
 
         scope.earth = earth()
-    given = list(_given(arguments, expressions, scope))
+    given = list(_given(inputs.arguments, inputs.expressions, scope))
     lines = [read_line(text) for text, _ in given]
-    scope.tree = _tree(trees, lines)
+    scope.tree = _tree(inputs.trees, lines)
     if not lines:
+        inputs.ask("origin", "local_axes", "zone")  # whatever comes
         return _without_expression(stream, output, scope)
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
         formula = _over_rows(lines, [is_option for _, is_option in given], scope, output)
-        formula.check((kind,) if kind else ("pose", "point", "vector"))
-        request = _request(formula, kind or "", time_column, degrees=deg, normalize=normalize)
+        formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
+        request = _request(formula, inputs)
         return stream.run(request, output)
     output.pieces(value_texts(_results(lines, scope), output.style))
     return 0
@@ -155,16 +152,14 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
     return RowExpressions(results, bindings, scope, output.style)
 
 
-def _request(formula: RowExpressions, kind: str, time_column: str | None, *, degrees: bool, normalize: bool) -> Request:
+def _request(formula: RowExpressions, inputs: Inputs) -> Request:
     """Say what is asked of the rows."""
     from frametool.stream.request import Operation, Request
     from frametool.stream.stamp_source import Timed
 
-    if time_column is not None and not formula.needs_time:
-        raise click.UsageError("--time-column is the time of @ row, which no expression asks for")
-    timed = Timed.of_rows(time_column or "") if formula.needs_time else None
+    timed = Timed.of_rows(inputs.time_column or "") if formula.needs_time else None
     counters = not any(frame.isdecimal() for _, tree in formula.scope.trees for frame in tree.frames)
     return Request(
-        Operation(moves=True, formula=formula), kind=kind, degrees=degrees, normalize=normalize, timed=timed,
-        frame_is_counter=counters, earth=formula.scope.earth,
+        Operation(moves=True, formula=formula), kind=inputs.kind or "", degrees=inputs.deg,
+        normalize=inputs.normalize, timed=timed, frame_is_counter=counters, earth=formula.scope.earth,
     )  # fmt: skip

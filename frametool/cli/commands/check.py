@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.group import EVERYTHING
+from frametool.cli.group import EVERYTHING, option
 from frametool.cli.options import FILE, Command, Parsed, file_options
 from frametool.cli.output import in_colour
 from frametool.cli.sink import writing
@@ -23,6 +23,7 @@ from frametool.lint.tree_diff import Tolerance, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.formats.load import FrameFile
     from frametool.stream.measurements import Measurement
 
@@ -46,20 +47,17 @@ class CheckCommand(Command):
 
 @click.command(cls=CheckCommand, name="check")
 @click.argument("files", nargs=-1, required=True, type=FILE)
-@click.option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
+@option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
               help="how findings are written")  # fmt: skip
-@click.option("--strict", is_flag=True, help="let warnings fail too")
-@click.option("--measured", multiple=True, type=FILE, metavar="FILE",
+@option("--strict", is_flag=True, help="let warnings fail too")
+@option("--measured", excludes=("each",), multiple=True, type=FILE, metavar="FILE",
               help="compare these measurements (help solve) too")  # fmt: skip
-@click.option("--tolerance", metavar="LENGTH,ANGLE",
+@option("--tolerance", requires=("measured",), metavar="LENGTH,ANGLE",
               type=Parsed("tolerance", partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0)))),
               help="what they may be off  [3 sigmas, or 10mm,1deg]")  # fmt: skip
-@click.option("--each", is_flag=True, help="check each file on its own; one without frames is a warning")
+@option("--each", is_flag=True, help="check each file on its own; one without frames is a warning")
 @file_options
-def command(
-    files: Sequence[str], form: str, strict: bool, measured: Sequence[str], tolerance: Tolerance | None, each: bool,
-    normalize: bool,
-) -> int:
+def command(inputs: Inputs) -> int:
     """Look for mistakes in FILES, trees and recordings, taken as one tree.
 
     \b
@@ -72,18 +70,16 @@ def command(
     Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
     --strict also if there is a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
     """
-    if tolerance is not None and not measured:
-        raise click.UsageError("--tolerance is about --measured; name the measurements")
-    if each and measured:
-        raise click.UsageError("--measured is about one tree, not about --each file")
+    files, measured, normalize = inputs.files, inputs.measured, inputs.normalize
+    form, strict = inputs.form, inputs.strict
     refuse_two_readers((*files, *measured))
-    if each:
+    if inputs.each:
         findings = _one_by_one(files, normalize=normalize)
     else:
         count = len(files) + len(measured)
         rows = _read(opened(measured, behind=len(files), of=count), normalize=normalize) if measured else []
         recordings = opened(files, of=count)
-        findings = _with_loops(recordings, rows, tolerance, normalize=normalize)
+        findings = _with_loops(recordings, rows, inputs.tolerance, normalize=normalize)
         state(recordings)
     text = WRITERS[form](findings)
     with writing(None) as write:

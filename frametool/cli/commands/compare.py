@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
+from frametool.cli.group import option
 from frametool.cli.options import OPTIONAL, TEXT, Command, Parsed, list_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
@@ -18,6 +19,7 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.fit.comparison import Comparison
     from frametool.fit.limits import Limit
 
@@ -49,20 +51,17 @@ def _read_limits(text: str) -> list[Limit]:
 @click.argument("est", nargs=-1, required=True, type=TEXT, metavar="EST..")
 @pairing_options
 @error_options
-@click.option("--rows", type=click.Choice(OPTIONAL["--rows"]), metavar="[=ate|rpe|kitti]",
+@option("--rows", type=click.Choice(OPTIONAL["--rows"]), metavar="[=ate|rpe|kitti]",
               help="one a pair, step or stretch of path: CSV, JSON")  # fmt: skip
-@click.option("--explain", type=click.Choice(("text",)), metavar="", help="the formulas with this run's numbers")
-@click.option("--fail", "limits", type=Parsed("limits", _read_limits), metavar="LIMIT,..",
+@option("--explain", type=click.Choice(("text",)), metavar="", help="the formulas with this run's numbers")
+@option("--fail", "limits", type=Parsed("limits", _read_limits), metavar="LIMIT,..",
               help="end with 1 where a number passes one: ate>5cm")  # fmt: skip
-@click.option("--report", type=Parsed("report", _read_report), metavar="FILE.html|svg",
+@option("--report", type=Parsed("report", _read_report), metavar="FILE.html|svg",
               help="also a picture of it, in one file; -o: instead")  # fmt: skip
 @trajectory_options
 @reading_options()
 @list_options("markdown", "latex")
-def command(
-    ref: str, est: Sequence[str], rows: str | None, explain: str | None, limits: list[Limit] | None, report: str | None,
-    **options: Any,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Compare trajectories with a reference: errors in place and along the way.
 
     \b
@@ -73,20 +72,20 @@ def command(
 
     REF and EST are trajectories or positions in any form (help trajectories).
     """
-    shaping = {name: options.pop(name) for name in ("format_name", "output", "force")}
-    path, told = shaping["output"], shaping["format_name"]
+    path, told, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
+    limits, est = inputs.limits, inputs.est
     instead = path if path and told is None and _form_of(path) else None
     for name in filter(None, (report, instead)):
-        refuse_existing(name, force=shaping["force"])
+        refuse_existing(name, force=inputs.force)
     if instead and rows:
         raise click.UsageError("--rows are CSV or JSON, no picture; write them with -f, or leave them out")
     if len(est) > 1 and "svg" in (_form_of(report or ""), _form_of(instead or "")):
         raise click.UsageError("an SVG shows one comparison; write .html for several")
-    if explain and (rows or instead or shaping["format_name"] not in (None, "text")):
+    if explain and (rows or instead or told not in (None, "text")):
         raise click.UsageError("--explain writes text; leave --rows, -f and pictures out")
-    output = Output("report", **shaping, otherwise="text")
+    output = Output(inputs, "report", otherwise="text")
     try:
-        found, skipped = comparisons(ref, est, options)
+        found, skipped = comparisons(inputs.ref, est, inputs)
         from frametool.fit.numbers import numbers
         from frametool.view.comparison_text import write_explanation
 
@@ -94,7 +93,7 @@ def command(
         asked = [(each, limit) for each in every for limit in limits or ()]
         passed = [(each, limit, now) for each, limit in asked if (now := limit.passed(each)) is not None]
         for name in filter(None, (report, instead)):
-            _write_report(found, name, force=shaping["force"])
+            _write_report(found, name, force=inputs.force)
         if explain:
             output.text("\n".join(map(write_explanation, every)))
         elif not instead:

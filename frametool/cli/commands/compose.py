@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +13,9 @@ from frametool.cli.poses import rows_among, without_inverse
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
+
 
 @click.command(cls=Command, name="compose")
 @click.argument("poses", nargs=-1, required=True, type=TEXT, metavar="POSE POSE ..")
@@ -21,7 +24,7 @@ from frametool.grammar.pose_algebra import product
 @EXPLAIN
 @offset_option
 @pose_stream_options
-def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 
     \b
@@ -33,7 +36,7 @@ def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
     POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
     inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
-    task = PoseTask(options)
+    task, poses = PoseTask(inputs), inputs.poses
     if task.derives:
         plan = task.plan()
         from frametool.explain import derive
@@ -43,7 +46,7 @@ def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
         raise click.UsageError("-i FILE is read where - stands among the poses")
     from frametool.stream.request import Operation
 
-    request = task.request(operation=Operation(similar=True, multiples=scale))
+    request = task.request(operation=Operation(similar=True, multiples=inputs.scale))
     rows = rows_among(poses, request, task.has_table)
     before = reduce(product, rows.before) if rows.before else None
 
@@ -52,5 +55,5 @@ def command(poses: tuple[str, ...], scale: bool, **options: Any) -> int:
         return result.parent, result.name
 
     behind = tuple(each.placed for each in rows.behind)
-    operation = Operation(before and before.placed, behind, similar=True, multiples=scale)
+    operation = Operation(before and before.placed, behind, similar=True, multiples=inputs.scale)
     return task.answer(rows.argument, request._replace(operation=operation, rename=rename), rows.timed)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
-from frametool.cli.group import refuse_unused
+from frametool.cli.group import option
 from frametool.cli.options import (
     TEXT,
     AxesName,
@@ -40,6 +40,7 @@ from frametool.text.numbers import parse_angle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
@@ -59,43 +60,36 @@ class ConvertCommand(Command):
 
 @click.command(cls=ConvertCommand, name="convert", short_help="one rotation or pose in other representations")
 @click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
-@click.option(
+@option(
     "--axes",
     type=AxesName(),
     metavar="NAME",
     help="the pose at the same place in these axes (help axes)",
 )
-@click.option(
+@option(
     "--world-axes", "world", type=AxesName(), metavar="A_from_B", help="axes of the frame it is seen from (help axes)"
 )
-@click.option("--all-axes", type=AxesName(), metavar="A_from_B", help="axes of both: unity_from_ros, or x,-y,-z")
-@click.option(
+@option("--all-axes", excludes=("axes", "world"), type=AxesName(), metavar="A_from_B",
+        help="axes of both: unity_from_ros, or x,-y,-z")  # fmt: skip
+@option(
     "--find",
     type=TEXT,
     metavar="A,B,C",
     help="Euler conventions with these angles (help euler)",
 )
-@click.option(
-    "--tolerance", type=Number(), default=1e-6, metavar="RAD", help="how near --find wants it  [default: 1e-06]"
+@option(
+    "--tolerance", requires=("find",), type=Number(), default=1e-6, metavar="RAD",
+    help="how near --find wants it  [default: 1e-06]",
 )
 @pose_result_options("poses", "points")
 @frames_out_option
 @EXPLAIN
-@click.option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
-@click.option("--time-column", type=ColumnNames(), metavar="NAME", help="column or key of stamps, for the next three")
+@option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
+@option("--time-column", requires=("time_offset", "start", "stop"), type=ColumnNames(), metavar="NAME",
+        help="column or key of stamps, for the next three")  # fmt: skip
 @limit_options
 @pose_stream_options
-def command(
-    values: tuple[str, ...],
-    axes: str | None,
-    world: str | None,
-    all_axes: str | None,
-    find: str | None,
-    tolerance: float,
-    unwrap: bool,
-    time_column: str | None,
-    **options: Any,
-) -> int:
+def command(inputs: Inputs) -> int:
     """Write one rotation or pose in other representations.
 
     \b
@@ -107,13 +101,11 @@ def command(
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
-    values = rejoined(values)
-    window = window_of(options.pop("start"), options.pop("stop"), time_column)
-    task = PoseTask(options, "poses", "points")
+    values, window, task = rejoined(inputs.values), window_of(inputs), PoseTask(inputs, "poses", "points")
     stream, output = task.stream, task.output
-    if all_axes is not None:
-        refuse_unused("is one side of what --all-axes changes; leave one of the two out", "axes", "world")
-        world, axes = _both_sides_of(all_axes)
+    axes, world = inputs.axes, inputs.world
+    if inputs.all_axes is not None:
+        world, axes = _both_sides_of(inputs.all_axes)
     if task.derives:
         task.plan()
         one_argument(values[0] if values else axes or world)
@@ -121,7 +113,7 @@ def command(
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
     forms = output.notations or (notation("quaternion"),)
-    request = task.request(operation=operation, notations=forms, unwrap=unwrap, window=window, extra_column=time_column)
+    request = task.request(operation=operation, notations=forms, window=window, extra_column=inputs.time_column)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
         _say_centimetres(world, output, is_anew=bool(values) and values != ("-",))
@@ -137,9 +129,11 @@ def command(
         values, request = ("-",), request.of_inverses() if is_inverse else request
     is_alone = operation.turns and not values and (task.derives or not stream.has_input())
     if values == ("-",) or not (values or is_alone):
-        refuse_unused("is about one rotation that is an argument", "find")
+        request = request._replace(unwrap=inputs.unwrap)
         return stream.run(request, output)
-    task.only_arguments(values, *["unwrap"] * (is_numbers or all(map(is_inline, values))))
+    task.only_arguments(values)
+    if not (is_numbers or all(map(is_inline, values))):
+        request = request._replace(unwrap=inputs.unwrap)
     results: list[Any]
     sources: Sequence[str | Source] = ()
     if is_numbers or not values:
@@ -149,8 +143,8 @@ def command(
         sources = [pose_source(each, request) for each in values] if task.derives else values
         results = list(values_of(sources, request, output))
     poses = [each.pose for each in results if isinstance(each, Result)]
-    if find is not None:
-        output.style = _found(poses, find, tolerance, output.style)
+    if inputs.find is not None:
+        output.style = _found(poses, inputs.find, inputs.tolerance, output.style)
     if task.derives:
         if len(poses) != 1:
             raise click.UsageError(f"--explain derives one pose, found {len(results)}")

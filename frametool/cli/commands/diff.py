@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.group import settings
+from frametool.cli.group import option
 from frametool.cli.options import FILE, TIME, Command, Parsed, at_ns, file_options, list_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
@@ -18,6 +18,7 @@ from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.formats.load import EdgePlace
     from frametool.lint.tree_diff import TreeComparison
 
@@ -28,21 +29,18 @@ EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with f
 @click.command(cls=Command, name="diff", epilog=EXIT_CODES)
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
-@click.option("--with-a", multiple=True, type=FILE, metavar="FILE", help="merge this file into A; may be repeated")
-@click.option("--with-b", multiple=True, type=FILE, metavar="FILE", help="merge this file into B; may be repeated")
-@click.option("--at", type=TIME, metavar="TIME",
+@option("--with-a", multiple=True, type=FILE, metavar="FILE", help="merge this file into A; may be repeated")
+@option("--with-b", multiple=True, type=FILE, metavar="FILE", help="merge this file into B; may be repeated")
+@option("--at", type=TIME, metavar="TIME",
               help="compare at this time: seconds, nanoseconds with ns  [default: the latest of each]")  # fmt: skip
-@click.option("--seen-from", type=FRAME, metavar="FRAME",
+@option("--seen-from", type=FRAME, metavar="FRAME",
               help="tell how far frames moved as seen from here too  [default: the root of A]")  # fmt: skip
-@click.option("--tolerance", type=Parsed("tolerance", parse_tolerance), default=Tolerance(), metavar="LENGTH,ANGLE",
+@option("--tolerance", type=Parsed("tolerance", parse_tolerance), default=Tolerance(), metavar="LENGTH,ANGLE",
               help="what still counts as the same, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]")  # fmt: skip
-@click.option("--all", "everything", is_flag=True, help="list the frames that did not move, too")
+@option("--all", "everything", is_flag=True, help="list the frames that did not move, too")
 @file_options
 @list_options("github")
-def command(
-    a: str, b: str, with_a: Sequence[str], with_b: Sequence[str], at: int | str | None, seen_from: str | None,
-    tolerance: Tolerance, everything: bool, normalize: bool, **options: Any,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Compare two trees, calibrations or recordings, A and B, in any forms.
 
     \b
@@ -58,13 +56,14 @@ def command(
     A and B are files, - for standard input, or . for the file that FRAMETOOL_TREE names. --in and --frames are taken
     in the order of the files: A, those of --with-a, B, those of --with-b; given for A only they count for both.
     """
-    output = Output("report", **options, otherwise="text")
-    (one, of_one), (other, of_other) = load_sides((a, *with_a), (b, *with_b), normalize=normalize)
-    start = seen_from and frame_name(seen_from, one)
-    comparison = diff(one, other, at_ns=at_ns(at), seen_from=start, tolerance=tolerance)
-    for note in () if settings().quiet else comparison.notes:
+    output = Output(inputs, "report", otherwise="text")
+    sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)
+    (one, of_one), (other, of_other) = load_sides(*sides, normalize=inputs.normalize)
+    start = inputs.seen_from and frame_name(inputs.seen_from, one)
+    comparison = diff(one, other, at_ns=at_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
+    for note in () if inputs.quiet else comparison.notes:
         say(note)
-    differences = [*comparison.differences, *(comparison.unmoved if everything else ())]
+    differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
     if output.style.form == "github":
         output.text(_annotations(comparison, (of_one, of_other)))
     elif output.style.form == "text":

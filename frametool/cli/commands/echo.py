@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.options import FILE, Command, Parsed, Skipped, Time, result_options, rules_of, tree_options
+from frametool.cli.group import option
+from frametool.cli.options import FILE, Command, Parsed, Skipped, Time, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, warn
@@ -18,8 +19,9 @@ from frametool.grammar.pose_algebra import result_at
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
+    from frametool.cli.group import Inputs
     from frametool.frames.lookups import Replayed
     from frametool.grammar.result import Result
 
@@ -31,18 +33,15 @@ RATE = Parsed("rate", lambda text: checked_rate(parse_number(text)))
 @click.argument("tree", type=FILE)
 @click.argument("target", type=FRAME)
 @click.argument("source", type=FRAME)
-@click.option("--rate", type=RATE, default=1.0, show_default=True, metavar="HZ",
+@option("--rate", type=RATE, default=1.0, show_default=True, metavar="HZ",
               help="blocks a second, in the time of the recording")  # fmt: skip
-@click.option("--start", type=STAMP, metavar="T", help="begin there  [default: when all edges have data]")
-@click.option("--stop", type=STAMP, metavar="T", help="end there  [default: when the first edge has no more]")
-@click.option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
-@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this file too; may be repeated")
+@option("--start", type=STAMP, metavar="T", help="begin there  [default: when all edges have data]")
+@option("--stop", type=STAMP, metavar="T", help="end there  [default: when the first edge has no more]")
+@option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
+@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this file too; may be repeated")
 @tree_options
 @result_options("poses")
-def command(
-    tree: str, target: str, source: str, more: Sequence[str], rate: float, start: int | None, stop: int | None,
-    limit: int | None, output: str | None, **options: Any,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET, time after time, as tf2_echo does on a running robot.
 
     \b
@@ -55,19 +54,19 @@ def command(
     they have 3 decimals unless --precision says otherwise. Stamps are seconds with nine decimals. TREE is also what
     `ros2 topic echo /tf` printed (help recordings).
     """
+    target, source, start, stop, limit = inputs.target, inputs.source, inputs.start, inputs.stop, inputs.limit
     if start is not None and stop is not None and start > stop:
         raise click.UsageError("--start is after --stop")
-    taken = rules_of(options)
-    out = Output("poses", output=output, otherwise=None if output else "text", **options)
+    out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
     out.check_target(target)
     if out.style.place is not None and out.style.form == "text":
         raise click.UsageError(f"--to {out.style.place.name}: tf2_echo's blocks have x, y, z; -f yaml, json or csv")
-    frames = load_tree(tree, more, taken)
+    frames = load_tree(inputs.tree, inputs.more, rules(inputs))
     target, source = frame_name(target, frames), frame_name(source, frames)
     out.take_axes_in(frames, source)
     if frames.covariances:
         warn(LEFT_OUT.format("echo"))
-    replayed = frames.replay(target, source, rate_hz=rate, start_ns=start, stop_ns=stop)
+    replayed = frames.replay(target, source, rate_hz=inputs.rate, start_ns=start, stop_ns=stop)
     skipped = Skipped(in_json=out.told == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))
     shown = islice(results, None if limit is None else min(limit, sys.maxsize))

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 from os.path import splitext
+from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.group import option
 from frametool.cli.options import FILE, Command, Text
 from frametool.cli.sink import refuse_existing, writing
 from frametool.errors import FileProblem, nearest, printable, shown
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
+
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
 
 
 def folder() -> str:
@@ -57,10 +62,10 @@ class Example(Text):
 
 @click.command(cls=Command, name="examples")
 @click.argument("name", type=Example(), required=False)
-@click.option("-o", "--output", type=FILE, metavar="FOLDER|FILE",
+@option("-o", "--output", type=FILE, metavar="FOLDER|FILE",
               help="copy all files into this folder, or NAME into this file")  # fmt: skip
-@click.option("--force", is_flag=True, help="let --output replace files")
-def command(name: str | None, output: str | None, force: bool) -> None:
+@option("--force", requires=("output",), is_flag=True, help="let --output replace files")
+def command(inputs: Inputs) -> None:
     """List the example files, print one, or copy them.
 
     \b
@@ -71,6 +76,7 @@ def command(name: str | None, output: str | None, force: bool) -> None:
     The examples of every `COMMAND --help` run inside the folder, those of the cookbook beside one called `examples`.
     `frametool help cookbook` searches the cookbook, COOKBOOK.md; SKILL.md is the tool in brief for an assistant.
     """
+    name, output, force = inputs.name, inputs.output, inputs.force
     if output is None:
         with writing(None) as write:
             write(example(name) if name else "".join(f"{each}\n" for each in names()))

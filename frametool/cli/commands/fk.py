@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,6 +25,10 @@ from frametool.stream.faults import ROWS_SKIPPED
 from frametool.stream.joint_rows import JointRows, echoed, joint_poses, names_in
 from frametool.stream.request import Operation, Request
 
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
+    from frametool.formats.load import FrameFile
+
 
 @click.command(cls=Command, name="fk")
 @click.argument("tree", type=FILE, metavar="URDF")
@@ -35,7 +39,7 @@ from frametool.stream.request import Operation, Request
 @rotation_options
 @result_options("poses")
 @stream_options
-def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Add the pose of TIP in BASE to rows of joint values.
 
     \b
@@ -49,26 +53,29 @@ def command(tree: str, base: str, tip: str, deg: bool, normalize: bool, **option
     one that mimics another follows it. For one posture there is
     `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
-    stream = Stream(options)
-    output = Output("poses", deg=deg, **options)
-    if stream.options["columns"] or stream.given:
-        raise click.UsageError("columns of joints are found by their names; leave --columns and --from out")
-    (file,) = opened((tree,), streams=True)
+    stream, output = Stream(inputs), Output(inputs, "poses")
+    (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
-    rows = JointRows(robot, posture, frame_name(base, robot), frame_name(tip, robot))
-    name = stream.path or "stdin"
+    rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
+    with stream.opened():
+        return _added(stream, output, rows, file)
+
+
+def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> int:
+    """Write the rows of a stream with their poses; the file is that of the robot."""
+    inputs, name = stream.inputs, stream.path or "stdin"
     begin = stream.opened().peek()
     form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
     if holds_arrays(form):
         raise click.UsageError(f"rows of joints are a table of text, records or messages, not {form}")
-    names = names_in(begin, form, name, header=stream.options["header"])
+    names = names_in(begin, form, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
-    file.tally.about = f"{len(rows.columns)} of {len(robot.joints)} joints from the rows"
+    file.tally.about = f"{len(rows.columns)} of {len(rows.joints)} joints from the rows"
     state([file])
     echo_form = "" if form in RECORDS else echoed(begin)
     if not echo_form:
         operation = Operation(moves=True, formula=rows)
-        return stream.run(Request(operation, poses=0, degrees=deg, normalize=normalize), output)
+        return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize), output)
     bad = stream.policy(name)
     with stream.opened() as source:
         output.poses_as_they_come(joint_poses(source, rows, bad, numbered=echo_form == "csv1"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,11 +11,14 @@ from frametool.cli.output import Output
 from frametool.formats.table import FORMATS
 from frametool.view.report_text import form_entry, write_form, write_forms
 
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
+
 
 @click.command(cls=Command, name="formats")
 @click.argument("name", type=Form(FORMATS, "known"), required=False)
 @list_options()
-def command(name: str | None, **options: Any) -> None:
+def command(inputs: Inputs) -> None:
     """List the forms of files that are read and written: their suffixes, what their numbers mean, what they leave open.
 
     \b
@@ -27,7 +30,7 @@ def command(name: str | None, **options: Any) -> None:
     known by its content first, then by the suffix of the file; --in NAME decides otherwise. With NAME all is said of
     one form, with an example where there is one. `frametool help formats` is about the options that files need.
     """
-    output = Output("report", **options, otherwise="text")
+    output, name = Output(inputs, "report", otherwise="text"), inputs.name
     entries = list(map(form_entry, FORMATS if name is None else [name]))
     if output.style.form == "text":
         output.text(write_forms(entries) if name is None else write_form(entries[0]))

@@ -13,7 +13,7 @@ import click
 from frametool import __version__
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.examples import example
-from frametool.cli.group import GROUPS, option_groups, option_row, show_help, write_options
+from frametool.cli.group import GROUPS, option, option_groups, option_row, show_help, write_options
 from frametool.cli.options import EXIT_CODES, Command, Text
 from frametool.cli.sink import writing
 from frametool.errors import any_near, shown
@@ -21,6 +21,8 @@ from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+
+    from frametool.cli.group import Inputs
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
 MADE = {  # topics that are no file of their own
@@ -191,10 +193,10 @@ class Topic(Text):
 
 @click.command(cls=Command, name="help")
 @click.argument("words", type=Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
-@click.option("-f", "--format", "form", type=click.Choice(("text", "json")), default="text", show_default=True,
+@option("-f", "--format", "form", type=click.Choice(("text", "json")), default="text", show_default=True,
               help="json, of all or a COMMAND: options, values, exit codes")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, words: tuple[str, ...], form: str) -> None:
+def command(ctx: click.Context, inputs: Inputs) -> None:
     """Explain a subject on one screen, or a command; find any word in them and in the cookbook.
 
     \b
@@ -205,9 +207,10 @@ def command(ctx: click.Context, words: tuple[str, ...], form: str) -> None:
       frametool help cookbook quaternion
       frametool help -f json lookup
     """
+    words = inputs.words
     name = " ".join(words)
     named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
-    if form == "json":
+    if inputs.form == "json":
         text = _json(ctx, name, named)
     elif named and name not in topics():  # calc and formats are subjects too
         show_help(click.Context(named, parent=ctx.parent, info_name=name))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,6 +16,9 @@ from frametool.grammar.result import Result
 from frametool.text.numbers import parse_number
 
 MOST = 1_000_000  # fractions of a range
+
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
 
 
 def fractions_of(text: str) -> list[float]:
@@ -42,7 +45,7 @@ def fractions_of(text: str) -> list[float]:
 @click.argument("fractions", nargs=-1, required=True, type=Parsed("number", fractions_of), metavar="FRACTION..")
 @pose_result_options("poses")
 @EXPLAIN
-def command(a: str, b: str, fractions: tuple[list[float], ...], **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Print poses between A (fraction 0) and B (fraction 1), as tf2 does: straight line and slerp.
 
     \b
@@ -52,15 +55,15 @@ def command(a: str, b: str, fractions: tuple[list[float], ...], **options: Any) 
     Fractions are numbers, or START:STOP:STEP; those outside 0 .. 1 extrapolate. The rotation takes the shorter arc.
     Unlike a screw motion, position and rotation are independent.
     """
-    task, asked = PoseTask(options), [each for some in fractions for each in some]
+    task, asked = PoseTask(inputs), [each for some in inputs.fractions for each in some]
     if task.derives:
         plan = task.plan()
         if len(asked) != 1:
             raise click.UsageError(f"--explain derives one fraction, found {len(asked)}")
         from frametool.explain import derive
 
-        return task.write(derive.interpolate(plan, task.written(a), task.written(b), asked[0]))
-    pairs = combinations((a, b), task.request())
+        return task.write(derive.interpolate(plan, task.written(inputs.a), task.written(inputs.b), asked[0]))
+    pairs = combinations((inputs.a, inputs.b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
         warn(LEFT_OUT.format("interpolate"))
     between = [interpolated(first, last, each) for first, last in pairs for each in asked]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
 from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
+
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="invert")
@@ -17,7 +20,7 @@ from frametool.cli.options import TEXT, Command, offset_option, pose_result_opti
 @EXPLAIN
 @offset_option
 @pose_stream_options
-def command(pose: str, scale: bool, **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 
     \b
@@ -26,12 +29,12 @@ def command(pose: str, scale: bool, **options: Any) -> int:
 
     POSE is a mapping, a file, or - for standard input, also with several poses.
     """
-    task = PoseTask(options)
+    task = PoseTask(inputs)
     if task.derives:
         from frametool.explain import derive
 
-        return task.write(derive.invert(task.plan(), task.written(pose)))
+        return task.write(derive.invert(task.plan(), task.written(inputs.pose)))
     from frametool.stream.request import Operation
 
-    operation = Operation(inverse=True, similar=True, multiples=scale)
-    return task.answer(pose, task.request(operation=operation, rename=lambda parent, name: (name, parent)))
+    operation = Operation(inverse=True, similar=True, multiples=inputs.scale)
+    return task.answer(inputs.pose, task.request(operation=operation, rename=lambda parent, name: (name, parent)))

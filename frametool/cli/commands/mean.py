@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.explaining import PoseTask, pose_stream_options
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
 from frametool.errors import ValueInvalid, warn
@@ -15,22 +16,23 @@ from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
     from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
 
 
 @click.command(cls=Command, name="mean")
 @click.argument("poses", nargs=-1, type=TEXT, metavar="[POSE.. | FILE]")
-@click.option(
+@option(
     "--weights",
     type=ColumnNames(),
     metavar="NAME | W,W,..",
     help="column or key of each pose's weight, or the weights of the POSEs",
 )
-@click.option("--robust", is_flag=True, help="leave out poses that do not agree with the rest, and tell them")
+@option("--robust", is_flag=True, help="leave out poses that do not agree with the rest, and tell them")
 @pose_result_options("poses")
 @pose_stream_options
-def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
 
     \b
@@ -48,8 +50,8 @@ def command(poses: tuple[str, ...], weights: str | None, robust: bool, **options
     left out, told with its place, how far off it is, and u, that in sigmas; the status is then 3. Where none is, the
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
-    task = PoseTask(options)
-    stream = task.stream
+    task = PoseTask(inputs)
+    stream, poses, weights, robust = task.stream, inputs.poses, inputs.weights, inputs.robust
     from frametool.stream.gathering import Gathered
 
     gathered = Gathered(named=robust)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.group import option
 from frametool.cli.options import FILE, TEXT, Command, file_options, offset_option, result_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say, say_error
@@ -13,8 +14,8 @@ from frametool.cli.trees import opened, state
 from frametool.lint.monitor_report import clocks_differ, monitor
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.errors import FormatError
 
 FAILED = 1
@@ -24,11 +25,11 @@ MOST_TOLD = 3  # frames that come by the topics of two robots
 @click.command(cls=Command, name="monitor")
 @click.argument("recording", type=TEXT)
 @click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
-@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
 @offset_option
 @file_options
 @result_options("report")
-def command(recording: str, frames: Sequence[str], more: Sequence[str], normalize: bool, **options: Any) -> int:
+def command(inputs: Inputs) -> int:
     """Print the rate, count, first and last stamp, largest gap, delay and jumps of each edge of RECORDING.
 
     \b
@@ -44,12 +45,14 @@ def command(recording: str, frames: Sequence[str], more: Sequence[str], normaliz
     speed_mean and speed_max metres a second from stamp to stamp. A jump is a step 10 times the median one and longer
     than 0.1 m or 0.2 rad.
     """
+    frames = inputs.frames
     if len(frames) not in (0, 2):
         raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
-    output = Output("report", **options)
-    files = opened((recording, *more))
+    output = Output(inputs, "report")
+    files = opened((inputs.recording, *inputs.more))
     clashes: list[FormatError] = []
-    report = monitor(files, *frames, normalize=normalize, clashing=clashes.append)
+    report = monitor(files, *frames, normalize=inputs.normalize, clashing=clashes.append)
+    inputs.ask("time_offset")
     state(files)
     most = MOST_TOLD + (len(clashes) == MOST_TOLD + 1)
     for error in clashes[:most]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused, settings
+from frametool.cli.group import option
 from frametool.cli.options import FILE, LIMIT, TEXT, Command, Text, pose_options, reading_options, verbose_option
 from frametool.cli.output import opened_place
 from frametool.cli.recording import copied_as, folder_of, refuse_input
@@ -23,8 +23,9 @@ from frametool.view.progress import ProgressBar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
+
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
-OF_FILES = ("input_forms", "joints", "joint_files", "named_frames", "direction", "camera_axes", "dh", "stamps", "order")
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
 
 
@@ -46,26 +47,23 @@ class Between(Text):
 
 @click.command(cls=Command, name="record", epilog=EXIT_CODES)
 @click.argument("tree", type=FILE, metavar="RECORDING")
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="write this file or folder, whole or not at all")
-@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE",
+@option("-o", "--output", type=FILE, metavar="FILE", help="write this file or folder, whole or not at all")
+@option("--with", "more", multiple=True, type=FILE, metavar="FILE",
               help="add the edges of this tree that are missing; may be repeated")  # fmt: skip
-@click.option("--replace", is_flag=True, help="let --with replace edges that are there with other values")
-@click.option("--into", type=FRAME, metavar="FRAME", help="move the messages of each --topic into this frame")
-@click.option("--topic", "topics", type=TEXT, multiple=True, metavar="NAME",
+@option("--replace", requires=("more",), is_flag=True, help="let --with replace edges that are there with other values")
+@option("--into", type=FRAME, metavar="FRAME", help="move the messages of each --topic into this frame")
+@option("--topic", "moved_topics", type=TEXT, multiple=True, metavar="NAME",
               help="a topic whose messages move, or whose transforms count; may be repeated")  # fmt: skip
-@click.option("--on-error", type=click.Choice(ON_ERROR[:2]), default=STOP, show_default=True,
+@option("--on-error", type=click.Choice(ON_ERROR[:2]), default=STOP, show_default=True,
               help="at a message that cannot be moved")  # fmt: skip
-@click.option("--between", type=Between(), metavar="START,STOP", help="leave out what was logged before and after")
-@click.option("-f", "--format", "format_name", type=click.Choice(writers("recording")),
+@option("--between", type=Between(), metavar="START,STOP", help="leave out what was logged before and after")
+@option("-f", "--format", "format_name", type=click.Choice(writers("recording")),
               help="form of the copy  [default: by the name of --output]")  # fmt: skip
-@click.option("--force", is_flag=True, help="let --output replace a file")
+@option("--force", requires=("output",), is_flag=True, help="let --output replace a file")
 @reading_options(topics=False)
 @verbose_option
 @pose_options
-def command(
-    tree: str, output: str | None, more: Sequence[str], replace: bool, into: str | None, topics: tuple[str, ...],
-    on_error: str, between: tuple[int, int] | None, format_name: str | None, force: bool, normalize: bool,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Copy RECORDING with something changed; all other messages stay as they are.
 
     \b
@@ -85,22 +83,27 @@ def command(
     from frametool.recordings.read import opened_recording
     from frametool.stream.record_run import RecordRequest, RecordRun
 
+    more, into, topics, normalize = inputs.more, inputs.into, inputs.moved_topics, inputs.peek("normalize")
     _refuse_idle(more, into, topics)
-    path = tree_file(tree)
+    path = tree_file(inputs.tree)
     if path == "-":
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
     form = _form_of(path)
-    copy, place = copied_as(form, path, output, format_name)
+    copy, place = copied_as(form, path, inputs.output, inputs.format_name)
     refuse_input(place, (path, *map(tree_file, more)))
     tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
+    if more or into:
+        inputs.ask("normalize")
     request = RecordRequest(
-        edges, replace=replace, into=_bare(into or ""), topics=topics, window=between, on_error=on_error,
+        edges, replace=inputs.replace, into=_bare(into or ""), topics=topics, window=inputs.between,
+        on_error=inputs.on_error if into else STOP,
         report=lambda error: say_error(error, in_json=False), normalize=normalize,
     )  # fmt: skip
-    quiet = settings().quiet
-    with opened_place(copy, place, force=force) as write, opened_recording(path, tally) as opened:
+    quiet = inputs.quiet
+    inputs.refuse_idle()
+    with opened_place(copy, place, force=inputs.force) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, request)
         with ProgressBar(None, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
@@ -115,10 +118,6 @@ def command(
 
 def _refuse_idle(more: Sequence[str], into: str | None, topics: Sequence[str]) -> None:
     """Refuse options that would not be used."""
-    if not more:
-        refuse_unused("is for --with FILE", "replace", *OF_FILES)
-    if not into:
-        refuse_unused("is for --into FRAME", "on_error", *(["normalize"] if not more else []))
     of_poses = [topic for topic in topics if topic.rpartition("/")[2] not in TRANSFORMS]
     if topics and not into and (of_poses or not more):
         raise click.UsageError(f"--topic {(of_poses or topics)[0]} is for --into FRAME, which moves its messages")

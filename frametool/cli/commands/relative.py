@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.explaining import EXPLAIN, PoseTask, one_argument, pose_stream_options
-from frametool.cli.group import settings
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, ColumnNames, Command, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among, without_inverse
 from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative_names
 
+if TYPE_CHECKING:
+    from frametool.cli.group import Inputs
+
 
 @click.command(cls=Command, name="relative")
 @click.argument("a", type=TEXT, required=False)
 @click.argument("b", type=TEXT, required=False)
 @pose_result_options("poses")
-@click.option("--consecutive", is_flag=True, help="of a stream, each row seen from the row before it")
-@click.option("--first", is_flag=True, help="of a stream, each row seen from the first")
-@click.option(
+@option("--consecutive", excludes=("first", "explain"), is_flag=True,
+        help="of a stream, each row seen from the row before it")  # fmt: skip
+@option("--first", excludes=("explain",), is_flag=True, help="of a stream, each row seen from the first")
+@option(
     "--velocity",
+    requires=("consecutive",),
     is_flag=True,
     help="with --consecutive, also the twist from row to row, m/s and rad/s",
 )
-@click.option(
+@option(
     "--time-column",
+    requires=("velocity", "time_offset", "start", "stop"),
     type=ColumnNames(),
     metavar="NAME",
     help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
@@ -35,15 +41,7 @@ from frametool.grammar.pose_algebra import relative_names
 @EXPLAIN
 @limit_options
 @pose_stream_options
-def command(
-    a: str | None,
-    b: str | None,
-    consecutive: bool,
-    first: bool,
-    velocity: bool,
-    time_column: str | None,
-    **options: Any,
-) -> int:
+def command(inputs: Inputs) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 
     \b
@@ -59,35 +57,28 @@ def command(
 
     The twist in dt seconds is the body's, seen in A: linear R_A' (p_B - p_A) / dt, angular rotvec(A^-1 B) / dt.
     """
-    window = window_of(options.pop("start"), options.pop("stop"))
-    task = PoseTask(options)
+    window, task, a, b = window_of(inputs), PoseTask(inputs), inputs.a, inputs.b
     if task.derives:
         plan = task.plan()
-        if consecutive or first:
-            raise click.UsageError("--consecutive and --first are about the rows of a stream; leave --explain out")
         from frametool.explain import derive
 
         arguments = [one_argument(each) for each in (a, b)]
         return task.write(derive.relative(plan, *map(task.written, arguments)))
-    if velocity and not consecutive:
-        raise click.UsageError("--velocity is that from one row to the next; give --consecutive too")
-    if time_column is not None and not (velocity or window or settings().time_offset):
-        raise click.UsageError("--time-column is for --velocity, --time-offset, --start and --stop")
     from frametool.stream.request import PREVIOUS, START, Operation
 
     given = [each for each in (a, b) if each is not None]
-    if consecutive or first:
-        if (consecutive and first) or len(given) > 1:
-            one = "--consecutive and --first are two questions" if consecutive and first else "leave A and B out"
-            raise click.UsageError(f"rows are compared with one of themselves; {one}")
+    if inputs.consecutive or inputs.first:
+        velocity = inputs.consecutive and inputs.velocity
+        if len(given) > 1:
+            raise click.UsageError("rows are compared with one of themselves; leave A and B out")
         # a row is seen from another one of the same stream, which is the same thing at another moment
-        operation = Operation(of=PREVIOUS if consecutive else START, velocity=velocity)
-        beside = (time_column or "") if velocity or window else None
+        operation = Operation(of=PREVIOUS if inputs.consecutive else START, velocity=velocity)
+        beside = (inputs.time_column or "") if velocity or window else None
         request = task.request(
             operation=operation, extra_column=beside, window=window, rename=lambda _parent, name: (name, name)
         )
         status = task.answer(a or "-", request)
-        if velocity and not settings().quiet:
+        if velocity and not inputs.quiet:
             say("note: the first pose has none before it, so no velocity: it is left out, results begin at the second")
         return status
     if b is None:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.comparing import parse_every, read_span, trajectory, trajectory_options, write_trajectory
-from frametool.cli.group import settings
+from frametool.cli.comparing import forms_of, parse_every, read_span, trajectory, trajectory_options, write_trajectory
+from frametool.cli.group import option
 from frametool.cli.options import (
     TEXT,
     Command,
@@ -27,28 +27,25 @@ from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
-    from frametool.fit.comparison import Delta
+    from frametool.cli.group import Inputs
     from frametool.frames.trajectory import Trajectory
 
 
 @click.command(cls=Command, name="resample")
 @click.argument("path", type=TEXT, metavar="TRAJ")
-@click.option("--rate", type=Number(), metavar="HZ", help="so many poses a second, from the first on")
-@click.option("--at", "times", type=TEXT, metavar="FILE|TIMES",
+@option("--rate", type=Number(), metavar="HZ", help="so many poses a second, from the first on")
+@option("--at", "times", type=TEXT, metavar="FILE|TIMES",
               help="at the stamps of a file; T,T,.., START:STOP:STEP")  # fmt: skip
-@click.option("--every", type=Parsed("step", parse_every), metavar="1m|5deg",
+@option("--every", type=Parsed("step", parse_every), metavar="1m|5deg",
               help="at even steps of the path, or of its turning")  # fmt: skip
-@click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
+@option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
               help="that is interpolated  [default: 3 median intervals]")  # fmt: skip
 @trajectory_options
 @offset_option
 @reading_options()
 @rotation_options
 @result_options("poses")
-def command(
-    path: str, rate: float | None, times: str | None, every: Delta | None, max_gap_ns: int | None, on_error: str,
-    deg: bool, **options: Any,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Interpolate a trajectory at other moments: positions along the line, rotations by slerp.
 
     \b
@@ -59,13 +56,13 @@ def command(
     TRAJ is a trajectory as `compare` takes it. Nothing is made beyond its ends, nor where its poses are more than
     --max-gap apart; how many moments have none is told.
     """
+    path, rate, times, every = inputs.path, inputs.rate, inputs.times, inputs.every
     if sum(each is not None for each in (rate, times, every)) != 1:
         raise click.UsageError("give one of --rate, --at and --every")
     if rate is not None and rate <= 0:
         raise click.UsageError("--rate is more than 0")
-    output = Output("poses", **options, deg=deg, otherwise=by_name(path, writers("poses")) or "csv")
-    forms = settings().input_forms
-    found, name, skipped = trajectory(path, on_error, forms[-1] if forms else "")
+    output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
+    found, name, skipped = trajectory(path, inputs.on_error, forms_of(1)[0])
     from frametool.fit.resampling import resampled, stamps_at_rate, stamps_every
 
     found = found.in_order()
@@ -75,7 +72,7 @@ def command(
             raise click.UsageError(f"{name} has no stamps; give them with --stamps FILE")
         found = found.numbered()
     stamps = stamps_at_rate(found, rate) if rate else stamps_every(found, every) if every else _stamps(times or "")
-    made = resampled(found, stamps, max_gap_ns)
+    made = resampled(found, stamps, inputs.max_gap_ns)
     if lost := len(stamps) - made.size:
         say(f"note: {lost} of {len(stamps)} moments are beyond the ends of {name}, or in a gap: no pose")
     write_trajectory(output, made._replace(stamps_ns=None) if counted else made)

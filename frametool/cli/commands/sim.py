@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.explaining import EXPLAIN, significant
-from frametool.cli.group import Group
+from frametool.cli.explaining import explain_option, significant
+from frametool.cli.group import Group, option
 from frametool.cli.options import EXIT_CODES, TEXT, Command
 from frametool.cli.poses import source_of, usage_if_inline
 from frametool.cli.signals import clean_up
@@ -21,6 +21,7 @@ from frametool.cli.sim_output import (
     follow_options,
     leader_of,
     output_options,
+    style_of,
 )
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
@@ -34,6 +35,7 @@ from frametool.sim.scene_file import read_scene
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frametool.cli.group import Inputs
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
     from frametool.sim.turtle import Twist
@@ -78,9 +80,9 @@ SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim
 @LEADER
 @follow_options("20")
 @output_options
-@click.option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
-@EXPLAIN
-def follow(leader: str, explain_step: int | None, explain: str | None, **options: Any) -> None:
+@option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
+@explain_option(requires=("explain_step",))
+def follow(inputs: Inputs) -> None:
     """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
 
     \b
@@ -94,59 +96,65 @@ def follow(leader: str, explain_step: int | None, explain: str | None, **options
     on with --realtime, where they act when they come. A turtle at a wall is reported once, and every tick
     there is counted in the summary. Below 2 micrometres from its target a follower stands still.
     """
-    if explain_step is not None:
-        _explain(options, leader, explain_step, explain or "text")
+    if inputs.explain_step is not None:
+        _explain(inputs)
         return
-    output, scene = output_and_scene(options, leader)
-    if explain is not None:
-        raise click.UsageError("--explain derives one control step; name it with --explain-step N, from 0")
+    output, scene = output_and_scene(inputs, leader_in(inputs))
     output.run(scene)
 
 
-def _explain(options: dict[str, Any], leader: str, step: int, form: str) -> None:
-    """Write the derivation of one control step of the followers; refuse options that are about a whole run."""
-    precision = options["precision"]
-    too_many = [f"--{name}" for name in ("live", "realtime", "plot", "view") if options[name]]
-    too_many += ["--emit"] if options["emit"] != "commands" else []
-    chosen = options["format_name"] or by_suffix(options["output"], ("yaml", "json", "csv"))
-    too_many += [f"the format {chosen}"] if chosen not in (None, "text") else []
-    output, scene = output_and_scene(options, leader)
-    if too_many:
-        raise click.UsageError(f"--explain-step derives one step in words; leave {' and '.join(too_many)} out")
+def _explain(inputs: Inputs) -> None:
+    """Write the derivation of one control step of the followers."""
+    scene = scene_of(inputs, leader_in(inputs))
+    form = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
+    if form not in (None, "text"):
+        raise click.UsageError(f"--explain-step derives one step in words; leave the format {form} out")
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.follow import derive_follow
     from frametool.sim.followed import follow_steps
 
-    plan = DerivationStyle(output.style, significant(precision))
-    text = derive_follow(plan, follow_steps(scene, step)).render(form)
-    with writing(output.output, force=output.force) as write:
+    plan = DerivationStyle(style_of(inputs), significant(inputs.precision))
+    text = derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text")
+    with writing(inputs.output, force=bool(inputs.force)) as write:
         write(text)
 
 
-def output_and_scene(
-    options: dict[str, Any], leader: str | MakeLeader, **more: Any,
-) -> tuple[SimOutput, Scene]:  # fmt: skip
-    """Return the output and the scene that the options describe; what cannot be is a usage error."""
-    law, seed = options.pop("law"), options.pop("seed")
-    changes = {name: options.pop(name) for name in LAW_OPTIONS}
-    chosen = {name: options.pop(name) for name in SCENE_OPTIONS}
+def leader_in(inputs: Inputs) -> MakeLeader:
+    """Return the leader that the options name."""
+    with misuse():
+        return leader_of(inputs.leader, inputs.seed, paced=inputs.realtime or inputs.live)
+
+
+def output_and_scene(inputs: Inputs, leader: MakeLeader, *, leaders: bool = False) -> tuple[SimOutput, Scene]:
+    """Return the output and the scene that the options describe."""
+    return SimOutput.of(inputs, leaders=leaders), scene_of(inputs, leader)
+
+
+def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
+    """Return the scene of a leader and followers; what cannot be is a usage error."""
+    chosen = {name: getattr(inputs, name) for name in SCENE_OPTIONS}
     if chosen["holonomic"] and chosen["turtlesim"] == "ros1":
         raise click.UsageError("--holonomic is for --turtlesim ros2; in ROS 1 linear.y always counts")
-    output = SimOutput.of(**options, **more)
+    with misuse():
+        law = FollowController(inputs.law, **{name: getattr(inputs, name) for name in LAW_OPTIONS})
+        return tutorial(leader=leader, law=law, **chosen)
+
+
+@contextmanager
+def misuse() -> Iterator[None]:
+    """Turn values that cannot be into usage errors."""
     try:
-        controller = FollowController(law, **changes)
-        drive = leader_of(leader, seed, paced=output.realtime or output.live) if isinstance(leader, str) else leader
-        return output, tutorial(leader=drive, law=controller, **chosen)
+        yield
     except ValueInvalid as error:
         raise click.UsageError(str(error)) from None
 
 
 @command.command(cls=Command, name="run")
 @click.argument("scene", type=TEXT)
-@click.option("--duration", type=DURATION, metavar="S", help="simulated seconds, or inf  [default: the scene's]")
-@click.option("--seed", type=click.IntRange(0), help="of random leaders  [default: the scene's]")
+@option("--duration", type=DURATION, metavar="S", help="simulated seconds, or inf  [default: the scene's]")
+@option("--seed", type=click.IntRange(0), help="of random leaders  [default: the scene's]")
 @output_options
-def run(scene: str, duration: float | None, seed: int | None, **options: Any) -> None:
+def run(inputs: Inputs) -> None:
     """Run SCENE, a YAML or JSON file, and print the followers' velocity commands.
 
     \b
@@ -165,9 +173,9 @@ def run(scene: str, duration: float | None, seed: int | None, **options: Any) ->
     law, rate, gain_linear, gain_angular, max_linear, max_angular, target, delay. Events are turtlesim's services:
     spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
     """
-    output = SimOutput.of(**options)
+    output, duration = SimOutput.of(inputs), inputs.duration
     try:
-        read = read_scene(source_of(scene), seed=seed)
+        read = read_scene(source_of(inputs.scene), seed=inputs.seed)
     except FormatError as error:
         raise usage_if_inline(error) from None
     chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
@@ -186,7 +194,7 @@ QUIT = b"qQ\x04"
 @command.command(cls=Command, name="teleop")
 @follow_options("inf")
 @output_options
-def teleop(**options: Any) -> None:
+def teleop(inputs: Inputs) -> None:
     """Drive turtle1 with the arrow keys, as turtle_teleop_key does; turtle2 follows. Drawn in the terminal; q ends it.
 
     \b
@@ -200,7 +208,7 @@ def teleop(**options: Any) -> None:
     if sys.stdin is None or not sys.stdin.isatty():
         raise click.UsageError(f"standard input is no terminal; {INSTEAD}")
     mailbox = Mailbox()
-    output, scene = output_and_scene({**options, "live": True}, lambda: mailbox, leaders=True)
+    output, scene = output_and_scene(inputs.but(live=True), lambda: mailbox, leaders=True)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
 

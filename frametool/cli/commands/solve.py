@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from os.path import realpath, splitext
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.comparing import read_span
-from frametool.cli.group import refuse_unused, settings
+from frametool.cli.group import option
 from frametool.cli.options import (
     FILE,
     TEXT,
@@ -30,18 +30,13 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.view.solution_text import Solution
 
 REPORTS = {".json": "json", ".csv": "csv"}
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
+SHAPES = ("hand_eye", "points")
 FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
-LEFT_OPEN = ("joints", "joint_files", "direction", "camera_axes", "dh", "stamps", "topics")  # in trajectories
-# shape -> the options that it does not use
-UNUSED = {
-    "": ("eye_to_hand", "max_gap_ns", "names", "scale"),
-    "--hand-eye": ("root", "fix", "without", "scale", "named_frames"),
-    "--points": ("root", "fix", "without", "eye_to_hand", "max_gap_ns", "named_frames", "normalize", *LEFT_OPEN),
-}
 
 
 def _read_report(path: str) -> str:
@@ -59,30 +54,28 @@ def _read_names(text: str) -> list[str]:
 
 @click.command(cls=Command, name="solve", epilog=EXIT_CODES)
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
-@click.option("--root", type=TEXT, metavar="FRAME", help="that all others are given in  [default: never a child]")
-@click.option("--fix", type=FILE, multiple=True, metavar="TREE", help="exact edges, kept as they are; may be repeated")
-@click.option("--without", type=TEXT, multiple=True, metavar="FILE:LINE",
+@option("--root", excludes=SHAPES, type=TEXT, metavar="FRAME",
+        help="that all others are given in  [default: never a child]")  # fmt: skip
+@option("--fix", excludes=SHAPES, type=FILE, multiple=True, metavar="TREE",
+        help="exact edges, kept as they are; may be repeated")  # fmt: skip
+@option("--without", excludes=SHAPES, type=TEXT, multiple=True, metavar="FILE:LINE",
               help="leave this row out; may be repeated")  # fmt: skip
-@click.option("--hand-eye", is_flag=True, help="where a camera sits, from poses of gripper and target")
-@click.option("--eye-to-hand", is_flag=True, help="the camera stands still, the target moves")
-@click.option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
+@option("--hand-eye", excludes=("points",), is_flag=True, help="where a camera sits, from poses of gripper and target")
+@option("--eye-to-hand", requires=("hand_eye",), is_flag=True, help="the camera stands still, the target moves")
+@option("--max-gap", "max_gap_ns", requires=("hand_eye",), type=Parsed("time", read_span), metavar="TIME",
               help="between stamps that are paired  [default: 50ms]")  # fmt: skip
-@click.option("--points", is_flag=True, help="A<-B from points that are the same in both")
-@click.option("--scale", is_flag=True, help="of A to B too")
-@click.option("--names", type=Parsed("names", _read_names), metavar="NAME,..",
+@option("--points", is_flag=True, help="A<-B from points that are the same in both")
+@option("--scale", requires=("points",), is_flag=True, help="of A to B too")
+@option("--names", requires=("hand_eye", "points"), type=Parsed("names", _read_names), metavar="NAME,..",
               help="BASE,GRIPPER,CAMERA,TARGET, or A,B")  # fmt: skip
-@click.option("--no-robust", is_flag=True, help="use all rows, wrong ones too")
-@click.option("--report", type=Parsed("report", _read_report), metavar="FILE.json|csv",
+@option("--no-robust", is_flag=True, help="use all rows, wrong ones too")
+@option("--report", type=Parsed("report", _read_report), metavar="FILE.json|csv",
               help="numbers of the fit and of each row")  # fmt: skip
 @reading_options()
 @pose_options
 @rotation_options
 @result_options("tree", "trajectory")
-def command(
-    files: Sequence[str], hand_eye: bool, points: bool, eye_to_hand: bool, max_gap_ns: int | None, scale: bool,
-    root: str | None, fix: Sequence[str], without: Sequence[str], names: Sequence[str] | None, no_robust: bool,
-    report: str | None, normalize: bool, **options: Any,
-) -> int:  # fmt: skip
+def command(inputs: Inputs) -> int:
     """Solve for the transforms that measurements mean, with sigmas; what does not agree is left out and named.
 
     \b
@@ -97,39 +90,38 @@ def command(
     moveit_calibration or easy_handeye. Points are matched by id, else by row; a column weight counts.
     """
     _use_one_thread()
-    shape = "--hand-eye" if hand_eye else "--points" if points else ""
-    if hand_eye and points:
-        raise click.UsageError("--hand-eye and --points are two things; give one")
-    _refuse_misuse(files, shape, names)
-    if hand_eye and len(files) == 1:
-        refuse_unused("is not used: SAMPLES are pairs, in YAML or JSON", "max_gap_ns", "input_forms", *LEFT_OPEN)
-    path, force = options["output"], options["force"]
+    hand_eye, points, files = inputs.hand_eye, inputs.points, inputs.files
+    _refuse_misuse(files, "--hand-eye" if hand_eye else "--points" if points else "", inputs.peek("names"))
+    report, path, force = inputs.report, inputs.output, inputs.force
     if report and path and realpath(report) == realpath(path):
         raise click.UsageError("--report and -o name one file")
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
-    output = Output("tree", "trajectory", **options)
-    if scale and output.style.form not in FORMS_OF_SCALE:
+    output = Output(inputs, "tree", "trajectory")
+    if points and inputs.scale and output.style.form not in FORMS_OF_SCALE:
         raise ValueInvalid(f"{output.style.form} has no place for a scale; write json, yaml or csv")
     from frametool.cli import solving
 
-    how = {"robust": not no_robust, "normalize": normalize}
+    robust = not inputs.no_robust
     if hand_eye:
+        gap = inputs.max_gap_ns if len(files) > 1 else None
         found = solving.solved_hand_eye(
-            files, eye_to_hand=eye_to_hand, max_gap_ns=max_gap_ns, names=names, **how
-        )
+            files, eye_to_hand=inputs.eye_to_hand, max_gap_ns=gap, names=inputs.names, robust=robust,
+            normalize=inputs.normalize,
+        )  # fmt: skip
     elif points:
-        found = solving.solved_points(files, names=names, scale=scale, robust=not no_robust)
+        found = solving.solved_points(files, names=inputs.names, scale=inputs.scale, robust=robust)
     else:
-        found = solving.solved_tree(files, root=root, fix=fix, without=without, **how)
+        chosen = {name: getattr(inputs, name) for name in ("root", "fix", "without", "normalize")}
+        found = solving.solved_tree(files, robust=robust, **chosen)
     from frametool.view.solution_text import write_left_out, write_solution
 
-    said = (write_left_out if settings().quiet else write_solution)(found)
+    said = (write_left_out if inputs.quiet else write_solution)(found)
     if said:
         tell(said.rstrip("\n"))
     if report:
         _write_report(found, report, force=force)
-    _write(output, found, on_hand=not eye_to_hand)
+    _write(output, found, on_hand=not (hand_eye and inputs.eye_to_hand))
     return ROWS_SKIPPED if found.left_out else 0
 
 
@@ -141,9 +133,6 @@ def _use_one_thread() -> None:
 
 def _refuse_misuse(files: Sequence[str], shape: str, names: Sequence[str] | None) -> None:
     """Raise a usage error for options of another shape, and for too many or too few files."""
-    refuse_unused(f"is not used {f'with {shape}' if shape else 'without --hand-eye or --points'}", *UNUSED[shape])
-    if not shape and names:
-        refuse_unused("is not used without --hand-eye or --points", "names")
     refuse_two_readers(files)
     if shape == "--hand-eye" and len(files) > 2:
         raise click.UsageError(f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {len(files)} files")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.group import option
 from frametool.cli.options import TEXT, Command, pose_result_options, reading_options, together
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
@@ -21,12 +22,13 @@ from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_posit
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.grammar.pose import Pose
 
 
 def _flag(name: str) -> Callable[..., Any]:
     metavar = "FRAME" if name.endswith("id") else "N"
-    return click.option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
+    return option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
 
 
 @click.command(cls=Command, name="static")
@@ -34,7 +36,7 @@ def _flag(name: str) -> Callable[..., Any]:
 @together(*map(_flag, FLAGS))
 @reading_options()
 @pose_result_options("tree")
-def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any) -> None:
+def command(inputs: Inputs) -> None:
     """Write the static_transform_publisher arguments of a TREE, or read such arguments into a tree.
 
     \b
@@ -48,20 +50,20 @@ def command(arguments: Sequence[str], deg: bool, normalize: bool, **options: Any
     Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent. Their angles
     are radians, as the tool has them; --deg is about the result.
     """
-    flags = {name: value for name in FLAGS if (value := options.pop(name.replace("-", "_"))) is not None}
-    form = options.pop("format_name")
+    flags = {name: value for name in FLAGS if (value := getattr(inputs, name.replace("-", "_"))) is not None}
+    arguments = inputs.arguments
     if len(arguments) == 1 and re.match(r"\s*[-+.\d]+\s", arguments[0]) and not os.path.exists(arguments[0]):
         arguments = arguments[0].split()  # in quotes
     if not flags and len(arguments) == 1:
-        output = Output("tree", format_name=form or "static2", deg=deg, **options)
+        output = Output(inputs, "tree", otherwise="static2")
         tree = load_tree(arguments[0])
         if tree.moves:
             raise ValueInvalid(moving_frames(track.child for track in tree.tracks() if not track.is_static))
         output.tree(tree)
         return
-    output = Output("tree", format_name=form, deg=deg, **options)
+    output = Output(inputs, "tree")
     tree = FrameTree("arguments")
-    pose = _pose(arguments, flags, Reading(Source("arguments", ""), normalize=normalize))
+    pose = _pose(arguments, flags, Reading(Source("arguments", ""), normalize=inputs.normalize))
     tree.add_components(pose.parent or "", pose.name or "", pose.components)
     output.tree(tree)
 

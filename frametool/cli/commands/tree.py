@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.options import FILE, TIME, Command, at_ns, color_option, result_options, rules_of, tree_options
+from frametool.cli.group import option
+from frametool.cli.options import FILE, TIME, Command, at_ns, color_option, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+
+    from frametool.cli.group import Inputs
 
 
 @click.command(cls=Command, name="tree")
 @click.argument("tree", type=FILE)
-@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@click.option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
+@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
 @color_option
 @tree_options
 @result_options("tree", "trajectory")
-def command(tree: str, more: Sequence[str], at: int | str | None, color: str, **options: Any) -> None:
+def command(inputs: Inputs) -> None:
     """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
 
     \b
@@ -36,11 +38,10 @@ def command(tree: str, more: Sequence[str], at: int | str | None, color: str, **
     moves as ROS's view_frames does, tf2 is the listing of tf2's all_frames_as_yaml. --at draws the tree as it stood
     at one time. Of frames.gv and that listing names and rates are shown: they hold no poses.
     """
-    taken = rules_of(options)
-    output = Output("tree", "trajectory", **options)
+    output = Output(inputs, "tree", "trajectory")
     place, drawn = output.style.place, output.style.form in ("yaml", "json", "text", "dot", "mermaid")
     if place is not None and (not drawn or place.origin is not None):
         raise click.UsageError(f"--to {place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
-    frames = load_tree(tree, more, taken, drawings=True)
-    stamp = at_ns(at)
-    output.tree(frames if stamp is None else frames.tree_at(stamp), color)
+    frames = load_tree(inputs.tree, inputs.more, rules(inputs), drawings=True)
+    stamp = at_ns(inputs.at)
+    output.tree(frames if stamp is None else frames.tree_at(stamp), inputs.color)

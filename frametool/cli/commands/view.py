@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import refuse_unused
-from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules_of
+from frametool.cli.group import option
+from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
@@ -19,8 +19,8 @@ from frametool.errors import listing, shown
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
+    from frametool.cli.group import Inputs
     from frametool.view.frame_scene import FrameScene
 
     Eye = tuple[float, float]
@@ -40,29 +40,26 @@ def _eye(text: str) -> Eye:
 @click.argument("tree", type=FILE)
 @click.argument("target", type=FRAME, required=False)
 @click.argument("source", type=FRAME, required=False)
-@click.option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@click.option("--frame", "fixed", type=FRAME, metavar="FIXED",
+@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@option("--frame", "fixed", type=FRAME, metavar="FIXED",
               help="what all is seen in  [default: TARGET, or the root of most frames]")
-@click.option("--at", type=TIME, metavar="TIME",
+@option("--at", type=TIME, metavar="TIME",
               help="seconds, nanoseconds with ns  [default: the first time that all edges have]")
-@click.option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it")
-@click.option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches")
-@click.option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE")
-@click.option("--from", "eye", type=Parsed("eye", _eye), default="slanted", show_default=True, metavar="EYE",
+@option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it")
+@option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches")
+@option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE")
+@option("--from", "eye", type=Parsed("eye", _eye), default="slanted", show_default=True, metavar="EYE",
               help="slanted, front, side, top, or AZ,EL in degrees")
 @moving_options
-@click.option("-f", "--format", "form", type=click.Choice(FORMS),
+@option("-f", "--format", "form", type=click.Choice(FORMS),
               help="form of the picture  [default: by the suffix of --output, else text]")
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
-@click.option("--force", is_flag=True, help="let --output replace an existing file")
-@click.option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
-@click.option("--sliders", is_flag=True, help="a slider for each joint of a URDF robot, on its page")
-@click.option("--open", "opens", is_flag=True, help="show the page in the browser")
+@option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
+@option("--force", requires=("output",), is_flag=True, help="let --output replace an existing file")
+@option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
+@option("--sliders", excludes=("overlay",), is_flag=True, help="a slider for each joint of a URDF robot, on its page")
+@option("--open", "opens", is_flag=True, help="show the page in the browser")
 @color_option
-def command(
-    tree: str, target: str | None, source: str | None, more: Sequence[str], eye: Eye, form: str | None,
-    output: str | None, force: bool, opens: bool, overlay: bool, sliders: bool, color: str, **options: Any,
-) -> None:  # fmt: skip
+def command(inputs: Inputs) -> None:
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
     \b
@@ -76,45 +73,48 @@ def command(
     from TARGET in every notation, play what moves. TREE is a file, a recording, - for standard input, or . for the
     file that FRAMETOOL_TREE names.
     """
-    chosen = _form(form, output, opens=opens)
-    if chosen != "text" or output is not None:
-        refuse_unused("is for a picture in the terminal", "color")
-    if chosen == "glb":
-        refuse_unused("is not used: GLB is seen from all sides", "eye")
-    refuse_existing(output, force=force)
+    tree, target, source, output = inputs.tree, inputs.target, inputs.source, inputs.output
+    chosen = _form(inputs.form, output, opens=inputs.opens)
+    refuse_existing(output, force=inputs.force)
     if chosen == "png":
         from frametool.view.pictures import require_matplotlib
 
         require_matplotlib()
+    overlay, sliders, eye = inputs.overlay, inputs.sliders, inputs.peek("eye")
+    if chosen != "glb":  # which is seen from all sides
+        inputs.ask("eye")
     if overlay and (source or not target):
         raise click.UsageError("--overlay takes two trees: frametool view AFTER BEFORE --overlay")
-    if options["path_only"] and not (target and source):
+    if inputs.path_only and not (target and source):
         raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
-    if sliders and (chosen != "html" or tree == "-" or overlay):
+    if sliders and (chosen != "html" or tree == "-"):
         raise click.UsageError("--sliders move the joints of a robot on a page: give a file, and -o FILE.html")
-    frames = load_tree(tree, more, rules_of(options))
+    frames = load_tree(tree, inputs.more, rules(inputs))
     from frametool.view.frame_scene import FrameScene
 
-    stamp_ns, ends = at_ns(options.pop("at")), {} if overlay else {"target": target, "source": source}
-    names = ends | {"fixed": options["fixed"], "below": options["below"]}
-    options |= {key: name and frame_name(name, frames) for key, name in names.items()}
-    scene = FrameScene(frames, at_ns=stamp_ns, **options)
+    ends = {} if overlay else {"target": target, "source": source}
+    names = ends | {"fixed": inputs.fixed, "below": inputs.below}
+    named: Any = {key: name and frame_name(name, frames) for key, name in names.items()}
+    scene = FrameScene(frames, at_ns=at_ns(inputs.at), only=inputs.only, path_only=inputs.path_only, **named)
     gone = [name for name, track in scene.tracks.items() if not track.covers(scene.at_ns or 0)]
     if gone and chosen != "html":  # which goes to the nearest time
         say(f"note: no data of {listing(gone, 5)} at {format_stamp(scene.at_ns or 0)}: not drawn, nor what hangs there")
     before = None
     if overlay:
         before = FrameScene(load_tree(str(target)), at_ns=scene.at_ns, fixed=scene.fixed, ground=scene.ground)
-    if chosen == "text" and output is None and sys.stdout.isatty():
-        from frametool.view.terminal import print_terminal
+    if chosen == "text" and output is None:
+        color = inputs.color
+        if sys.stdout.isatty():
+            from frametool.view.terminal import print_terminal
 
-        print_terminal(scene, eye, color)
-        return
+            print_terminal(scene, eye, color)
+            return
+    inputs.refuse_idle()
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
-    path = _page_file(tree) if opens and output is None else output
-    with writing(path, force=force or output is None) as write:
+    path = _page_file(tree) if inputs.opens and output is None else output
+    with writing(path, force=inputs.force or output is None) as write:
         write(content)
-    if opens and path:
+    if inputs.opens and path:
         import webbrowser
         from pathlib import Path
 
