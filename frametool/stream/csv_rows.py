@@ -68,8 +68,8 @@ def _cells(batch: Batch, value: Any, style: Style) -> Spans:
     if leaf is None:
         return _words([value], size)
     node, found = batch.leaf(int(leaf[1]))
-    is_null = np.bool_(0) if node.quote else found.data[found.starts] == ord("n")
-    if not (_is_split(found) | is_null).any():
+    is_odd = _is_split(found) if node.quote else found.data[found.starts] == ord("n")  # it may be null
+    if not is_odd.any():
         return found
     return _words(plain_texts(batch, int(leaf[1])), size)
 
