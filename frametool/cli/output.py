@@ -211,7 +211,7 @@ class Output:
             self.pieces(self._blocks(iter(values)))
             return
         if self.style.form == "csv":
-            self.text(self._module("").write_values(values, self.style))
+            self.text(self._module("").write_poses(values, self.style))
             return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]

@@ -70,6 +70,7 @@ _WORDS = frozenset(
 COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
 TOLD = DESCRIPTIVE - {"frame"}  # whatever a number under these is, it tells of a result; null may be another record
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
+MOST_NAMES = 1 << 16  # of frames, kept in mind
 MOST_LEAVES = 2000
 """Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
 
@@ -233,6 +234,8 @@ class Template:
     def named(self, at: int, names: Names) -> Named | None:
         """Return the frames of the result of an entry that names these frames; None where that is to be read anew."""
         if (at, names) not in self._named:
+            if len(self._named) > MOST_NAMES:
+                self._named.clear()
             self._named[at, names] = self._find_named(at, names)
         return self._named[at, names]
 

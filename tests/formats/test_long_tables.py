@@ -35,7 +35,7 @@ def table(values: list[Any], most: int) -> str:
 @pytest.mark.parametrize("few", [1, 2, 4])
 @pytest.mark.parametrize("values", SEQUENCES)
 def test_rows_that_wait_are_the_table_of_all_at_once(values: list[Any], few: int, sizes: Sizes) -> None:
-    at_once = csv.write_values(values, STYLE)
+    at_once = csv.write_poses(values, STYLE)
     assert table(values, few) == at_once
     sizes(table=few)
     assert table(values, few) == at_once

@@ -26,14 +26,12 @@ SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")
 
 
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return a header and one row a result."""
-    return _table([_pose_cells(result, style) for result in results], style)
+def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
+    """Return a header and one row a result; a point's coordinates are x, y, z."""
+    return _table([cells_of(each, style) for each in results], style)
 
 
-def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return a header and one row a record; a point's coordinates are x, y, z."""
-    return _table([dict(_record_cells(record)) for record in records], style)
+write_points = write_poses
 
 
 def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
@@ -87,11 +85,6 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
     """Return the cells of a result by column name."""
     return _pose_cells(value, style) if isinstance(value, Result) else dict(_record_cells(value))
-
-
-def write_values(values: Iterable[Result | dict[str, Any]], style: Style) -> str:
-    """Return a header and one row a result, whatever they are."""
-    return _table([cells_of(each, style) for each in values], style)
 
 
 def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
