@@ -46,6 +46,7 @@ QUATERNIONS = ((notation("quaternion"), False),)
 NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
            0.7416198487095663)  # fmt: skip
 STAMP_NS = 1234567890987654321
+MOST_ENTRIES = 8  # points or poses of a record: each is looked at for itself
 PARENT, NAME = "@@parent@@", "@@name@@"
 LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
 
@@ -175,6 +176,8 @@ class RecordRows:
 
     def _plan(self, template: Template) -> tuple[Plan, list[Marked]] | None:
         """Plan the records of a template; None where they are not simple."""
+        if len(template.entries) > MOST_ENTRIES:
+            return None
         if not template.regular or len({entry.record.path for entry in template.entries}) < len(template.entries):
             return None
         targets, found = [], []

@@ -117,9 +117,14 @@ class Template:
         self._request = request
         cuts, patterns = self._cuts()
         self.stretches, pieces = cut(len(text), sorted(cuts), edits)
-        known = [node.start for node in chain(*self._frame_nodes) if node is not None]
+        self._frames_at: dict[int, tuple[int, int, Node]] = {}
+        for number, nodes in enumerate(self._frame_nodes):
+            for role, node in enumerate(nodes):
+                if node is not None:
+                    self._frames_at.setdefault(node.start, (number, role, node))
         self.pieces = [
-            Const(each.text) if isinstance(each, Renamed) and each.at not in known else each for each in pieces
+            Const(each.text) if isinstance(each, Renamed) and each.at not in self._frames_at else each
+            for each in pieces
         ]
         at = dict(zip(self.stretches, count(), strict=False))
         self._patterns = {at[span]: pattern for span, pattern in patterns.items()}
@@ -279,12 +284,7 @@ class Template:
 
     def renamed(self, piece: Renamed) -> tuple[int, int, Node]:
         """Return whose name a piece is: of which entry, whether its parent or its name, and where that was read."""
-        return next(
-            (at, role, node)
-            for at, nodes in enumerate(self._frame_nodes)
-            for role, node in enumerate(nodes)
-            if node is not None and node.start == piece.at
-        )
+        return self._frames_at[piece.at]
 
     @cached_property
     def expression(self) -> bytes:
