@@ -5,9 +5,10 @@ Code reads them here as `sizes.BLOCK` when a run begins, so that a test can set 
 
 BLOCK = 1 << 19  # bytes of a stream of lines
 RECORD = 1 << 26  # bytes of the longest row or record in such a stream: a longer one is refused
-FEW = 16  # records of a whole stream: up to so many are computed one by one, without numpy
+SMALL = 1 << 14  # bytes of records that may be few
+FEW = 64  # records of a whole stream: up to so many are computed one by one, without numpy
 LEARNED = 64  # records from which those written alike are learned, to compute them together; 0: each one alone
-TABLE = 1 << 13  # rows of a table of results that is put together in memory; a longer one waits in a file
+TABLE = 1 << 24  # bytes of a table of results that waits in memory until its columns are known; a longer one in a file
 TYPED = 1 << 18  # rows whose cells say what the types of columns are
 GROUP = 3 << 26  # bytes of a group of rows in a file of columns that is held as a whole, four times in all: below 1 GB
 PIECE = 1 << 20  # bytes of a file of documents that are read at once

@@ -9,7 +9,7 @@ import os
 import re
 import sys
 from importlib import import_module
-from itertools import islice
+from itertools import chain, islice
 from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames, FrameTree
     from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
+    from frametool.stream.record_results import Rows
     from frametool.stream.request import Operation
     from frametool.stream.row_poses import RowPoses
     from frametool.view.pictures import Picture
@@ -204,7 +205,7 @@ class Output:
             self.pieces(self._blocks(iter(values)))
             return
         if self.style.form == "csv":
-            self.pieces(self._module("").table_pieces(iter(values), self.style))
+            self.text(self._module("").write_poses(values, self.style))
             return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
@@ -212,6 +213,15 @@ class Output:
             self.poses(poses)
         else:
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
+
+    def rows(self, blocks: Iterator[Rows]) -> None:
+        """Write the results of a stream of records, block by block where the form has rows."""
+        if self.style.form == "csv":
+            from frametool.stream.csv_table import CsvTable
+
+            self.pieces(CsvTable(self.style).pieces(blocks))
+            return
+        self.values(chain.from_iterable(block.in_order() for block in blocks))
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""

@@ -331,7 +331,7 @@ class Stream:
 
     def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
         """Write the results of records in another form than theirs."""
-        from frametool.stream.record_results import stream_results
+        from frametool.stream.record_results import stream_rows
 
         if self.inputs.on_error == NULL and output.told not in ("csv", *RECORDS):
             raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
@@ -339,7 +339,7 @@ class Stream:
         request = request._replace(by_default=has_no_text(output.told or "") and not output.notations)
         if is_recording(output.told or ""):
             request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
-        output.values(_then_closed(self.opened(), stream_results(stream, form, request, output.style, bad)))
+        output.rows(_then_closed(self.opened(), stream_rows(stream, form, request, output.style, bad)))
         return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:

@@ -64,10 +64,10 @@ class Plan(NamedTuple):
 
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
-    edge_of: the pose that moves a row, by the name of its frame; edges: those that move each shape
+    edge_of: the pose that moves a row, or one of its shapes, by the name of the frame it is given in
     words: reads the numbers that are words of a table, by column: zones; marked: angles that are no plain number
     beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
-    timed: those that do so in time; sources: the frame each shape is then given in, where rows do not say theirs
+    timed: those that do so in time; source: the frame that rows are given in, whatever they name
     remedies: for each shape, what to do where its angles are degrees
     offset_ns: what is added to the stamps of rows; window: the first and the last that are left
     yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
@@ -85,9 +85,8 @@ class Plan(NamedTuple):
     on_error: str = STOP
     unwrap: bool = False
     yaml: bool = False
-    edges: tuple[Rigid | None, ...] = ()
     timed: Timed | None = None
-    sources: tuple[str | None, ...] = ()
+    source: str = ""
     frame_column: str = ""
     beside: str = ""
     gathered: Gathered | None = None
@@ -237,23 +236,30 @@ class Run:
 
     def _movers(self) -> list[Rigid | None]:
         """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
-        plan, block = self.plan, self.block
-        shapes = max(len(plan.shapes), 1)
+        plan, block, shapes = self.plan, self.block, max(len(self.plan.shapes), 1)
         if plan.operation.formula is not None:
             return [None] * shapes
+        sources = [[plan.source]] if plan.source else block.sources
+        edges = list(map(self._edge, sources)) or [None] * shapes
         if plan.timed is not None and self.count:
-            frames: list[Sequence[str | None]] = [[source] for source in plan.sources] or [block.frames or [None]]
+            frames = sources or [block.frames or [None]]
             if block.times is not None:
                 return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
-            edges = (plan.edges or [None] * shapes)[: len(block.stamps)]
             movers = [  # the rows of a table have one stamp for all their points
                 by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
-                for stamps, names, edge in zip(block.stamps, frames, edges, strict=True)
+                for stamps, names, edge in zip(block.stamps, frames, edges[: len(block.stamps)], strict=True)
             ]
             return movers * (shapes // len(movers))
-        if plan.edge_of is not None and self.count:
+        if plan.edge_of is not None and self.count and not sources:
             return [by_frame(plan.edge_of, block.frames, self._blame, plan.frame_column)] * shapes
-        return list(plan.edges) or [None] * shapes
+        return edges
+
+    def _edge(self, frames: Sequence[str | None]) -> Rigid | None:
+        """Return the pose that moves one of the shapes of the rows, by the frames that it is given in."""
+        edge_of = self.plan.edge_of
+        if edge_of is None or not self.count:
+            return None
+        return edge_of(frames[0]) if len(frames) == 1 else by_frame(edge_of, frames, self._blame)
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""

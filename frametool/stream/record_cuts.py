@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import chain
+from itertools import accumulate, chain, count
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,8 +12,9 @@ from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_text import attempt, column_in
 from frametool.stream.rows import Block
+from frametool.stream.splice import quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part
-from frametool.stream.text_parts import In
+from frametool.stream.text_parts import In, Renamed
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from frametool.stream.request import Request
     from frametool.stream.splitter import Splitter
-    from frametool.stream.template import Template
+    from frametool.stream.template import Names, Template
     from frametool.text.spans import Bytes, Ints
 
     Places: TypeAlias = Sequence[tuple[int, int]]
@@ -95,6 +96,8 @@ class RecordCutter:
         if self.splitter.layout in (LINES, DOCUMENTS) and is_text(text):
             rest = self._cut(text, rest, self.templates[-MOST_TRIED:][::-1], found.cuts)
             rest = self._learn_and_cut(text, rest, found.cuts)
+            found.cuts, strays = _without_strays(found.cuts, text)
+            rest = sorted(rest + strays)
         return found, rest
 
     def _learn_and_cut(self, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
@@ -138,7 +141,7 @@ class RecordCutter:
         def match(at: int) -> int | None:
             """Match the template used last, which most records follow."""
             hit = self.templates[-1].pattern.match(chunk, at) if self.templates and clean else None
-            if hit is None:
+            if hit is None or not self.templates[-1].fits_in(chunk, hit.regs[1:]):
                 return None
             matches[at] = self.templates[-1], hit.regs[1:]
             return hit.end()
@@ -159,13 +162,18 @@ class RecordCutter:
             return self.match(text, part.start, part.end)
         return learned, [(begin + part.start, end + part.start) for begin, end in learned.places()]
 
+    def learned(self, text: bytes, part: Part) -> tuple[Template, Places] | None:
+        """Learn from a record; return the template, and where its stretches stand in it."""
+        found = self.learn(text, part)
+        return None if isinstance(found, (Fault, bytes)) else self.own_places(found, text, part)
+
     def match(self, text: bytes, begin: int, stop: int) -> tuple[Template, Places] | None:
         """Find the template that a record follows."""
         if not is_text(text[begin:stop]):
             return None
         for template in reversed(self.templates):
             found = template.pattern.fullmatch(text, begin, stop)
-            if found is not None:
+            if found is not None and template.fits_in(text, found.regs[1:]):
                 return template, found.regs[1:]
         return None
 
@@ -200,21 +208,64 @@ def block_of(cut: Cut, data: Bytes, text: bytes) -> Block:
         return text.count(b"\n", 0, start), str(column_in(text, start))
 
     stamps = [tuple(without_quotes(parts[index]) for index in each) for each in template.stamps]
+    frames = [names_of(cut, at, text) for at in range(len(template.entries))]
+    sources = [[parent for parent, _ in each] for each in frames]
+    renamed = [piece for piece in template.pieces if isinstance(piece, Renamed)]
+    parts += [_renamed(template, piece, frames, len(starts)) for piece in renamed]
     numbers = _numbers(template, data, starts, ends)
-    return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps, place_of=place_of)
+    return Block(numbers, parts, cut.starts[:, -1], line_of, stamps=stamps, sources=sources, place_of=place_of)
+
+
+def names_of(cut: Cut, at: int, text: bytes) -> list[Names]:
+    """Return the frames that an entry of each record names, parent and name; one pair where all name the same."""
+    record = cut.template.entries[at].record
+    columns: list[list[str | None]] = []
+    for index, known in zip(cut.template.frames[at], (record.parent.text, record.name.text), strict=True):
+        columns.append([known] if index is None else _texts(text, cut.starts[:, index], cut.ends[:, index]))
+    size = max(map(len, columns))
+    parents, names = (each if len(each) == size else each * size for each in columns)
+    return [*zip(parents, names, strict=True)]
+
+
+def _texts(text: bytes, starts: Ints, ends: Ints) -> list[str | None]:
+    """Return texts, one a record, or the one that all have."""
+    size = ends[0] - starts[0]
+    if (ends - starts == size).all():
+        found = np.frombuffer(text, np.uint8)[starts[:, None] + np.arange(size)]
+        if (found == found[0]).all():
+            return [text[starts[0] : ends[0]].decode()]
+    texts = [text[start:end] for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
+    known = {each: each.decode() for each in {*texts}}
+    return [known[each] for each in texts]
+
+
+def _renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names]], rows: int) -> Spans:
+    """Return the names of frames as results have them."""
+    at, role, node = template.renamed(piece)
+    texts = {}
+    for each in {*frames[at]}:
+        named = template.named(at, each)
+        name = None if named is None else named.names[role]
+        texts[each] = quoted_name(node, name or "", json=template.json).encode()
+    stops = dict(zip(texts, accumulate(map(len, texts.values())), strict=True))
+    ends = np.array([stops[each] for each in frames[at]], np.int64) + MARGIN
+    starts = ends - np.array([len(texts[each]) for each in frames[at]], np.int64)
+    return Spans(framed(b"".join(texts.values())), np.resize(starts, rows), np.resize(ends, rows))
 
 
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     """Say what is done to the records of one template."""
     after = len(template.stretches)
+    renamed = count(after + 2)
+    pieces = [In(next(renamed)) if isinstance(each, Renamed) else each for each in template.pieces]
     plan = Plan(
         template.shapes,
         tuple(entry.target for entry in template.entries),
         request.operation,
-        (In(after + 1), *template.pieces, In(after)),
+        (In(after + 1), *pieces, In(after)),
         template.names,
         b"null",
-        edges=tuple(entry.edge for entry in template.entries),
+        edge_of=request.pose_from_frame if any(entry.edge is not None for entry in template.entries) else None,
     )
     return plan._replace(
         normalize=request.normalize,
@@ -229,7 +280,6 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
         remedies=tuple(
             KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in template.entries
         ),
-        sources=tuple(entry.record.parent.text for entry in template.entries),
     )
 
 
@@ -261,6 +311,23 @@ def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | Non
     begins, stops = starts[rows].reshape(shape)[:, 1:], ends[rows].reshape(shape)[:, 1:]
     first = begins[:, :1]  # nothing stands before a record
     return Cut(template, np.concatenate([begins, first], axis=1), np.concatenate([stops, first], axis=1)), gaps
+
+
+def _without_strays(cuts: Sequence[Cut], text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
+    """Leave out records whose frames are called so that their results are written otherwise; return where these are."""
+    found: list[Cut] = []
+    strays: list[tuple[int, int]] = []
+    for cut in cuts:
+        fits = np.ones(len(cut.starts), np.bool_)
+        for at in range(len(cut.template.entries)):
+            names = names_of(cut, at, text)
+            wrong = {each for each in {*names} if not cut.template.fits(at, each)}
+            if wrong:
+                fits &= np.resize(np.array([each not in wrong for each in names]), len(fits))
+        gone = ~fits
+        strays += zip(cut.starts[gone, 0].tolist(), cut.ends[gone, -2].tolist(), strict=True)
+        found.append(cut if fits.all() else Cut(cut.template, cut.starts[fits], cut.ends[fits]))
+    return [cut for cut in found if len(cut.starts)], strays
 
 
 def _as_cut(template: Template, spans: Sequence[Places]) -> Cut:

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from frametool.stream.splitter import Part
     from frametool.text.lines import ByteStream
 
-SMALL = 1 << 14  # bytes of a stream that may be few records
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
 
 
@@ -44,7 +43,7 @@ def _outcomes(
     if first is None:
         return
     second: bytes | None = b""
-    if len(first) < SMALL and _has_ended(stream):
+    if len(first) < sizes.SMALL and _has_ended(stream):
         try:
             second = next(blocks, None)
         except FormatError as error:  # comes behind the results of what is whole

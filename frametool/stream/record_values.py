@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 SIX_BY_SIX = 36  # entries of the covariance of a pose
+ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
 LOST = "lost"  # rule of frames that results cannot name
 MOST_TOLD = 3  # of what is odd by one rule in one text
 
@@ -68,7 +69,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     for document, records in documents(source, request):
         for record in records:
             poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(document, record, source)))
-            unit = _unit(record, document.value)
+            unit = unit_of(record, document.value)
             if not _says_no_more(record, document, unit):
                 nodes = nodes or parse_nodes(source.text)
                 beside.update(_header_stamp(record), _rest(_at(nodes, unit), unit, record))
@@ -80,7 +81,7 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
 def stamp_of(document: Document, record: Record, source: Source) -> int | None:
     """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
     own = value_at(document.value, record.path[1:])
-    key = _stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""
+    key = stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""
     try:
         return _read_stamp(key, own[key]) if key else record.stamp_ns
     except ValueInvalid as error:
@@ -163,15 +164,15 @@ def results(
         found = (_answer(document, entry, request, source, memory, own) for entry in entries)
         answers = [each for each in found if each is not None]
         for each in answers:
-            units.setdefault(_unit(each.entry.record, document.value), (document, []))[1].append(each)
+            units.setdefault(unit_of(each.entry.record, document.value), (document, []))[1].append(each)
         spliced.add(entries, answers)
     for unit, (document, ours) in units.items():
         if all(_says_no_more(each.entry.record, document, unit) for each in ours):
-            yield from _values(NOTHING, unit, ours, request, style, spliced)
+            yield from values_of_unit(NOTHING, unit, ours, request, style, spliced)
             continue
         nodes = nodes or parse_nodes(source.text)
         try:
-            yield from _values(_at(nodes, unit), unit, ours, request, style, spliced)
+            yield from values_of_unit(_at(nodes, unit), unit, ours, request, style, spliced)
         except Aliased as error:
             raise error.in_text(source.text) from None
     if teller is None:
@@ -180,7 +181,7 @@ def results(
         raise FormatError("nothing in it", source=source.name)
 
 
-def _unit(record: Record, document: Any) -> Path:
+def unit_of(record: Record, document: Any) -> Path:
     """Return the path of the thing that a record's result is: the document, or an item of the list it is."""
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
 
@@ -264,8 +265,8 @@ def _is_json(source: Source) -> bool:
         return False
 
 
-def _values(
-    node: Node, unit: Path, answers: list[Answer], request: Request, style: Style, spliced: _Spliced
+def values_of_unit(
+    node: Node, unit: Path, answers: list[Answer], request: Request, style: Style, spliced: Any
 ) -> Iterator[Value]:
     """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
     inside = any(type(step) is str for each in answers for step in each.entry.record.path[len(unit) :])
@@ -343,7 +344,7 @@ def with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
 
     Raises ValueInvalid for what is no time.
     """
-    key = _stamp_key(extras)
+    key = stamp_key(extras)
     is_spelled = form in SPELLED and (form != "csv" or type(extras[key]) is not dict) if key else False
     if not key or (key != "stamp_ns" and is_spelled):
         return extras
@@ -354,13 +355,13 @@ def at_time(value: Value, timed: dict[str, Any]) -> Value:
     """Return a result with a stamp, or without any; its own stays as it is written if there is to be one."""
     if not isinstance(value, Result):
         return value
-    key = _stamp_key(value.extras)
+    key = stamp_key(value.extras)
     if key and timed:
         return value
     return type(value)(value.pose, timed | {name: each for name, each in value.extras.items() if name != key})
 
 
-def _stamp_key(members: dict[str, Any]) -> str:
+def stamp_key(members: dict[str, Any]) -> str:
     """Return the key of a mapping's own stamp, "" where there is none."""
     keys = [key for key, value in members.items() if value is not None and type(value) is not list]
     at = None if "stamp_ns" in keys else stamp_column(keys)

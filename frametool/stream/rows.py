@@ -48,6 +48,7 @@ class Block(NamedTuple):
     lost: the first row whose result cannot name a frame, and that frame
     values, times: (n, c) and (n,) the numbers and the stamps in nanoseconds themselves, where they are no text
     weights: (n,) the numbers beside them, where they are no text
+    sources: for each shape the name of the frame each row is given in, or one for all
     place_of: line, from 0, and column, from 1, of one of a row's numbers, where columns have no names
     """
 
@@ -65,6 +66,7 @@ class Block(NamedTuple):
     times: Ints | None = None
     weights: Floats | None = None
     place_of: Callable[[int, int], tuple[int, str]] | None = None
+    sources: Sequence[Sequence[str | None]] = ()
 
 
 def number_spans(values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False) -> Spans:

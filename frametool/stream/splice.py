@@ -17,7 +17,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
-from frametool.stream.text_parts import Const, IfLocked, Out, Word
+from frametool.stream.text_parts import Const, IfLocked, Out, Renamed, Word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -288,17 +288,8 @@ class Splicer:
                 self.dropped.add(str(path[-1]))
             else:
                 node = self.root.at(path)
-                self.edits.append(Edit(node.start, node.end, (Const(self._quoted_as(node, new or "").encode()),)))
-
-    def _quoted_as(self, node: Node, name: str) -> str:
-        """Write a frame's name with the quotes that the one before it had."""
-        if node.quote == "'":
-            return "'" + name.replace("'", "''") + "'"
-        if node.quote != '"' or not node.value:
-            return self._text(name) if name or self.json else "''"
-        from frametool.documents.json import dump
-
-        return dump(name)
+                text = quoted_name(node, new or "", json=self.json).encode()
+                self.edits.append(Edit(node.start, node.end, (Renamed(node.start, text),)))
 
     def _has_swapped(self, name: str | None, parent: str | None) -> bool:
         """Call the one frame there is by the other key, where that is all that changes."""
@@ -393,6 +384,17 @@ class Splicer:
             else:
                 end = members[index + 1][1][0].start if index + 1 < len(members) else value.end
                 self.edits.append(Edit(key_node.start, end, ()))
+
+
+def quoted_name(node: Node, name: str, *, json: bool) -> str:
+    """Write a frame's name with the quotes that the one before it had."""
+    if node.quote == "'":
+        return "'" + name.replace("'", "''") + "'"
+    if not json and (node.quote != '"' or not node.value):
+        return quoted(name) if name else "''"
+    from frametool.documents.json import dump
+
+    return dump(name)
 
 
 def root_of_extras(root: Node, record: Record) -> Node:

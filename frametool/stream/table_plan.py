@@ -82,11 +82,10 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         frames = ((table.names or ()).index(PARENT_KEYS[0]),)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
-    edge_of = None if on_earth else request.pose_of_row_frame
+    edge_of = request.pose_from_frame if on_earth else request.pose_of_row_frame
     if frames and edge_of is None and request.operation.moves and not on_earth:
         edge_of = request.pose_from_frame
     words, marked = readers_of(shapes[0]) if on_earth else ({}, {})
-    edges = (request.pose_from_frame(EARTH_FRAMES[0]),) if on_earth and request.pose_from_frame else ()
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
     poses = [_written(pose) for pose in poses] if on_earth else poses
@@ -105,7 +104,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
         timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
-        edges=edges, sources=EARTH_FRAMES[:1] if on_earth else (),
+        source=EARTH_FRAMES[0] if on_earth else "",
         frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
         window=request.window, words=words, marked=marked,
     ), layout  # fmt: skip

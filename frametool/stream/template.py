@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from itertools import accumulate, islice, pairwise
-from typing import TYPE_CHECKING
+from itertools import accumulate, chain, count, islice
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.documents.document import Aliased, Document, Node, parse_documents, parse_nodes
 from frametool.documents.json import JSON_NUMBER, strict_json
 from frametool.documents.source import Source, check_text
-from frametool.errors import FormatError
+from frametool.errors import FormatError, FrametoolError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
@@ -23,10 +23,10 @@ from frametool.stream.faults import RowNote
 from frametool.stream.record import POINT_KEYS, STALE
 from frametool.stream.row_layout import PARTS, POSE
 from frametool.stream.splice import OURS, Splicer
-from frametool.stream.text_parts import Const, IfLocked, In, Out, Word
+from frametool.stream.text_parts import Const, IfLocked, In, Out, Renamed, Word
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from frametool.errors import Finding
     from frametool.grammar.readers import Path
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from frametool.stream.splice import Edit
     from frametool.stream.stamp_source import Timed
     from frametool.stream.text_parts import Piece
+
+    Names: TypeAlias = tuple[str | None, str | None]
+    Span: TypeAlias = tuple[int, int]
 
 # what a number looks like: JSON's is exact, YAML's is judged when it is read
 YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
@@ -49,6 +52,12 @@ FREE = {
     (False, True): r'"[^"\\\x00-\x1f]*"',
     (False, False): YAML_PLAIN,
 }
+FRAME = {
+    (True, '"'): r'[^"\\\x00-\x1f]+',
+    (False, '"'): r'[^"\\\x00-\x1f]+',
+    (False, "'"): r"[^'\x00-\x1f]+",
+    (False, ""): rf"(?!(?:null|Null|NULL)\b){YAML_PLAIN}",
+}
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
 NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
@@ -59,23 +68,32 @@ DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME
 _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
 )  # fmt: skip
+COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
 TOLD = DESCRIPTIVE - {"frame"}  # whatever a number under these is, it tells of a result; null may be another record
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
+MOST_NAMES = 1 << 16  # of frames, kept in mind
 MOST_LEAVES = 2000
 """Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
+
+
+class Named(NamedTuple):
+    """The frames of a result, and all else that their names decide about its text."""
+
+    names: Names
+    decides: tuple[Any, ...]
 
 
 class Template:
     """The text of records, and what holds for all that are written alike.
 
     stretches: where each part of the text stands
-    numbers: the stretches that hold our numbers, in order; known: those that -1 would make another record
+    numbers: the stretches that hold our numbers, in order; regular: whether all of them are written plainly
     stamps: the stretches of each entry's stamp
+    frames: the stretches of the names of each entry's frames, parent and name; None where they are the same in all
     pieces: what the result is made of
     notes: what is worth telling about all of them; own_notes: about the record that was learned alone
     of_places: those of them that hold for all
-    header, rest: of a result that is written anew, the stretches of its header's stamp and of what else is said, by
-    key; says_apart: where none of them is in another one
+    leaves: of what is written anew, the scalars that decide nothing: the stretch of each, and where it was learned
     """
 
     def __init__(
@@ -98,27 +116,60 @@ class Template:
         self.of_places = [RowNote(0, each.rule, each.message) for each in notes if each.rule in OF_PLACES]
         self._root = root
         self._request = request
-        slots = [_inside(root, path) for entry in entries for path in entry.record.numbers]
-        known = {_inside(root, path) for entry in entries for path in entry.record.known}
-        held = [[root.at(path) for path in entry.stamp] for entry in entries]
-        stamps = [[(node.start, node.end) for node in each] for each in held]
-        number = re.compile(JSON_NUMBER if json else YAML_NUMBER)
-        self.regular = all(slot is not None and number.fullmatch(text, *slot) for slot in slots)
-        self.values = tuple(value for entry in entries for value in entry.record.values)
-        cuts = {*(slot for slot in slots if slot is not None), *(span for spans in stamps for span in spans)}
-        header, rest = _said_beside(root, entries) if request.canonical else ([], {})
-        more = {(node.start, node.end) for node in (*header, *rest.values())}
-        self.says_apart = all(end <= start for (_, end), (start, _) in pairwise(sorted(cuts | more)))
-        cuts |= more if self.says_apart else set()
-        self.stretches, self.pieces = cut(len(text), sorted(cuts), edits)
-        at = {stretch: index for index, stretch in enumerate(self.stretches)}
-        self.numbers = tuple(at[slot] for slot in slots if slot is not None)
-        self.known = {at[slot] for slot in known if slot is not None}
-        self.stamps = tuple(tuple(at[span] for span in spans) for spans in stamps)
-        self.header = [at[node.start, node.end] for node in header if self.says_apart]
-        self.rest = {key: (at[node.start, node.end], node) for key, node in rest.items() if self.says_apart}
-        first = min((slot[0] for slot in slots if slot is not None), default=0)
-        self.line = text.count("\n", 0, first)
+        cuts, patterns = self._cuts()
+        self.stretches, pieces = cut(len(text), sorted(cuts), edits)
+        self._frames_at: dict[int, tuple[int, int, Node]] = {}
+        for number, nodes in enumerate(self._frame_nodes):
+            for role, node in enumerate(nodes):
+                if node is not None:
+                    self._frames_at.setdefault(node.start, (number, role, node))
+        self.pieces = [
+            Const(each.text) if isinstance(each, Renamed) and each.at not in self._frames_at else each
+            for each in pieces
+        ]
+        at = dict(zip(self.stretches, count(), strict=False))
+        self._patterns = {at[span]: pattern for span, pattern in patterns.items()}
+        self.numbers = tuple(map(at.__getitem__, self._numbers))
+        self.stamps = tuple(tuple(map(at.__getitem__, spans)) for spans in self._stamps)
+        self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in self._frame_nodes]
+        self.leaves = tuple((at[span], node) for span, node in self._leaf_nodes)
+        self._named: dict[tuple[int, Names], Named | None] = {}
+        self.line = text.count("\n", 0, min(self._numbers, default=(0, 0))[0])
+
+    def _cuts(self) -> tuple[set[Span], dict[Span, str]]:
+        """Return where numbers, stamps, names and what else is read stand, and what else may stand there."""
+        text, root = self.text, self._root
+        number = JSON_NUMBER if self.json else YAML_NUMBER
+        is_number = re.compile(number).fullmatch
+        self.regular = True
+        self._numbers: list[Span] = []
+        self._stamps: list[list[Span]] = []
+        self._frame_nodes: list[tuple[Node | None, Node | None]] = []
+        patterns: dict[Span, str] = {}
+        values: list[float] = []
+        for entry in self.entries:
+            record = entry.record
+            values += record.values
+            for path in record.numbers:
+                span = None if path is None else _text_of(root.at(path))
+                self.regular = self.regular and span is not None and is_number(text, *span) is not None
+                if span is not None:
+                    self._numbers.append(span)
+                    patterns[span] = NOT_UNKNOWN * (path in record.known) + number
+            stamp = [root.at(path) for path in entry.stamp]
+            self._stamps.append([(node.start, node.end) for node in stamp])
+            nodes = _frames_of(root, record, self._request, json=self.json)
+            self._frame_nodes.append(nodes)
+        self.values = tuple(values)
+        cuts = {*self._numbers, *chain(*self._stamps)}
+        patterns = patterns if self.regular else {}
+        for node in chain(*self._frame_nodes):
+            if node is not None:
+                patterns[_text_of(node)] = FRAME[self.json, node.quote]
+        cuts.update(patterns)
+        self._leaf_nodes = self._cut_leaves(cuts, patterns) if self._request.canonical else []
+        cuts.update(patterns)
+        return cuts, patterns
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -186,17 +237,65 @@ class Template:
         """Return the text of the result."""
         return filled(self.pieces, self.segments(), numbers, locked=locked)
 
+    def named(self, at: int, names: Names) -> Named | None:
+        """Return the frames of the result of an entry that names these frames; None where that is to be read anew."""
+        if (at, names) not in self._named:
+            if len(self._named) > MOST_NAMES:
+                self._named.clear()
+            self._named[at, names] = self._find_named(at, names)
+        return self._named[at, names]
+
+    def _find_named(self, at: int, names: Names) -> Named | None:
+        entry, request, timed = self.entries[at], self._request, self._request.timed
+        record = entry.record
+        asked = request.for_kind(record.shape.kind)
+        if any(path[-1] == "frame" and request.counts(names[0] or "") for path in record.parent.paths):
+            return None
+        try:
+            new = names if asked.rename is None else asked.rename(*names)
+            if entry.edge is not None and request.pose_from_frame is not None:
+                request.pose_from_frame(names[0])
+            is_timed = timed is not None and not timed.name and timed.moves(names[0])
+        except FrametoolError:
+            return None
+        free = [node is not None for node in self._frame_nodes[at]]
+        known = (
+            (name == old, name == other, not name) if is_free else (name,)
+            for name, old, other, is_free in zip(new, names, names[::-1], free, strict=True)
+        )
+        return Named(new, (is_timed, *known))
+
+    def fits(self, at: int, names: Names) -> bool:
+        """Return True if the text around these frames is that of the ones that were learned."""
+        record = self.entries[at].record
+        named, own = self.named(at, names), self.named(at, (record.parent.text, record.name.text))
+        return named is not None and own is not None and named.decides == own.decides
+
+    def fits_in(self, text: bytes, places: Sequence[tuple[int, int]]) -> bool:
+        """Return True if the frames that a record names fit; places: where its stretches are."""
+        for at, (entry, found) in enumerate(zip(self.entries, self.frames, strict=True)):
+            known = entry.record.parent.text, entry.record.name.text
+            parent, name = (
+                old if index is None else text[slice(*places[index])].decode()
+                for old, index in zip(known, found, strict=True)
+            )
+            if not self.fits(at, (parent, name)):
+                return False
+        return True
+
+    def renamed(self, piece: Renamed) -> tuple[int, int, Node]:
+        """Return whose name a piece is: of which entry, whether its parent or its name, and where that was read."""
+        return self._frames_at[piece.at]
+
     @cached_property
     def expression(self) -> bytes:
         """Return the regular expression, one group a stretch, that all records match that are alike."""
-        number = JSON_NUMBER if self.json else YAML_NUMBER
-        ours = set(self.numbers)
-        free = iter(self._free_leaves())
+        free = iter(() if self._request.canonical else self._free_leaves())
         leaf = next(free, None)
         groups = []
         for index, (start, end) in enumerate(self.stretches):
-            if index in ours and self.regular:
-                groups.append(f"({NOT_UNKNOWN * (index in self.known)}{number})")
+            if index in self._patterns:
+                groups.append(f"({self._patterns[index]})")
                 continue
             parts, at = [], start
             while leaf is not None and leaf[0].end <= end:
@@ -208,16 +307,43 @@ class Template:
             groups.append("".join(["(", *parts, re.escape(self.text[at:end]), ")"]))
         return "".join(groups).encode()
 
+    def _cut_leaves(self, cuts: Collection[Span], patterns: dict[Span, str]) -> list[tuple[Span, Node]]:
+        """Return the scalars that decide nothing, without their quotes, and add what may stand there."""
+        found: list[tuple[Span, Node]] = []
+        for node, pattern in self._free_leaves():
+            span, quotes = (node.start, node.end), len(node.quote or "")
+            if not re.fullmatch(pattern, self.text[node.start : node.end], re.ASCII):
+                continue
+            if span not in cuts:  # else it is a stamp, which is read as it is written
+                span, pattern = (node.start + quotes, node.end - quotes), pattern[quotes : len(pattern) - quotes]  # noqa: PLW2901
+            if span[0] < span[1]:
+                found.append((span, node))
+                patterns[span] = pattern
+        return found
+
+    def stretch_of(self, path: Path) -> int:
+        """Return the stretch of a scalar that decides nothing."""
+        node = self._root.at(path)
+        return next(at for at, each in self.leaves if each.start == node.start)
+
     def _free_leaves(self) -> Iterator[tuple[Node, str]]:
         """Yield the scalars that decide nothing, in order, each with the expression of what it may be."""
-        around = {entry.record.path[:depth] for entry in self.entries for depth in range(len(entry.record.path) + 1)}
-        around |= {(*path, "header") for path in around}
-        poses = [entry.record.path for entry in self.entries if entry.record.shape.kind == POSE]
-        around |= {(*path, "scale") for path in poses}
-        words = _WORDS if poses else _WORDS - {"scale"}  # of points that is data
-        fixed = {path for entry in self.entries for path in (*entry.record.numbers, *entry.record.unknown)}
+        around: set[Path] = set()
+        fixed: set[Path | None] = set()
+        has_poses = False
+        for entry in self.entries:
+            record, depths = entry.record, range(len(entry.record.path) + 1)
+            around.update(record.path[:depth] for depth in depths)
+            around.update((*record.path[:depth], "header") for depth in depths)
+            if record.shape.kind == POSE:
+                has_poses = True
+                around.add((*record.path, "scale"))
+            fixed.update(record.numbers, record.unknown)
+        words = _WORDS if has_poses else _WORDS - {"scale"}  # of points that is data
         placed = {(*entry.record.path, key) for entry in self.entries for key in entry.record.placed}
         number = re.compile(JSON_NUMBER if self.json else YAML_NUMBER)
+        operation = self._request.operation
+        passes = operation.keeps_frames and operation.formula is None and self._request.gathered is None
         stamps = {path: STAMP[at % 2] for entry in self.entries for at, path in enumerate(entry.record.stamps)}
         for path, leaf in _leaves(self._root, ()):
             depth = next((depth for depth in range(len(path), 0, -1) if type(path[depth - 1]) is str), 0)
@@ -228,6 +354,10 @@ class Template:
                 yield leaf, f"{leaf.quote}{stamps[path]}{leaf.quote}"
             elif "sigma" in path or may_be_uncertain(key) or any(path[: len(each)] == each for each in placed):
                 continue  # they say a covariance or a place, and are no numbers of ours
+            elif passes and key == COVARIANCE and depth < len(path) and path not in fixed and number.fullmatch(
+                leaf.value
+            ):
+                yield leaf, f"{leaf.quote}{number.pattern}{leaf.quote}"
             elif key in LISTED_WORDS and depth == len(path):
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
             elif key in TOLD and depth == len(path) and path not in fixed and number.fullmatch(leaf.value):
@@ -236,15 +366,6 @@ class Template:
                 continue
             else:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
-
-
-def _said_beside(root: Node, entries: Sequence[Entry]) -> tuple[list[Node], dict[str, Node]]:
-    """Return the stamp in the header of a record that is alone in its text, and what else is said beside it."""
-    record = entries[0].record
-    if len(entries) > 1 or type(root.at(record.path[:1]).value) is not dict:
-        return [], {}
-    stamp = record.stamps[:2] if record.stamp_ns is not None else ()
-    return [root.at(path) for path in stamp], rest_of(root.at(record.path[:1]), record.path[:1], record)
 
 
 def used_keys(record: Record) -> set[str]:
@@ -300,11 +421,27 @@ def _leaves(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
         yield path, node
 
 
-def _inside(root: Node, path: Path | None) -> tuple[int, int] | None:
-    """Return where a number stands, without its quotes; None for one that is not written."""
-    if path is None:
+def _frames_of(root: Node, record: Record, request: Request, *, json: bool) -> tuple[Node | None, Node | None]:
+    """Return where the frames of a record are named, parent and name, if all that is alike may name others."""
+    is_placed = record.placed or record.shape.place or request.place or request.given_place
+    if is_placed or not request.poses:
+        return None, None
+    parent, name = (
+        root.at(each.paths[0]) if each.text and len(each.paths) == 1 else None for each in (record.parent, record.name)
+    )
+    return _as_frame(parent, json=json), _as_frame(name, json=json)
+
+
+def _as_frame(node: Node | None, *, json: bool) -> Node | None:
+    """Return the node of a frame's name if it is written as plainly as all that are alike are."""
+    if node is None or type(node.value) is not str or len(node.value) != node.end - node.start - 2 * bool(node.quote):
         return None
-    node = root.at(path)
+    pattern = FRAME.get((json, node.quote))
+    return node if pattern is not None and re.fullmatch(pattern, node.value, re.ASCII) else None
+
+
+def _text_of(node: Node) -> Span:
+    """Return where the text of a scalar stands, without its quotes."""
     return node.start + bool(node.quote), node.end - bool(node.quote)
 
 
@@ -347,7 +484,7 @@ def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str]
             shown.append(numbers[piece.first])
         elif isinstance(piece, Word):
             shown.append(piece.text(float(numbers[piece.number])).decode())
-        elif isinstance(piece, Const) or (locked and isinstance(piece, IfLocked)):
+        elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
             shown.append(piece.text.decode())
     return "".join(shown)
 
@@ -369,7 +506,7 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
         return None
     root = Node(0, len(text), parse_nodes(text))
     try:
-        edits = edits_of(text, entries, root, request, json=json)
+        edits = [] if request.canonical else edits_of(text, entries, root, request, json=json)
         return Template(text, entries, root, edits, request, notes, json=json)
     except Aliased as error:
         error.in_text(text).line += line - 1

@@ -38,6 +38,13 @@ class Instead(NamedTuple):
     new: int
 
 
+class Renamed(NamedTuple):
+    """The name of a frame in the result, in place of the one that begins at `at` in the text that was learned."""
+
+    at: int
+    text: bytes
+
+
 class Const(NamedTuple):
     """The same text in every row."""
 
@@ -50,4 +57,4 @@ class IfLocked(NamedTuple):
     text: bytes
 
 
-Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word
+Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word | Renamed

@@ -1,4 +1,4 @@
-"""Tables of results: those whose rows wait in a file are those of all rows at once."""
+"""Tables of results: those whose rows wait, block after block, are those of all rows at once."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from frametool.formats.rows import csv
 from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
+from frametool.stream.csv_table import CsvTable
+from frametool.stream.record_results import Rows
 
 if TYPE_CHECKING:
     from conftest import Sizes
@@ -24,15 +26,22 @@ SEQUENCES: list[list[Any]] = [
 ]  # fmt: skip
 
 
+def table(values: list[Any], most: int) -> str:
+    """Write values as a table, so many of them in a block."""
+    blocks = (values[first : first + most] for first in range(0, len(values), most))
+    return b"".join(CsvTable(STYLE).pieces(Rows((), [*enumerate(block)]) for block in blocks)).decode()
+
+
 @pytest.mark.parametrize("few", [1, 2, 4])
 @pytest.mark.parametrize("values", SEQUENCES)
-def test_rows_that_wait_in_a_file_are_the_table_of_all_at_once(values: list[Any], few: int, sizes: Sizes) -> None:
-    at_once = "".join(csv.table_pieces(iter(values), STYLE))
+def test_rows_that_wait_are_the_table_of_all_at_once(values: list[Any], few: int, sizes: Sizes) -> None:
+    at_once = csv.write_poses(values, STYLE)
+    assert table(values, few) == at_once
     sizes(table=few)
-    assert "".join(csv.table_pieces(iter(values), STYLE)) == at_once
+    assert table(values, few) == at_once
 
 
 def test_poses_and_points_stand_in_columns_of_their_own() -> None:
-    assert "".join(csv.table_pieces(iter([PLAIN, POINT]), STYLE)) == (
+    assert table([PLAIN, POINT], 1) == (
         "parent,x,y,z,qx,qy,qz,qw,stamp_ns,frame\nmap,1.0,2.0,3.0,0.0,0.0,0.0,1.0,5,\n,1.0,2.0,3.0,,,,,7,map\n"
     )

@@ -73,7 +73,7 @@ def test_four_members_alone_are_a_quaternion() -> None:
 
 
 @pytest.mark.parametrize("yaw", ["yaw", "theta"])
-@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("count", [1, 80])
 def test_a_place_and_a_turn_about_z_are_a_pose_in_the_plane(yaw: str, count: int) -> None:
     record = f'{{"x":1,"y":2,"{yaw}":0,"k":7}}\n'
     found = flow(record.encode() * count, INVERT, "json")
@@ -82,14 +82,14 @@ def test_a_place_and_a_turn_about_z_are_a_pose_in_the_plane(yaw: str, count: int
     assert json.loads(turned.text.splitlines()[0])["quaternion"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 
-@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("count", [1, 80])
 def test_what_leaves_the_plane_is_a_bad_record(count: int) -> None:
     found = flow(b'{"x":1,"y":2,"yaw":0}\n' * count, MOVE, "json")
     assert (found.status, found.text) == (1, b"")
     assert "--to rpy" in found.told[0]
 
 
-@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("count", [1, 80])
 def test_units_in_names_count_as_written(count: int) -> None:
     record = '{"x_mm":1000,"y_mm":0,"z_mm":0,"roll [deg]":0,"pitch [deg]":0,"yaw[deg]":90}\n'
     found = flow(record.encode() * count, INVERT, "json")

@@ -52,7 +52,7 @@ def test_each_document_without_a_result_is_null(records: list[str], size: int) -
     assert ['"x": null, "y": null' not in document for document in documents] == [record == GOOD for record in records]
 
 
-@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("count", [1, 80])
 @pytest.mark.parametrize("between", [", ", ",\n"])
 @pytest.mark.parametrize("end", ["] trailing\n", "]\ntrailing\n", "\n", ",\n", ',{"x": 1', ""])
 def test_arrays_with_a_broken_end_give_what_is_good(count: int, between: str, end: str) -> None:
@@ -79,7 +79,7 @@ def test_a_long_array_on_one_line_is_one_however_long_the_blocks() -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("size", [0, 1, 30])
-@pytest.mark.parametrize("more", [1, 40])
+@pytest.mark.parametrize("more", [1, 80])
 def test_nothing_is_written_of_an_array_whose_first_record_is_an_error(layout: str, size: int, more: int) -> None:
     for bad in (TEXT, HUGE):
         found = flow(array(layout, [bad, *[GOOD] * more]).encode(), MOVE, "json", size=size)

@@ -63,7 +63,7 @@ def run(lines: list[str], request: Asked, size: int) -> Flow:
 def test_a_mutated_line_changes_no_other(kind: str, wanted: str, data: st.DataObject) -> None:
     if kind == "plane" and wanted == "move":
         return  # leaves the plane
-    count = data.draw(st.integers(1, 100))
+    count = data.draw(st.integers(1, 160))
     place = data.draw(st.integers(0, count - 1))
     mutation = data.draw(st.sampled_from(sorted(MUTATIONS)))
     size = data.draw(st.sampled_from([0, 64, 300, 1000]))

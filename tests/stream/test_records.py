@@ -7,7 +7,7 @@ from flow import INVERT, MOVE, Asked, Flow, asked, convert, flow
 
 from frametool.errors import FrametoolWarning
 
-MANY = 40  # records: beyond what is done singly
+MANY = 80  # records: beyond what is done singly
 
 
 def check(form: str, record: str, wanted: str, request: Asked) -> None:
@@ -160,7 +160,7 @@ def test_a_frame_that_the_result_does_not_know_is_left_out_and_told_once(count: 
     assert len(told) == 1
 
 
-@pytest.mark.parametrize("copies", [1, 40])
+@pytest.mark.parametrize("copies", [1, 80])
 @pytest.mark.parametrize("specs", ["rpy_deg,rotvec", "rotvec,rpy_deg", "rpy_rad,rotvec_deg,axis_angle"])
 def test_each_key_of_several_notations_says_the_unit_of_its_own_angles(copies: int, specs: str) -> None:
     text = b'{"quaternion": {"x": 0, "y": 0, "z": 0.6, "w": 0.8}}\n' * copies

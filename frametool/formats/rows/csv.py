@@ -8,10 +8,8 @@ Metres, radians unless the column says degrees; the pose of `name` in `parent`.
 
 from __future__ import annotations
 
-from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
-from frametool import sizes
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
 from frametool.grammar.result import NoResult, Result, carries_position, in_columns, pose_numbers, without_frame
@@ -28,14 +26,12 @@ SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")
 
 
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return a header and one row a result."""
-    return _table([_pose_cells(result, style) for result in results], style)
+def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
+    """Return a header and one row a result; a point's coordinates are x, y, z."""
+    return _table([cells_of(each, style) for each in results], style)
 
 
-def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return a header and one row a record; a point's coordinates are x, y, z."""
-    return _table([dict(_record_cells(record)) for record in records], style)
+write_points = write_poses
 
 
 def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
@@ -86,27 +82,9 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
             yield key, value
 
 
-def table_pieces(values: Iterator[Result | dict[str, Any]], style: Style) -> Iterator[str]:
-    """Yield the table of results, poses or mappings; of many it waits in a file until all columns are known."""
-    cells = (_pose_cells(each, style) if isinstance(each, Result) else dict(_record_cells(each)) for each in values)
-    rows = list(islice(cells, sizes.TABLE))
-    if len(rows) < sizes.TABLE:
-        yield _table(rows, style)
-        return
-    from json import dumps, loads
-    from tempfile import TemporaryFile
-
-    columns: list[str] = []  # in the order they are first met, so that a row lacks only the last of them
-    with TemporaryFile("w+", encoding="ascii") as waiting:
-        for each in chain(rows, cells):
-            if [*each] != columns:
-                columns += [name for name in each if name not in columns]
-            waiting.write(f"{len(columns)} {dumps(row([each.get(name, '') for name in columns], style))}\n")
-        yield row(columns, style)
-        waiting.seek(0)
-        for line in waiting:
-            count, _, text = line.partition(" ")
-            yield loads(text)[:-1] + "," * (len(columns) - int(count)) + "\n"
+def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
+    """Return the cells of a result by column name."""
+    return _pose_cells(value, style) if isinstance(value, Result) else dict(_record_cells(value))
 
 
 def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
@@ -119,10 +97,10 @@ def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
 
 def row(cells: Iterable[Any], style: Style) -> str:
     """Return one line of cells with its line end."""
-    return ",".join(_cell(value, style) for value in cells) + "\n"
+    return ",".join(cell(value, style) for value in cells) + "\n"
 
 
-def _cell(value: Any, style: Style) -> str:
+def cell(value: Any, style: Style) -> str:
     """Write one cell, quoted where a reader would split it."""
     if isinstance(value, float):
         return style.number(value)

@@ -1,0 +1,357 @@
+"""Records that are written alike, as rows: a record is a row whose columns are its scalars.
+
+What such a row becomes in another form is seen from one whose scalars are marks, by the way that single results take;
+what is odd, or worth telling, takes that way itself.
+"""
+
+from __future__ import annotations
+
+import re
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from frametool import sizes
+from frametool.documents.document import Node, parse_nodes
+from frametool.documents.source import Source
+from frametool.errors import FrametoolError, ValueInvalid
+from frametool.geometry import floats
+from frametool.geometry.representations import notation
+from frametool.grammar.names import in_nanoseconds
+from frametool.grammar.result import Result
+from frametool.stream.answers import Answer
+from frametool.stream.evaluate import Run, State
+from frametool.stream.faults import DEGREES
+from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
+from frametool.stream.record_values import MESSAGES, ROUNDED, plain, plain_scalar, stamp_key, unit_of, values_of_unit
+from frametool.stream.row_layout import POSE, ROTATION, Target
+from frametool.stream.splitter import Part
+from frametool.stream.stamp_columns import read_stamps
+from frametool.text.spans import MARGIN, Spans, framed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from frametool.grammar.result import Style
+    from frametool.stream.evaluate import Plan
+    from frametool.stream.record_values import Value
+    from frametool.stream.request import Request
+    from frametool.stream.row_layout import Shape
+    from frametool.stream.splitter import Splitter
+    from frametool.stream.template import Template
+    from frametool.text.spans import Bytes, Floats, Ints
+
+QUATERNIONS = ((notation("quaternion"), False),)
+NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
+           0.7416198487095663)  # fmt: skip
+STAMP_NS = 1234567890987654321
+MOST_ENTRIES = 8  # points or poses of a record: each is looked at for itself
+PARENT, NAME = "@@parent@@", "@@name@@"
+LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
+
+
+class Marked(NamedTuple):
+    """The result of one of the records of a template, with marks in the place of what differs.
+
+    value: the result; numbers: which column of results stands for a number of it, by its text
+    stamp: which scalar is its stamp, if it has no header, and whether it counts nanoseconds
+    """
+
+    value: Value
+    numbers: Mapping[str, int]
+    stamp: tuple[int, bool] | None = None
+
+
+class Batch(NamedTuple):
+    """Results of records that are written alike, one a row.
+
+    places: (n,) where each stands; results: (n, k) numbers; parents, names: of their frames, one a row or one for all
+    stamps_ns: (n,) those of their headers, if they have any
+    """
+
+    marked: Marked
+    cut: Cut
+    data: Bytes
+    places: Ints
+    results: Floats
+    parents: Sequence[str | None]
+    names: Sequence[str | None]
+    stamps_ns: Ints | None
+
+    def leaf(self, at: int) -> tuple[Node, Spans]:
+        """Return a scalar of the records: where it was learned, and its text in each, without quotes."""
+        stretch, node = self.cut.template.leaves[at]
+        return node, Spans(self.data, self.cut.starts[:, stretch] + MARGIN, self.cut.ends[:, stretch] + MARGIN)
+
+    def take(self, rows: Ints) -> Batch:
+        """Return some of the rows."""
+        size = len(self.places)
+        parents, names = ([each[row] for row in rows.tolist()] if len(each) == size else each for each in self[5:7])
+        cut = Cut(self.cut.template, self.cut.starts[rows], self.cut.ends[rows])
+        stamps = None if self.stamps_ns is None else self.stamps_ns[rows]
+        return Batch(self.marked, cut, self.data, self.places[rows], self.results[rows], parents, names, stamps)
+
+
+class RecordRows:
+    """Make rows of one block of records after the other, of those that are written alike."""
+
+    def __init__(self, splitter: Splitter, form: str, request: Request, style: Style, source: str) -> None:
+        """Begin without templates."""
+        self.request = request._replace(canonical=True)
+        self.style = style
+        self.cutter = RecordCutter(splitter, form, self.request, source)
+        self.is_yaml = form == "yaml"
+        self.left = sizes.LEARNED  # where no records are alike, learning is lost time
+        self._plans: dict[Template, tuple[Plan, list[Marked]] | None] = {}
+
+    def of_block(self, text: bytes, told: Mapping[str, int]) -> tuple[list[Batch], list[Part], int]:
+        """Return the rows of a block, the records that are none, and how many rotations of rows were normalised.
+
+        told: how often things were told, by their rules
+        """
+        records, rest = self.cutter.cut(text)
+        alone: list[Part] = []
+        for start, end in rest:
+            for part, known in self.cutter.singly(text, start, end):
+                hit = known
+                if hit is None and self.left and not part.problem:
+                    self.left -= 1
+                    hit = self.cutter.learned(text, part)
+                if hit is None:
+                    alone.append(part)
+                else:
+                    records.add(part, *hit)
+        data = framed(text)
+        batches: list[Batch] = []
+        mended = 0
+        for cut in records.by_template():
+            made, rows, count = self._of_cut(cut, data, text, told)
+            batches += made
+            mended += count
+            begins, ends = cut.starts[rows, 0].tolist(), cut.ends[rows, -3].tolist()
+            alone += [Part(start, start, end, end) for start, end in zip(begins, ends, strict=True)]
+        return batches, sorted(alone, key=itemgetter(1)), mended
+
+    def _of_cut(
+        self, cut: Cut, data: Bytes, text: bytes, told: Mapping[str, int]
+    ) -> tuple[list[Batch], Sequence[int], int]:
+        """Return the rows of one template; those that are odd, and the first that tells something, stay alone."""
+        template = cut.template
+        is_new = template not in self._plans
+        if is_new:
+            self._plans[template] = self._plan(template)
+        if (planned := self._plans[template]) is None:
+            return [], range(len(cut.starts)), 0
+        plan, marked = planned
+        run = Run(plan, block_of(cut, data, text), State())
+        tells = template.notes or template.own_notes or any(map(self._carries, template.shapes))
+        left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not told[DEGREES])}
+        left |= {*run.mended[:1]} if not told[ROUNDED] else set()
+        left |= {*run.reasons, *run.rows[run.locked != 0].tolist()}
+        stamps = []
+        for at, each in enumerate(marked):
+            times, late = _stamps(cut, at, each, data)
+            stamps.append(times)
+            left |= {*late}
+        good = np.array([row not in left for row in run.rows.tolist()], np.bool_)
+        rows = run.rows[good]
+        own = Cut(template, cut.starts[rows], cut.ends[rows])
+        if not len(rows):
+            return [], sorted(left), 0
+        batches: list[Batch] = []
+        first = 0
+        for at, each in enumerate(marked):
+            last = first + len(each.numbers)
+            becomes = [named.names for pair in names_of(own, at, text) if (named := template.named(at, pair))]
+            parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
+            times = stamps[at]
+            batch = Batch(
+                each, own, data, own.starts[:, 0] + at, run.results[good, first:last], parents, names,
+                None if times is None else times[rows],
+            )  # fmt: skip
+            batches.append(batch)
+            first = last
+        return batches, sorted(left), len({*run.mended} - left)
+
+    def _plan(self, template: Template) -> tuple[Plan, list[Marked]] | None:
+        """Plan the records of a template; None where they are not simple."""
+        if len(template.entries) > MOST_ENTRIES:
+            return None
+        if not template.regular or len({entry.record.path for entry in template.entries}) < len(template.entries):
+            return None
+        targets, found = [], []
+        for at, entry in enumerate(template.entries):
+            shape = entry.record.shape
+            if shape.multiple or shape.place or entry.record.placed or entry.target.place or entry.target.scaled:
+                return None
+            target = self._target(entry.target, shape.kind)
+            made = marked(template, at, self.request, self.style, target)
+            if made is None:
+                return None
+            targets.append(target)
+            found.append(made)
+        plan = plan_of(template, self.request, yaml=self.is_yaml)
+        return plan._replace(pieces=(), targets=tuple(targets)), found
+
+    def _carries(self, shape: Shape) -> bool:
+        """Return True if results have a covariance, of which there may be something to tell."""
+        return bool(self.request.operation.carried(shape))
+
+    def _target(self, own: Target, kind: str) -> Target:
+        """Choose which numbers of a result are written."""
+        if kind not in (POSE, ROTATION):
+            return own
+        if not own.notations:
+            return Target(1.0, ())
+        placed = own.unit is not None or own.whole
+        forms = tuple((each, self.style.in_degrees(each)) for each in self.style.notations)
+        if self.style.form != "csv" or not forms:
+            return Target(1.0, QUATERNIONS, keep_sign=True)
+        whole = placed and any(each.representation.whole for each, _ in forms)
+        return Target(1.0 if placed and not whole else None, forms, self.style.keep_sign, whole and len(forms) == 1)
+
+
+def marked(template: Template, at: int, request: Request, style: Style, target: Target) -> Marked | None:
+    """Return the result of an entry of a template whose scalars are marks; None where it is not made of them alone."""
+    entry = template.entries[at]
+    record = entry.record
+    text, begin = "", 0
+    for number, (stretch, _) in enumerate(template.leaves):
+        start, end = template.stretches[stretch]
+        text, begin = f"{text}{template.text[begin:start]}73105857{number:07d}", end
+    text += template.text[begin:]
+    own = 7 if record.shape.kind in (POSE, ROTATION) else len(NUMBERS[: record.shape.own_size])
+    beside = request.operation.extras(record.shape)
+    size = own + len(beside) + sum(record.shape.covariance)
+    parts = (*NUMBERS[:own], *(0.7310585786300049 + at for at in range(size - own)))
+    parent, name = entry.parent and PARENT, entry.name and NAME
+    stamp = None if record.stamp_ns is None else STAMP_NS
+    shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
+    probe = Answer(shown, parts, mended=False)
+    if style.form in MESSAGES:
+        return None
+    try:
+        root = Node(0, len(text), parse_nodes(text))
+        unit = unit_of(record, root.at(record.path[:1]).value)
+        (value,) = values_of_unit(root.at(unit), unit, [probe], request, style.in_form("csv"), _Unmarked())
+    except (FrametoolError, ValueError):
+        return None
+    numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
+    found = _stamped(value, numbers, is_spelled=style.form == "csv")
+    if found is None or style.form != "csv":
+        return found
+    from frametool.formats.rows.csv import cells_of
+
+    known = all(type(each) is not float or repr(each) in numbers for each in cells_of(value, style).values())
+    return found if known else None
+
+
+def _stamped(value: Value, numbers: Mapping[str, int], *, is_spelled: bool) -> Marked | None:
+    """Take the scalar that is a stamp for that of the result; None where it is no scalar.
+
+    is_spelled: stamps stay as they are written, but those that were read already
+    """
+    extras = value.extras if isinstance(value, Result) else value
+    rest = {key: each for key, each in extras.items() if each != STAMP_NS}
+    key = stamp_key(rest)
+    if not key or (is_spelled and type(rest[key]) is not int):
+        return Marked(value, numbers)
+    leaf = LEAF.fullmatch(str(rest[key]))
+    if key != "stamp_ns":
+        del extras[key]
+    extras["stamp_ns"] = STAMP_NS
+    return None if leaf is None else Marked(value, numbers, (int(leaf[1]), in_nanoseconds(key)))
+
+
+class _Unmarked:
+    """Stands for the text of a record with results in it, which shows no marks."""
+
+    source = Source("", "")
+
+    def at(self, _path: object) -> Any:
+        """Refuse to say what stands at a path."""
+        raise ValueInvalid("written in its own text")
+
+
+def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, Iterable[int]]:
+    """Read the stamps of records, in their headers or beside them; give also which records have none."""
+    record = cut.template.entries[at].record
+    places = [cut.template.stretch_of(path) for path in record.stamps[:2]] if record.stamp_ns is not None else []
+    places = [cut.template.leaves[each.stamp[0]][0]] if each.stamp is not None else places
+    if not places:
+        return None, ()
+    spans = (Spans(data, cut.starts[:, place] + MARGIN, cut.ends[:, place] + MARGIN) for place in places)
+    return read_stamps((*spans,), in_ns=each.stamp is not None and each.stamp[1])
+
+
+def plain_texts(batch: Batch, at: int) -> list[Any]:
+    """Return a scalar of each record as a plain value."""
+    node, cells = batch.leaf(at)
+    data = cells.data.tobytes()
+    spans = zip(cells.starts.tolist(), cells.ends.tolist(), strict=True)
+    texts = [data[start:end] for start, end in spans]
+    known = {text: plain_of(text.decode(), node) for text in {*texts}}
+    return [known[text] for text in texts]
+
+
+def plain_of(text: str, node: Node) -> Any:
+    """Return the text of a scalar as a plain value, quoted as it was where it was learned."""
+    if not node.quote:
+        return plain_scalar(text)
+    return plain(parse_nodes(f"{node.quote}{text}{node.quote}")[0]) if "\\" in text else text
+
+
+class Filling:
+    """Puts what the rows of a batch say in the place of marks."""
+
+    def __init__(self, batch: Batch) -> None:
+        """Take the rows."""
+        self.batch = batch
+        size = len(batch.places)
+        self.known = {
+            mark: each if len(each) == size else [*each] * size
+            for mark, each in ((PARENT, batch.parents), (NAME, batch.names))
+        }
+        self.numbers = batch.results.tolist()
+        self.stamps = [] if batch.stamps_ns is None else batch.stamps_ns.tolist()
+        self.leaves: dict[str, list[Any]] = {}
+
+    def filled(self, part: Any, row: int) -> Any:
+        """Return a plain value without marks."""
+        if type(part) is dict:
+            return {key: self.filled(each, row) for key, each in part.items()}
+        if type(part) is list:
+            return [self.filled(each, row) for each in part]
+        if isinstance(part, float):
+            return self.numbers[row][self.batch.marked.numbers[repr(part + 0.0)]]
+        if isinstance(part, str):
+            return self.text(part, row)
+        return self.stamps[row] if part == STAMP_NS else part
+
+    def text(self, mark: str, row: int) -> Any:
+        """Return what stands in the place of a text, if that is a mark."""
+        if mark in self.known:
+            return self.known[mark][row]
+        if mark not in self.leaves:
+            leaf = LEAF.fullmatch(mark)
+            self.leaves[mark] = [mark] * len(self.numbers) if leaf is None else plain_texts(self.batch, int(leaf[1]))
+        return self.leaves[mark][row]
+
+
+def values_of(batch: Batch) -> Iterator[Value]:
+    """Yield the rows of a batch as single results; their numbers are position and quaternion."""
+    value = batch.marked.value
+    filling = Filling(batch)
+    for row, numbers in enumerate(filling.numbers):
+        if not isinstance(value, Result):
+            yield filling.filled(value, row)
+            continue
+        pose = value.pose
+        own = pose._replace(
+            position=None if pose.position is None else tuple(numbers[:3]),
+            rotation=None if pose.rotation is None else tuple(numbers[3:7]),
+            name=filling.filled(pose.name, row),
+            parent=filling.filled(pose.parent, row),
+        )
+        yield Result(own, filling.filled(value.extras, row))
