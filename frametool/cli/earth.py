@@ -96,7 +96,10 @@ def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Plac
     """Part what --to names into rotations, and how positions are written; raises ValueInvalid for --to enu alone."""
     names = [each.representation.name for each in notations if each.representation.is_place]
     rest = tuple(each for each in notations if not each.representation.is_place)
-    return rest, Place.written(names, earth()) if names else None
+    place = Place.written(names, earth()) if names else None
+    if inputs().peek("origin") == FIRST and not (place and place.is_local):
+        raise click.UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
+    return rest, place
 
 
 def mapping_of(texts: Sequence[str], name: str) -> str:

@@ -71,7 +71,7 @@ class Output:
         self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
         self.told = told or (by_name(self.path, writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
-        if any(each.representation.is_place for each in notations):
+        if inputs.peek("origin") is not None or any(each.representation.is_place for each in notations):
             from frametool.cli.earth import places_of
 
             notations, place = places_of(notations)

@@ -40,7 +40,8 @@ def propagate(jacobian: Rows, entries: Entries) -> Components:
     whole = np.stack(np.broadcast_arrays(*flat, *entries), axis=-1)
     side = len(jacobian[0])
     j, a = (part.reshape(*whole.shape[:-1], -1, side) for part in np.split(whole, [len(flat)], axis=-1))
-    found = _product(_product(j, a), np.swapaxes(j, -1, -2))
+    with np.errstate(all="ignore"):  # what is not finite is refused where it would be written
+        found = _product(_product(j, a), np.swapaxes(j, -1, -2))
     rows = found.tolist() if found.ndim == 2 else np.moveaxis(found, (-2, -1), (0, 1))
     return symmetric([number for row in rows for number in row])
 

@@ -239,7 +239,7 @@ def test_a_matrix_is_a_similarity_where_it_is_asked_for(run: Run) -> None:
     assert float(found["scale"]) == 0.5
     off = json.dumps({"matrix": [[2, 0, 0.5], [0, 2, 0], [0, 0, 2]]})
     assert run("invert", "--scale", off).status == 1
-    assert "--scale is about the matrix of --transform" in run("apply", "--scale", "tree.yaml", "a", "b", "1", "1", "1", files={"tree.yaml": "frames: {a: {b: {}}}"}).err
+    assert "--scale has no effect here" in run("apply", "--scale", "tree.yaml", "a", "b", "1", "1", "1", files={"tree.yaml": "frames: {a: {b: {}}}"}).err
 
 
 @pytest.mark.parametrize("form", ["argument", "file", *STREAMS[:-1]])

@@ -25,7 +25,7 @@ def section() -> Section:
 def _meant(name: str) -> Any:
     """Return what a name stands for; of a folder that can be called, the function in it."""
     value = getattr(frametool, name)
-    return getattr(import_module(f"{value.__name__}.api"), name) if inspect.ismodule(value) and callable(value) else value
+    return getattr(import_module(value.entry), name) if inspect.ismodule(value) and callable(value) else value
 
 
 def _page(name: str, value: Any) -> Page:

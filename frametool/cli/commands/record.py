@@ -101,9 +101,9 @@ def command(inputs: Inputs) -> int:
         on_error=inputs.on_error if into else STOP,
         report=lambda error: say_error(error, in_json=False), normalize=normalize,
     )  # fmt: skip
-    quiet = inputs.quiet
+    quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()
-    with opened_place(copy, place, force=inputs.force) as write, opened_recording(path, tally) as opened:
+    with opened_place(copy, place, force=force) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, request)
         with ProgressBar(None, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
