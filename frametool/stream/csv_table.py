@@ -40,7 +40,7 @@ class CsvTable:
             self.waiting.seek(0)
             for count, size in self.sizes:
                 text = self.waiting.read(size)
-                missing = len(self.columns) - count
+                missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
                 yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
 
     def _add(self, block: Rows) -> None:
