@@ -296,6 +296,8 @@ def opened(
     if len(named) not in (0, 1, len(lacking), files):
         close_all(found)
         raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
+    if len(named) == 1:  # for poses that have no names at all, rather than for names that others go without saying
+        lacking = [file for file in lacking if "rows" in FORMATS[file.form].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:

@@ -94,13 +94,25 @@ def _line(pose: Pose, style: Style) -> str:
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the pose that each line publishes."""
-    number = 0
+    for number, line in _calls(file):
+        is_call = line.strip() and not line.lstrip().startswith("#")
+        if is_call and (edge := read_edge(line, file, options, number)):
+            yield edge
+
+
+def _calls(file: InputFile) -> Iterator[tuple[int, str]]:
+    """Yield the lines of a file with their numbers; one that ends in a backslash goes on in the next."""
+    number, first, call = 0, 1, ""
     for piece in lines(file.stream, file.name):
-        for line in piece.text.removesuffix("\n").replace("\r", "\n").split("\n"):
+        for line in re.split(r"\r\n|[\r\n]", piece.text.removesuffix("\n").removesuffix("\r")):
             number += 1
-            is_call = line.strip() and not line.lstrip().startswith("#")
-            if is_call and (edge := read_edge(line, file, options, number)):
-                yield edge
+            call += line
+            if line.endswith("\\") and not call.lstrip().startswith("#"):
+                call += "\n"
+                continue
+            yield first, call
+            first, call = number + 1, ""
+    yield first, call
 
 
 def read_edge(
@@ -125,6 +137,7 @@ def read_call(line: str, reading: Reading) -> Pose:
     """
     from shlex import split
 
+    line = re.sub(r"\\(?:\n|\Z)|(?<!\S)\\\s+(?=--|\Z)", " ", line)  # XML and YAML make a blank of the line's end
     try:
         words = split(line, comments=re.search(r"(?:^|\s)#", line) is not None)  # in a word it is part of it
     except ValueError as error:
@@ -135,8 +148,10 @@ def read_call(line: str, reading: Reading) -> Pose:
 def read_words(words: Sequence[str], reading: Reading) -> Pose:
     """Read one call from its words: what stands before the tool's name, and what is said to ROS itself, is left out.
 
+    Its numbers have no units of their own.
     Raises ValueInvalid.
     """
+    reading.bare_numbers = True
     starts = [index for index, word in enumerate(words) if word.rsplit("/", 1)[-1] == CALL]
     if len(starts) > 1:
         raise ValueInvalid(f"{len(starts)} calls of {CALL} in one line; write one a line")
@@ -195,8 +210,7 @@ def read_positional(words: Sequence[str], reading: Reading) -> Pose:
 def _pose(
     position: Sequence[str], key: str, rotation: Sequence[str], parent: str, child: str, reading: Reading
 ) -> Pose:
-    """Check the numbers of a call, which have no units of their own."""
-    reading.bare_numbers = True
+    """Check the numbers of a call."""
     x, y, z = map(read_number, position)
     turned = rotation_of(ROTATION_KEYS[key], rotation, INDICES, reading)
     if not parent or not child:

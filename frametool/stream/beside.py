@@ -64,6 +64,8 @@ def with_covariances(
     if request.gathered is not None or is_left_out:
         return record._replace(others=(*record.others, *said))
     if operation.keeps_frames and not (shape.inverse or (has_sigma and request.canonical)):
+        for key in there * is_own:
+            within((*around, key), _entries, holder[key], (36, 9))
         return record
     if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"

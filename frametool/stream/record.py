@@ -429,6 +429,8 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
     if request.operation.only_adds or request.operation.columns:
         raise Misfit("a bare list has no keys; write a mapping like {point: [x, y, z]}")
     if type(value[0]) is list:
+        if not request.operation.multiples:
+            read_rotation("matrix", value, reading)  # for what is worth telling about it
         return _with_rotation(value, "matrix", Record(path, Shape(POSE, None)), (), reading, request)
     if len(value) != 3 or not request.operation.moves:
         raise _bare_numbers(value)

@@ -219,7 +219,7 @@ def as_trajectory(table: Table, form: str, request: Request, source: str) -> Tab
     row = FORMATS[form]
     if request.given or request.columns:
         return table
-    if row.widths and not table.names and table.width not in row.widths:
+    if row.widths and table.width not in row.widths and (form == "kitti" or not table.names):
         wanted = " or ".join(map(str, row.widths))
         line = table.head.count(b"\n") + 1
         raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
@@ -420,7 +420,7 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nu
     if len(cells.rows) < len(cells.counts):
         for line in cells.odd_lines().tolist():
             raw = cells.line(line)
-            if cells.counts[line] == 0:
+            if cells.counts[line] == 0 or (cells.counts[line] == 1 and not raw.strip()):
                 odd.append((line, raw))
             else:
                 null_row = _null_row(table, layout, raw) if nulls else b""

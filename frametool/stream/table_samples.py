@@ -17,7 +17,7 @@ from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
-from frametool.stream.faults import BadRow
+from frametool.stream.faults import BadRow, Fault
 from frametool.stream.request import Request
 from frametool.stream.row_poses import TablePoses
 from frametool.stream.table_stream import begin_table
@@ -50,6 +50,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
     for block, line, _ in rows.blocks(begun):
         for fault in rows.faults:
             options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
+        for row, role in _nameless(block, rows.roles).items():
+            column = rows.table.name(rows.naming.places[role] or 0)
+            fault = Fault(line + int(block.lines[row]), column, "no name of a frame")
+            options.report(BadRow(fault, fault.reason, source=file.name))
         yield from _pieces(block, _times(block, stamps, form, count), line, form, options)
         count += len(block.numbers)
     if stamps:
@@ -77,6 +81,12 @@ def _times(block: RowPoses, stamps: StampFile | None, form: Poses, before: int) 
         times: list[int] = block.stamps_ns.tolist()
         return times
     return [(before + at) * BILLION for at in range(count)] if form.counted else None
+
+
+def _nameless(block: RowPoses, roles: Sequence[int]) -> dict[int, int]:
+    """Return the rows in which the cell of the parent (0) or of the name (1) is empty, and which of the two is."""
+    named = [(role, block.for_each((block.parents, block.names)[role])) for role in roles]
+    return {row: role for role, names in named if not all(names) for row, name in enumerate(names) if not name}
 
 
 def _pieces(

@@ -186,6 +186,12 @@ def test_static_arguments_become_a_tree_entry(run: Run) -> None:
     assert yaml.safe_load(run("static", *flags).out)["frames"][1]["xyz"] == [-0.1, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("flags", ["--yaw 90deg", "--yaw pi/2", "--yaw 1.5707963267948966"])
+def test_angles_of_static_may_have_a_unit(run: Run, flags: str) -> None:
+    done = run("static", *flags.split(), "--frame-id", "a", "--child-frame-id", "b", "-f", "static1", "--to", "rpy")
+    assert done.out == "0.0 0.0 0.0 1.5707963267948966 0.0 0.0 a b\n"
+
+
 def test_static_refuses_what_moves_and_what_is_no_rotation(run: Run) -> None:
     assert run("static", "tf.txt", files=FILES).err == "frametool: frames move and cannot be published as static: base\n"
     assert run("static", "--qz", "0.5", "--frame-id", "a", "--child-frame-id", "b").status == 1

@@ -195,6 +195,7 @@ def test_only_forms_that_are_read_are_offered_for_the_input(run: Run, monkeypatc
 
 TUM = "0 1 2 3 0 0 0 1\n1 2 2 3 0 0 0 1\n"
 OWN_NAMES = "stamp,parent,name,x,y,z,qx,qy,qz,qw\n0,a,b,0,0,0,0,0,0,1\n1,a,b,1,0,0,0,0,0,1\n"
+CHAIN = "cam0:\n  T_cam_imu: [[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
 NO_NAMES = "stamp,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,1,0,0,0,0,0,1\n"
 
 
@@ -206,6 +207,10 @@ NO_NAMES = "stamp,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,1,0,0,0,0,0,1\n"
         (("r.urdf", "a.tum", "b.tum"), ("base,m", "base,n"), ("base", "arm", "m", "n"), ""),
         (("own.csv", "a.tum"), ("a,m",), ("a", "b", "m"), ""),
         (("r.urdf", "none.csv"), ("base,m",), ("base", "arm", "m"), ""),
+        (("chain.yaml", "a.tum"), ("m,imu",), ("m", "imu", "cam0"), ""),
+        (("chain.yaml", "a.tum"), ("arm", "m,arm"), ("m", "arm", "cam0"), ""),
+        (("hand.yaml", "none.csv"), ("m,base",), ("m", "base", "lidar"), ""),
+        (("chain.yaml",), ("arm",), ("arm", "cam0"), ""),
         (("r.urdf", "a.tum"), ("x,y", "base,m"), ("base", "arm", "m"), "note: --frames x,y changes nothing: r.urdf names its own frames"),
         (("own.csv",), ("x,y",), ("a", "b"), "note: --frames changes nothing: csv does not leave that open"),
         (("none.csv",), ("x,y",), ("x", "y"), ""),
@@ -213,6 +218,7 @@ NO_NAMES = "stamp,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,1,0,0,0,0,0,1\n"
 )  # fmt: skip
 def test_names_of_frames_go_to_the_files_that_need_them(run: Run, files: tuple[str, ...], named: tuple[str, ...], frames: tuple[str, ...], told: str) -> None:
     texts = {**FILES, "a.tum": TUM, "b.tum": TUM, "own.csv": OWN_NAMES, "none.csv": NO_NAMES}
+    texts |= {"chain.yaml": CHAIN, "hand.yaml": "lidar: {x: 1, y: 0, z: 0, yaw: 0}\n"}
     more = [word for file in files[1:] for word in ("--with", file)]
     done = run("tree", files[0], *more, *[word for each in named for word in ("--frames", each)], "-f", "json", files=texts)
     assert done.status == 0, done.err

@@ -6,6 +6,8 @@ import csv
 import io
 from typing import TYPE_CHECKING, Protocol
 
+import pytest
+
 if TYPE_CHECKING:
     from conftest import Outcome
 
@@ -30,3 +32,11 @@ def test_the_columns_are_those_of_all_results(run: Run) -> None:
     text = run("convert", "{xyz: [1, 0, 0], rpy: [0, 0, 0]}", "{name: b, rpy: [0, 0, 1]}", "-f", "csv").out
     first, second = csv.DictReader(io.StringIO(text))
     assert (first["x"], first["name"], second["x"], second["name"]) == ("1.0", "", "", "b")
+
+
+@pytest.mark.parametrize(("row", "column"), [("base,,4,5,6,0", "name"), (",lidar,4,5,6,0", "parent")])
+def test_a_row_of_a_tree_without_the_name_of_a_frame_is_an_error(run: Run, row: str, column: str) -> None:
+    files = {"t.csv": f"parent,name,x,y,z,yaw\nbase,camera,1,2,3,0\n{row}\n"}
+    for command in (("tree", "t.csv"), ("lookup", "t.csv", "base", "camera")):
+        done = run(*command, files=files)
+        assert (done.status, done.out, done.err) == (1, "", f"frametool: t.csv:3:{column}: no name of a frame\n")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from frametool.errors import FormatError
-from frametool.formats.load import load
+from frametool.formats.load import FrameFile, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,3 +134,15 @@ def test_what_is_no_tree_is_named(run: Callable[..., Any], text: str, message: s
 def test_what_we_draw_ourselves_is_shown_with_its_labels(run: Callable[..., Any]) -> None:
     drawn = run("tree", "-", "-f", "dot", stdin="frames: {base: {lidar: {xyz: [1, 2, 3]}}}").out
     assert run("tree", "-", stdin=drawn).out == "base\n└── lidar  xyz 1 2 3 rpy_deg 0 0 0\n"
+
+
+def test_a_drawing_of_many_edges_is_read_in_one_pass(tmp_path: Path) -> None:
+    count = 50_000
+    path = tmp_path / "frames.gv"
+    nodes = "".join(f'"f{at}";\n' for at in range(count))
+    arrows = "".join(f'"f0" -> "f{at}"[label="Broadcaster: /b\\nAverage rate: 10\\n"];\n' for at in range(1, count))
+    path.write_text(f"digraph G {{\n{nodes}\n\n{arrows}}}\n")
+    begin = process_time()
+    lines = [edge.line for edge in FrameFile(path, reads=("drawing",)).edges()]
+    assert lines == [*range(2, count + 2), *range(count + 4, 2 * count + 3)]
+    assert process_time() - begin < 10

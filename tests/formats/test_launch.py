@@ -351,3 +351,18 @@ def test_reading_a_launch_file_in_xml_loads_neither_numpy_nor_the_reader_of_pyth
     code = "import sys; from frametool.cli import run; run(['lookup', 'a.launch', 'base', 'cam']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert not {"numpy", "rich", "yaml", "frametool.formats.trees.launch_python"} & set(done.stdout.split())
+
+
+ARGUMENTS = "--x 1 \\\n      --frame-id a \\\n      --child-frame-id b"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        (f'<launch><node pkg="tf2_ros" exec="static_transform_publisher" args="{ARGUMENTS}"/></launch>', "a.launch"),
+        (f"launch:\n- node:\n    pkg: tf2_ros\n    exec: static_transform_publisher\n    args: >-\n      {ARGUMENTS}\n", "a.yaml"),
+    ],
+)
+def test_arguments_go_on_behind_a_backslash(tmp_path: Path, text: str, name: str) -> None:
+    tree, _ = read(tmp_path, text, name)
+    assert tree.lookup("a", "b").components[:3] == (1.0, 0.0, 0.0)

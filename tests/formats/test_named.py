@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -141,6 +142,27 @@ def test_a_key_that_names_two_frames_asks_for_the_direction(run: Run) -> None:
     }
     assert '"xyz": [1.0, 0.0, 0.0]' in points["parent-from-child"]
     assert '"xyz": [0.0, 1.0, 0.0]' in points["child-from-parent"]
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "rvec: [0, 0, 1.5707963267948966], tvec: [1, 0, 0]",
+        "t: [1, 0, 0], R: [[0, -1, 0], [1, 0, 0], [0, 0, 1]]",
+        f"qvec: [{HALF}, 0, 0, {HALF}], tvec: [1, 0, 0]",
+    ],
+)
+def test_the_words_of_opencv_ask_for_the_direction(run: Run, entry: str) -> None:
+    files = {"e.yaml": f"cam: {{{entry}}}\n"}
+    done = run("tree", "e.yaml", files=files)
+    names = " and ".join(each.partition(":")[0] for each in entry.split(", ") if ":" in each)
+    assert (done.status, done.out) == (2, "")
+    assert f"'{names}': the key does not say its direction: give --direction parent-from-child" in done.err
+    lookup = ("lookup", "e.yaml", "base", "cam", "-f", "json", "--quiet", "--direction")
+    for direction, wanted in (("parent-from-child", [1.0, 0.0, 0.0]), ("child-from-parent", [0.0, 1.0, 0.0])):
+        assert json.loads(run(*lookup, direction, files=files).out)["xyz"] == pytest.approx(wanted, abs=1e-15)
+    files = {"e.yaml": f"cam: {{parent: base, {entry}}}\n"}
+    assert run("lookup", "e.yaml", "base", "cam", files=files).status == 0
 
 
 def test_a_tree_is_written_so_and_reads_back_to_the_same_bits(run: Run, tmp_path: Path) -> None:

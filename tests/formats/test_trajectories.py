@@ -535,6 +535,22 @@ def test_the_header_of_euroc_may_name_other_columns_too(run: Run) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("blank", ["\n", " \n", "\t\r\n", "  "])
+def test_a_blank_line_of_euroc_is_no_row(run: Run, blank: str) -> None:
+    text = text_of("euroc", matrices(2))
+    given, wanted = run("convert", stdin=f"{text}{blank}"), run("convert", stdin=text)
+    assert (given.status, given.out, given.err) == (0, f"{wanted.out}{blank}", wanted.err)
+    assert run("tree", "e.csv", files={"e.csv": f"{text}{blank}"}).status == 0
+
+
+@pytest.mark.parametrize("text", ["1x\n3 0\n", "a b\n3 0\n"])
+def test_kitti_has_no_header_of_another_width(run: Run, text: str) -> None:
+    wanted = f":1: expected 12 numbers a line, found {len(text.splitlines()[0].split())}"
+    for command in (("convert", "-i", "k.txt"), ("tree", "k.txt")):
+        done = run(*command, "--in", "kitti", files={"k.txt": text})
+        assert (done.status, done.out, done.err) == (1, "", f"frametool: k.txt{wanted}\n")
+
+
 def test_the_header_of_euroc_stays(run: Run) -> None:
     text = text_of("euroc", matrices(2))
     turned = run("invert", stdin=text).out

@@ -273,3 +273,13 @@ def test_each_row_has_its_own_sigma(run: Run, sigma: Any) -> None:
     alone = [run("compose", EXACT, "-", stdin=line + "\n").out for line in lines[:7]]
     assert done.out == "".join(alone[at % 7] for at in range(40))
     assert len({*alone}) == 7
+
+
+@pytest.mark.parametrize("entry", ["xyz: [1, 2, 3]", "rpy: [0, 0, 1]", "point: [1, 2, 3]", "rotvec: [0, 0, 1]"])
+@pytest.mark.parametrize("count", [3, 6, 21])
+def test_a_covariance_of_another_size_is_refused_where_it_is_only_copied(run: Any, entry: str, count: int) -> None:
+    record = f"{{{entry}, covariance: {[0] * count}}}"
+    for done in (run("convert", record), run("convert", stdin=f"{record}\n")):
+        assert (done.status, done.out) == (1, "")
+        assert f"covariance has {count} numbers; 36 are needed" in done.err.splitlines()[0]
+    assert run("convert", f"{{{entry}, covariance: {[0] * 36}}}").status == 0

@@ -104,3 +104,26 @@ def test_two_calls_in_one_line_are_refused_and_a_hash_within_a_name_is_part_of_i
         read("static_transform_publisher 1 0 0 0 0 0 a b & static_transform_publisher 1 0 0 0 0 0 b c")
     assert read("1 0 0 0 0 0 a b#c").name == "b#c"
     assert read("1 0 0 0 0 0 a b # c").name == "b"
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize(
+    "call",
+    [
+        "ros2 run tf2_ros static_transform_publisher --x 1 --y 2 \\\n  --z 3 \\\n  --frame-id a --child-frame-id b",
+        "rosrun tf static_transform_publisher 1 2 3 \\\n  0 0 0 a b 100",
+        "1 2 3 0 0 0 \\\na b \\\n",
+    ],
+)
+def test_a_call_goes_on_behind_a_backslash_at_the_end_of_a_line(call: str, end: str, tmp_path: Path) -> None:
+    path = tmp_path / "calls.sh"
+    path.write_bytes(f"# a rig \\\n{call}\n0 0 0 0 0 0 b c\n".replace("\n", end).encode())
+    tree = load(path, format="calls")
+    assert tree.lookup("a", "c").components[:3] == (1.0, 2.0, 3.0)
+    path.write_bytes(f"{call}\n0 0 0 0 0 0 x\n".replace("\n", end).encode())
+    with pytest.raises(FormatError, match=f"calls.sh:{call.count(chr(10)) + 2}: "):
+        load(path, format="calls")
+
+
+def test_a_blank_of_a_name_behind_a_backslash_stays() -> None:
+    assert read(r"0 0 0 0 0 0 'a \ b' c").parent == r"a \ b"

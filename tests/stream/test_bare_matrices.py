@@ -42,3 +42,15 @@ def test_a_bare_matrix_that_gains_no_position_stays_a_rotation(run: Run, command
 def test_a_bare_matrix_as_angles_is_json(run: Run) -> None:
     outcome = run("convert", "--to", "rpy", "-f", "json", stdin="[[0, -1, 0], [1, 0, 0], [0, 0, 1]]\n")
     assert list(json.loads(outcome.out)) == ["rpy"]
+
+
+SHEARED = ["[[1, 4e-4, 0], [0, 1, 0], [0, 0, 1]]", "[[1, 4e-4, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]"]
+
+
+@pytest.mark.parametrize("matrix", SHEARED)
+@pytest.mark.parametrize("command", ["convert", "invert"])
+def test_a_bare_matrix_that_is_rounded_is_reported(run: Run, matrix: str, command: str) -> None:
+    off = "matrix is orthonormal only to 0.0004 and was replaced by the nearest rotation"
+    assert run(command, matrix).err == f"frametool: warning: argument:1:3: {off}\n"
+    assert run(command, stdin=f"{matrix}\n").err == f"frametool: warning: stdin:1:3: {off}\n"
+    assert run(command, matrix, "--normalize").status == 0

@@ -33,16 +33,25 @@ _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most rece
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the frames and edges of a digraph; what it says of each goes to the tally, the poses are none."""
-    text = re.sub(r"(?m)^\s*//.*$", "", file.text)
+    text = re.sub(r"(?m)^[^\S\n]*//.*$", "", file.text)
     if not text.rstrip().endswith("}"):
         raise FormatError("the drawing ends before its last }; is the file whole?", source=file.name)
-    for node in re.finditer(rf"(?m)^\s*{_WORD}\s*;\s*$", text):
+    for node, line in _with_lines(rf"(?m)^[^\S\n]*{_WORD}\s*;\s*$", text):
         if (name := _unquoted(node[1])) not in _SETTING:
-            yield Edge(None, options.tally.names.bare(name), IDENTITY, line=1 + text.count("\n", 0, node.start(1)))
-    for arrow in re.finditer(_ARROW, text):
+            yield Edge(None, options.tally.names.bare(name), IDENTITY, line=line)
+    for arrow, line in _with_lines(_ARROW, text):
         parent, child = (options.tally.names.bare(_unquoted(word)) for word in arrow.groups()[:2])
         options.tally.drawn[child] = _about(arrow[3] or "")
-        yield Edge(parent, child, IDENTITY, line=1 + text.count("\n", 0, arrow.start()))
+        yield Edge(parent, child, IDENTITY, line=line)
+
+
+def _with_lines(pattern: str, text: str) -> Iterator[tuple[re.Match[str], int]]:
+    """Yield what a pattern finds in a text, and the line in which its first group begins."""
+    line, before = 1, 0
+    for match in re.finditer(pattern, text):
+        line += text.count("\n", before, match.start(1))
+        before = match.start(1)
+        yield match, line
 
 
 def _unquoted(word: str) -> str:

@@ -4,6 +4,7 @@
     camera: {parent: lidar, translation: [0.1, 0, -0.2], quaternion: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
     imu: {trans_x: 0.1, trans_y: 0.0, trans_z: 0.0, rot_x: 0.0, rot_y: 0.0, rot_z: 0.0, rot_w: 1.0}
     base_to_left: {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}         asks for --direction
+    left: {R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], t: [0.1, 0.0, 0.0]}                      asks for --direction
     gps: {value: [0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0]}                                     asks for --from
 
 Metres, radians unless a key says degrees.  The pose is that of the name, or of `child`, in `parent`; where none is
@@ -43,6 +44,7 @@ _POSITIONS = (*POSITION_WORDS, "translation", "position", "location")
 _TURNS = (*(word for word, meant in ROTATION_WORDS.items() if not meant), "q", "quaternion")
 _SPELLED = {"t": "xyz", "q": "quaternion", "r": "rotvec_rad"}  # by the first letter of a column's own name
 _WHOLE = ("value", "pose")  # seven numbers
+_OF_CAMERAS = ("rvec", "qvec", "tvec", "R", "T", "t")  # camera<-world in OpenCV and COLMAP, often the other way
 # the names of single numbers -> the key of the grammar under which they stand together
 _FLAT = {
     **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t")},
@@ -123,7 +125,9 @@ def _entry(
     if isinstance(meaning, Ambiguous):
         ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
         raise Unclear(f"{bare(child)} may name its two frames in several ways; give --frames {ways}", key=True)
-    if isinstance(meaning, Meaning) and not meaning.said:
+    if meaning is None and (pair := [key for key in fields if key in _OF_CAMERAS]) and len(pair) == len(fields) == 2:
+        meaning = directed(" and ".join(pair), (), options.answers.names("base")[0], child, options.answers)
+    elif isinstance(meaning, Meaning) and not meaning.said:
         meaning = directed(child, (), meaning.target, meaning.source, options.answers)
     if meaning is None or not (meaning.target and meaning.source):
         return read.components, None
