@@ -195,6 +195,36 @@ def six_d(sheet: Sheet, q: Quaternion) -> Sequence[float]:
     return found
 
 
+def from_unreal(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
+    """Go as from rpy, then negate x and y."""
+    return _mirrored(sheet, to_quaternion.rpy(sheet, numbers, degrees=degrees))
+
+
+def rpy_unreal(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
+    """Negate x and y, then go as to rpy."""
+    return rpy(sheet, _mirrored(sheet, q), degrees=degrees)
+
+
+def _mirrored(sheet: Sheet, q: Quaternion) -> Quaternion:
+    """Turn about x and y the other way."""
+    sheet.heading("The signs of Unreal's rotator")
+    sheet.say("Unreal turns about x and y the other way than rpy (FRotator::Quaternion); z and w stay.")
+    x, y = sheet.each(dict(zip(XYZW, q, strict=True)), XYZW[:2], "q%", "-%")
+    return x, y, q[2], q[3]
+
+
+def from_unity(sheet: Sheet, numbers: Sequence[float], *, degrees: bool) -> Quaternion:
+    """Go as from the Euler angles z, x, y."""
+    return to_quaternion.euler(sheet, (*numbers[2:], *numbers[:2]), axes="szxy", degrees=degrees)
+
+
+def euler_unity(sheet: Sheet, q: Quaternion, *, degrees: bool) -> Sequence[float]:
+    """Go as to the Euler angles z, x, y."""
+    z, x, y = euler(sheet, q, axes="szxy", degrees=degrees)
+    sheet.say(f"In Unity's order: x {sheet.number(x)}, y {sheet.number(y)}, z {sheet.number(z)}")
+    return x, y, z
+
+
 class Blocks(NamedTuple):
     """The ways of a representation: from its numbers to the quaternion, and back."""
 
@@ -213,6 +243,8 @@ BLOCKS = {
     "matrix": Blocks(to_quaternion.matrix, matrix),
     "mrp": Blocks(to_quaternion.mrp, mrp),
     "six_d": Blocks(to_quaternion.six_d, six_d),
+    "rpy_unreal": Blocks(from_unreal, rpy_unreal),
+    "euler_unity": Blocks(from_unity, euler_unity),
 }
 
 
