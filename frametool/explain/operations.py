@@ -44,7 +44,10 @@ BLOCKS = {
     "matrix": Block(ROTATION, ROTATION),
     "mrp": Block("px py pz", "px py pz"),
     "six_d": Block("ax ay az bx by bz", "r11 r21 r31 r12 r22 r32"),
+    "rpy_unreal": Block(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler_unity": Block("a2 a3 a1", "a2 a3 a1"),
 }
+AXES_OF = {"rpy": "sxyz", "rpy_unreal": "sxyz", "euler_unity": "szxy"}  # Euler angles under another name
 ORDERS = {"wxyz": "w, x, y, z: the scalar w stands first.", "": "x, y, z, w: the scalar w stands last."}
 UNITS = {True: {"deg": "_deg", "unit": "deg"}, False: {"deg": "", "unit": "rad"}}
 PLAIN = ("quaternion", "xyzw")
@@ -78,8 +81,9 @@ def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *,
     names, name = names_of(block_of(notation).written, notation, degrees=degrees), sheet_of(notation)
     values: Values = dict(zip(names, numbers, strict=True))
     words = UNITS[degrees].copy()
-    if name == "euler":
-        words |= _axes(notation.bound_axes(), values) | _elementary(notation.bound_axes())
+    if name.startswith("euler"):
+        axes = AXES_OF.get(name) or notation.bound_axes()
+        words |= _axes(axes, values) | _elementary(axes)
     is_plain = name in ("wxyz", "quaternion")
     sheet.play("quaternion to" if is_plain else f"{name} to", values, order=ORDERS.get(name, ORDERS[""]), **words)
     return quaternion_of(values)
@@ -94,10 +98,11 @@ def from_quaternion(
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
     words = UNITS[degrees].copy()
-    if notation.representation.name in ("rpy", "euler"):
-        axes = notation.bound_axes() if notation.representation.name == "euler" else "sxyz"
+    if (name := notation.representation.name) in ("euler", *AXES_OF):
+        axes = AXES_OF.get(name) or notation.bound_axes()
         values["locked"] = float(euler.locked(*q, axes))
-        words |= _axes(axes, values) | dict(zip(("a1", "a2", "a3"), block_of(notation).found.split(), strict=True))
+        shown_as = ANGLES if name.startswith("euler") else ROLL_PITCH_YAW
+        words |= _axes(axes, values) | dict(zip(ANGLES.split(), shown_as.split(), strict=True))
     sheet.play(f"{sheet_of(notation)} from", values, **words)
     return [values[name] for name in names]
 

@@ -102,7 +102,10 @@ def resample(
 
     Moments beyond its ends, or between poses more than a gap apart (3 median intervals if none is said), have none.
     """
-    given = _taken(trajectory, "trajectory").in_order()
+    given = _taken(trajectory, "trajectory")
+    for hint in given.disorder("trajectory"):
+        warn(hint)
+    given = given.in_order()
     if sum(each is not None for each in (rate, at, every)) != 1:
         raise ValueInvalid("give one of rate, at and every")
     if given.stamps_ns is None:

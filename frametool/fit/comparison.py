@@ -161,7 +161,8 @@ def compare(
         require_near(each.xyz, name)
     ref, est = _on_the_ground(ref, est, names, hints)
     if not settings.evo:
-        ref, est = (_in_order(each, name, hints) for each, name in zip((ref, est), names, strict=True))
+        hints += [*ref.disorder(names[0]), *est.disorder(names[1])]
+        ref, est = ref.in_order(), est.in_order()
     pairs, offset_ns, score = _paired(ref, est, settings, names, hints)
     pairs, mount = _mounted(_cut(pairs, settings), settings)
     up = np.array(settings.up)
@@ -210,18 +211,6 @@ def _seen_from(each: Trajectory, pose: Rigid) -> Trajectory:
         return each._replace(xyz=xyz, world=ENU)
     turned = quaternion.compose(*quaternion.conjugate(*pose[3:]), *each.xyzw.T)
     return each._replace(xyz=xyz, xyzw=np.stack(turned, -1), world=ENU)
-
-
-def _in_order(each: Trajectory, name: str, hints: list[str]) -> Trajectory:
-    if each.stamps_ns is None:
-        return each
-    steps = np.diff(each.stamps_ns)
-    if (steps < 0).any():
-        hints.append(f"{name}: stamps are out of order; sorted")
-    found = each.in_order()
-    if found.size < each.size:
-        hints.append(f"{name}: {each.size - found.size} poses have the stamp of another; the last counts")
-    return found
 
 
 def _paired(

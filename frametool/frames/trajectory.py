@@ -65,6 +65,13 @@ class Trajectory(NamedTuple):
         """Return it with the numbers of its poses as seconds."""
         return self._replace(stamps_ns=np.arange(self.size, dtype=np.int64) * 1_000_000_000)
 
+    def disorder(self, name: str) -> list[str]:
+        """Say what `in_order` changes of a trajectory with a name, a sentence each."""
+        stamps = np.array([], np.int64) if self.stamps_ns is None else self.stamps_ns
+        doubled = len(stamps) - len(np.unique(stamps))
+        said = [f"{name}: stamps are out of order; sorted"] * bool((np.diff(stamps) < 0).any())
+        return said + [f"{name}: {doubled} poses have the stamp of another; the last counts"] * bool(doubled)
+
     def in_order(self) -> Trajectory:
         """Return it sorted by its stamps, of equal ones the last."""
         if self.stamps_ns is None or not np.any(np.diff(self.stamps_ns) <= 0):

@@ -36,6 +36,7 @@ MIRRORED: dict[str, tuple[Rotation, str]] = {
 SYSTEMS = {"ros": ("enu", "flu"), "aircraft": ("ned", "frd")}  # the axes of the world, and of bodies in it
 ALIASES = {"opencv": "optical", "blender": "opengl"}
 IN_CENTIMETRES = "unreal"
+ENGINE_ANGLES = {"unreal": "rpy_unreal", "unity": "euler_unity"}  # what these call roll, pitch, yaw, or Euler angles
 OWN = "x,-y,-z"  # axes of one's own, which make (x, -y, -z) of (x, y, z)
 
 

@@ -87,6 +87,31 @@ def from_quaternion(x: N, y: N, z: N, w: N, axes: str, xp: Functions[N], *, degr
     return (first * RADIAN, middle * RADIAN, third * RADIAN) if degrees else (first, middle, third)
 
 
+def from_unreal(roll: N, pitch: N, yaw: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
+    """Return the quaternion of an Unreal rotator: yaw to the right, pitch up, roll clockwise, in Unreal's axes.
+
+    Source: FRotator::Quaternion, which CARLA's Rotation follows: that of rpy with x and y negated.
+    """
+    x, y, z, w = to_quaternion(roll, pitch, yaw, "sxyz", xp, degrees=degrees)
+    return 0.0 - x, 0.0 - y, z, w
+
+
+def as_unreal(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False) -> Three[N]:
+    """Return roll, pitch, yaw of an Unreal rotator."""
+    return from_quaternion(0.0 - x, 0.0 - y, z, w, "sxyz", xp, degrees=degrees)
+
+
+def from_unity(x: N, y: N, z: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
+    """Return the quaternion of Unity's Quaternion.Euler: about the fixed z, then x, then y, in Unity's axes."""
+    return to_quaternion(z, x, y, "szxy", xp, degrees=degrees)
+
+
+def as_unity(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False) -> Three[N]:
+    """Return x, y, z of Unity's eulerAngles, x between -90 and 90 degrees."""
+    about_z, about_x, about_y = from_quaternion(x, y, z, w, "szxy", xp, degrees=degrees)
+    return about_x, about_y, about_z
+
+
 def locked(x: N, y: N, z: N, w: N, axes: str) -> Condition:
     """Say whether a convention is at gimbal lock here: the first and third axis coincide to 1 eps."""
     i, j, k, parity, symmetric, _ = AXES[axes]

@@ -89,15 +89,15 @@ class Representation:
     whole: how it carries the position too, if it can; searched: whether headers are searched for its columns
     alone: columns that say the last number where the others are missing and 0
     batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
+    in_degrees: whether its angles are degrees where their name says no unit
     overview: the units in which an overview shows it ("" for no unit)
     is_place: it says a position on the Earth and no rotation: a row of POSITIONS
     kernels: of a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
     __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "is_place",
-        "kernels", "label",
-        "name", "names", "overview", "searched", "shape", "summary", "whole",
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "in_degrees",
+        "is_place", "kernels", "label", "name", "names", "overview", "searched", "shape", "summary", "whole",
     )  # fmt: skip
 
     def __init__(
@@ -106,7 +106,7 @@ class Representation:
         check: Check | None = None, kept: Callable[..., Components] | None = None,
         shape: str | dict[str, int] = LIST, names: str = "", label: str = "", axes: str = "",
         whole: Whole | None = None, searched: bool = True, alone: str = "", overview: tuple[str, ...] = (),
-        batch: BatchRule | None = None, kernels: str = "",
+        in_degrees: bool = False, batch: BatchRule | None = None, kernels: str = "",
     ) -> None:  # fmt: skip
         """Describe a notation.
 
@@ -125,6 +125,7 @@ class Representation:
         self.whole = whole
         self.searched = searched
         self.alone = tuple(alone.split())
+        self.in_degrees = in_degrees
         self.overview = overview
         self._forward = forward
         self._backward = backward
@@ -308,6 +309,16 @@ REPRESENTATIONS: dict[str, Representation] = {
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
         batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
     ),
+    "rpy_unreal": Representation(
+        "roll pitch yaw", (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",
+        names="roll pitch yaw", shape=MAP, axes="sxyz", alone="yaw", searched=False, in_degrees=True,
+        forward=_angular(euler.from_unreal), backward=_angular(euler.as_unreal),
+    ),
+    "euler_unity": Representation(
+        "euler_x euler_y euler_z", (0, 1, 2), "degrees, Unity's Quaternion.Euler: about z, then x, then y",
+        axes="szxy", searched=False, in_degrees=True,
+        forward=_angular(euler.from_unity), backward=_angular(euler.as_unity),
+    ),
 }  # fmt: skip
 PLACE = "frametool.geometry.place"
 POSITIONS = {
@@ -462,6 +473,8 @@ def notation(spec: str) -> Notation:
         raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
+    if degrees is None and row.in_degrees:
+        degrees = True
     if colon and row.axes != NAMED_AXES:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
     return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)

@@ -218,7 +218,7 @@ def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> lis
 def _searched(given: Notation) -> list[Representation]:
     """Return the representations whose columns are looked for, of those that share their columns the first."""
     same = [row for row in ROTATIONS.values() if row.searched and {*row.columns} == {*given.representation.columns}]
-    return same[:1] or [given.representation]
+    return same[:1] if given.representation.searched else [given.representation]
 
 
 SEARCHED = [*{frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}.values()][::-1]
@@ -538,7 +538,7 @@ def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | No
 def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> Columns | None:
     """Return the rotation whose columns these are, in their order."""
     chosen = Header([header.names[place] for place in places])
-    for row in ROTATIONS.values():
+    for row in dict.fromkeys([*([given.representation] if given is not None else ()), *ROTATIONS.values()]):
         told = given if given is not None and given.representation is row else None
         if not (row.searched or told):
             continue

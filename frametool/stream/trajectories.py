@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from operator import ge
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -167,6 +168,8 @@ def read_stamps(path: str, report: Report, say: Callable[[str], None]) -> list[i
             found.append(stamp)
     if not len(stamps):
         raise FormatError(NO_TIMES, source=file.name)
+    if any(map(ge, found, found[1:])):
+        warn(f"{file.name}: stamps are out of order or doubled; used as they stand")
     return found
 
 

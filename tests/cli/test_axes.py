@@ -130,7 +130,10 @@ def test_unreal_counts_in_centimetres(run: Run) -> None:
     pose = "{xyz: [1.1, -2, 3.0e-7], rpy_deg: [0, 0, 90]}"
     there = run("convert", pose, "--all-axes", "unreal_from_ros", "--to", "rpy_deg")
     assert there.out == "xyz_cm: [110.0, 200.0, 3.0e-05]\nrpy_deg: {roll: 0.0, pitch: 0.0, yaw: -90.0}\n"
-    assert there.err == "frametool: note: Unreal counts in centimetres: xyz is written as xyz_cm\n"
+    assert there.err == (
+        "frametool: note: Unreal counts in centimetres: xyz is written as xyz_cm\n"
+        "frametool: warning: rpy is not what Unreal calls its angles; rpy_unreal is\n"
+    )
     back = run("convert", there.out, "--all-axes", "ros_from_unreal", "--to", "rpy_deg")
     assert back.out == "xyz: [1.1, -2.0, 3.0e-07]\nrpy_deg: {roll: 0.0, pitch: 0.0, yaw: 90.0}\n"
     rows = run("convert", "--all-axes", "unreal_from_ros", stdin="x_cm,y_cm,z_cm\n100,2,3\n")

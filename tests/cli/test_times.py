@@ -59,6 +59,27 @@ def test_echo_begins_and_ends_where_there_are_answers(run: Run) -> None:
     assert (stamps[0], stamps[-1]) == (8.25, 10.5)
 
 
+# --- stamps that stand twice or go back ------------------------------------------------------------------------------
+
+ODD = "".join(f"{stamp} {stamp} 0 0 0 0 0 1\n" for stamp in (1, 2, 2, 4, 3, 5))
+
+
+def test_resample_warns_of_stamps_out_of_order_and_doubled_as_compare_does(run: Run) -> None:
+    for arguments in (["odd.tum", "--rate", "1"], ["even.tum", "--at", "odd.tum"]):
+        done = run("resample", *arguments, files={"odd.tum": ODD, "even.tum": "".join(sorted(set(ODD.splitlines(keepends=True))))})
+        assert done.status == 0
+        assert len(done.out.splitlines()) == 5
+        assert "warning: odd.tum: stamps are out of order; sorted\n" in done.err
+        assert "warning: odd.tum: 1 poses have the stamp of another; the last counts\n" in done.err
+
+
+@pytest.mark.parametrize(("times", "warns"), [("0\n1\n2\n", False), ("0\n2\n1\n", True), ("0\n1\n1\n", True)])
+def test_times_of_a_file_that_go_back_or_stand_twice_are_answered_with_a_warning(run: Run, times: str, *, warns: bool) -> None:
+    done = run("lookup", "drive.yaml", "map", "base", "--times", "times.txt", "-f", "tum", files=FILES | {"times.txt": times})
+    assert [row[:1] for row in done.out.splitlines()] == times.split()
+    assert ("warning: times.txt: stamps are out of order or doubled; used as they stand" in done.err) == warns
+
+
 # --- options -------------------------------------------------------------------------------------------------------
 
 HUGE = ["1e400", "-1e400", "1e999", "9" * 40, "99999999999999999999", "1e30", "nan", "inf", "-inf", "", "soon", "0x10"]

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
+    from frametool.geometry.representations import Notation
     from frametool.grammar.result import Style
     from frametool.stream.request import Operation
 
@@ -116,7 +117,7 @@ def command(inputs: Inputs) -> int:
     request = task.request(operation=operation, notations=forms, window=window, extra_column=inputs.time_column)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
-        _say_centimetres(world, output, is_anew=bool(values) and values != ("-",))
+        _say_of_engines(world, request.given, output, is_anew=bool(values) and values != ("-",))
     is_numbers = _are_numbers(values, has_from=request.given is not None or bool(request.given_place))
     if is_numbers and request.given_place:
         from frametool.cli.earth import mapping_of
@@ -237,9 +238,9 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
     return OtherAxes(left, right, operation.mirrors) if left or right else None
 
 
-def _say_centimetres(world: str | None, output: Output, *, is_anew: bool) -> None:
-    """Tell of the unit of axes whose users count in centimetres, and write what is written anew in it."""
-    from frametool.geometry.conventions import IN_CENTIMETRES
+def _say_of_engines(world: str | None, given: Notation | None, output: Output, *, is_anew: bool) -> None:
+    """Tell of the units and angles that engines call by the same names, and write what is written anew in theirs."""
+    from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES
 
     into, _, out_of = (world or "").partition("_from_")
     if into == IN_CENTIMETRES:
@@ -249,6 +250,9 @@ def _say_centimetres(world: str | None, output: Output, *, is_anew: bool) -> Non
         say(f"note: Unreal counts in centimetres: xyz {here}")
     if out_of == IN_CENTIMETRES:
         say("note: Unreal counts in centimetres: xyz is read as metres, xyz_cm and x_cm say them")
+    for engine, forms in ((into, output.notations), (out_of, (given,) if given else ())):
+        if engine in ENGINE_ANGLES and any(each.representation.name == "rpy" for each in forms):
+            say(f"warning: rpy is not what {engine.title()} calls its angles; {ENGINE_ANGLES[engine]} is")
 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:

@@ -21,7 +21,7 @@ from frametool.cli.options import (
 )
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
-from frametool.errors import FormatError
+from frametool.errors import FormatError, warn
 from frametool.formats.table import by_name, writers
 from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
@@ -65,7 +65,7 @@ def command(inputs: Inputs) -> int:
     found, name, skipped = trajectory(path, inputs.on_error, forms_of(1)[0])
     from frametool.fit.resampling import resampled, stamps_at_rate, stamps_every
 
-    found = found.in_order()
+    found = _in_order(found, name)
     counted = found.stamps_ns is None
     if counted:
         if every is None:
@@ -86,9 +86,16 @@ def _stamps(text: str) -> Any:
     from frametool.errors import FileProblem
 
     try:
-        found: Trajectory = trajectory(text, "stop")[0]
+        found, name, _ = trajectory(text, "stop")
     except (FormatError, FileProblem):
         return np.array(read_times(text, stop), np.int64)
     if found.stamps_ns is None:
         raise click.UsageError(f"--at {text}: the poses there have no stamps")
-    return found.in_order().stamps_ns
+    return _in_order(found, name).stamps_ns
+
+
+def _in_order(found: Trajectory, name: str) -> Trajectory:
+    """Sort a trajectory; warn of what that changes."""
+    for hint in found.disorder(name):
+        warn(hint)
+    return found.in_order()
