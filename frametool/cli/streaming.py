@@ -351,7 +351,8 @@ class Stream:
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
         told = self.inputs
-        if form not in RECORDS and output.told not in RECORDS and request.gathered is None:
+        adds = bool(request.poses) or request.operation.formula is None  # look-ups add by themselves
+        if form not in RECORDS and output.told not in RECORDS and adds and request.gathered is None:
             request = request._replace(keep=told.keep)
         if (form not in RECORDS or request.operation.only_adds) and request.gathered is None:
             request = request._replace(prefix=told.prefix)

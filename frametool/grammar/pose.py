@@ -55,6 +55,7 @@ DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "a
 NAMES = frozenset((*NAME_KEYS, *PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
 MOST_NAMED = 5  # unknown keys in one message, if they fit into
+MOST_CHOICES = 10  # representations that an error names; `help rotations` has all
 MOST_CHARACTERS = 80
 SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
@@ -293,5 +294,5 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     known -= LISTED_WORDS
     if unknown:
         named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
-        choices = ", ".join(ROTATIONS)
+        choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
         raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)

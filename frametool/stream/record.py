@@ -23,6 +23,7 @@ from frametool.grammar.names import (
 )
 from frametool.grammar.pose import (
     COVARIANCE_KEYS,
+    MOST_CHOICES,
     POSE_KEYS,
     POSITION_KEYS,
     SCALE,
@@ -179,7 +180,7 @@ def _nothing_in(document: Any) -> Misfit:
 def _unknown(near: Sequence[tuple[str, str]]) -> Misfit:
     """Build the error for keys that are nearly known."""
     named = unknown_keys(near, len(near))
-    choices = ", ".join(ROTATIONS)
+    choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
     return Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (near[0][0],), key=True)
 
 

@@ -112,7 +112,7 @@ def test_what_moves_is_not_compared_and_what_is_wrong_in_the_tree_is_said_too(ru
 @pytest.mark.parametrize(
     ("options", "status", "message"),
     [
-        (("--tolerance", "1mm"), 2, "--tolerance is about --measured; name the measurements"),
+        (("--tolerance", "1mm"), 2, "--tolerance needs --measured"),
         (("--measured", "m.yaml", "--tolerance", "much"), 2, "write a length, an angle or both: 1mm,0.1deg"),
         (("--measured", "none.yaml"), 5, "none.yaml"),
         (("--measured", "tree.yaml", "--measured", "bad.yaml"), 1, "bad.yaml:1: missing parent"),
