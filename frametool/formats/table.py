@@ -363,7 +363,8 @@ FORMATS = {
         "results of Kalibr as text",
         "frametool.formats.trees.kalibr",
         magic=(
-            ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|T_(?:ci|ic):?[ \t]*\(\w+ to|Camera-system parameters:)"),
+            ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|Camera-system parameters:)"),
+            ("text", r"(?im)^[ \t]*(?:Transformation[ \t]+)?T_(?:ci|ic|\w+_\w+):?[ \t]*\(\w+ to \w"),
         ),
         conventions="target<-source; metres; q of a baseline is the inverse's, as in T_cn_cnm1; "
         "+- and timeshifts not read",
