@@ -123,6 +123,10 @@ _POSE_WORDS = (
     r"xyzw|wxyz|matrix|a[xyz]|theta|[RT]|rotation_matrix|[rq]vec(?:_[wxyz])?|tvec_[xyz]"
 )
 
+_TWO_FRAMES = (
+    r"T_[A-Za-z]\w{0,60}_\w{1,60}|[A-Za-z]\w{0,60}(?:_T_|_to_|_from_)\w{1,60}|[A-Za-z]{1,60}2[A-Za-z]\w{0,60}|"
+    r"extrinsics?(?:_?matrix)?"
+)
 _AT_HEAD = r"(?=(?s:.{0,2000}?)"
 _LENGTH = r"""(?<!\w)%s(?:[_ ]?[({\[]*[ijkn](?: ?- ?1)?[)}\]]*)?["']?\s*(?:[,;:\t ]|[\[(_](?:m|mm|cm)\b|$)"""
 _DH = (
@@ -355,6 +359,7 @@ FORMATS = {
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
             ("json path", "*/T_BS/data"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
+            ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
         ),
         conventions="target<-source as each key says; metres; intrinsics are not kept",
         required_options=("direction", "frames"),
@@ -363,7 +368,8 @@ FORMATS = {
         "results of Kalibr as text",
         "frametool.formats.trees.kalibr",
         magic=(
-            ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|T_(?:ci|ic):?[ \t]*\(\w+ to|Camera-system parameters:)"),
+            ("text", r"(?im)^[ \t]*(?:baseline T_\d+_\d+:|Camera-system parameters:)"),
+            ("text", r"(?im)^[ \t]*(?:Transformation[ \t]+)?T_(?:ci|ic|\w{1,40}_\w{1,40}):?[ \t]*\(\w{1,40} to \w"),
         ),
         conventions="target<-source; metres; q of a baseline is the inverse's, as in T_cn_cnm1; "
         "+- and timeshifts not read",

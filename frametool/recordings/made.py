@@ -103,7 +103,9 @@ def serialised(
     Raises ValueInvalid for names that are no text.
     """
     store = typestore(ros1=form == BAG1)
-    message = _message(store.types, kind, frames, [divmod(stamp, BILLION) for stamp in stamps_ns], numbers)
+    stamps = [divmod(stamp, BILLION) for stamp in stamps_ns]
+    stamps = [((second + (1 << 31)) % (1 << 32) - (1 << 31), part) for second, part in stamps]  # of ROS 1, as int32
+    message = _message(store.types, kind, frames, stamps, numbers)
     try:
         return bytes((store.serialize_ros1 if form == BAG1 else store.serialize_cdr)(message, kind.type))
     except UnicodeEncodeError as error:

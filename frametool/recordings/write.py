@@ -239,8 +239,9 @@ def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
 
 def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:
     """Close what was opened for a recording, and remove what is left of it."""
-    stream.close()
-    file.close()
+    for each in (stream, file):
+        with suppress(OSError):  # on a full disk what waits in it finds no room
+            each.close()
     rmtree(folder, ignore_errors=True)
 
 

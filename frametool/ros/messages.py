@@ -53,7 +53,7 @@ _DATE = (
 
 def is_message(value: dict[str, Any]) -> bool:
     """Tell whether a mapping is a TransformStamped, a list of them, or either in rosbridge's envelope."""
-    return not MARKS.isdisjoint(value) or is_envelope(value)
+    return (not MARKS.isdisjoint(value) and "frame_id" not in value) or is_envelope(value)
 
 
 def is_envelope(value: dict[str, Any]) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Peer
 
+from frametool.errors import FormatError
 from frametool.formats.load import load
 
 if TYPE_CHECKING:
@@ -105,6 +106,21 @@ def test_the_camchain_of_the_same_rig_says_the_same(tmp_path: Path) -> None:
         close(imucam, cam_name, "imu0", wanted)
     close(imucam, "imu1", "imu0", IMU1_IMU0)
     assert imucam.roots == ("imu0",)
+
+
+def test_the_report_of_one_camera_says_the_same(tmp_path: Path) -> None:
+    text = (
+        f"{BEGIN}Transformation T_cam0_imu0 (imu0 to cam0, T_ci): \n{printed(CAM0_IMU)}\n\n"
+        f"cam0 to imu0 time: [s] (t_imu = t_cam + shift)\n0.0012\n\n"
+        f"T_imu0_cam0 (cam0 to imu0, T_ic): \n{printed(INV(CAM0_IMU))}\n"
+    )
+    (tmp_path / "report.txt").write_text(text)
+    tree = load(tmp_path / "report.txt")
+    assert tree.roots == ("imu0",)
+    close(tree, "cam0", "imu0", CAM0_IMU)
+    (tmp_path / "turned.txt").write_text(text.replace(printed(INV(CAM0_IMU)), printed(CAM0_IMU)))
+    with pytest.raises(FormatError, match=r"turned.txt:7: T_cam0_imu0 \(imu0 to cam0\) differs from T_imu0_cam0"):
+        load(tmp_path / "turned.txt")
 
 
 def test_what_it_means_is_told_and_frames_are_called_otherwise(run: Callable[..., Any]) -> None:

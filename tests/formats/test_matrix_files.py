@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -156,6 +157,21 @@ def test_a_key_that_says_no_direction_is_asked_for_with_both_spellings(tmp_path:
     ((parent, child, _),) = one.edges()
     assert matrix(one, parent, child) == pytest.approx(rigid(3), abs=1e-15)
     assert matrix(other, child, parent) == pytest.approx(rigid(3), abs=1e-15)
+
+
+@pytest.mark.parametrize("layout", ["{%s: %s}", '{"%s": %s}', '{\n  "K": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],\n  "%s": %s}', "%s: %s"])
+@pytest.mark.parametrize("key", ["T_cam_lidar", "lidar_to_cam", "lidar2cam", "extrinsic", "extrinsic_matrix"])
+def test_a_matrix_alone_is_known_by_its_key_in_yaml_and_json(run: Callable[..., Any], layout: str, key: str) -> None:
+    name = "e.json" if '"' in layout else "e.yaml"
+    files = {name: layout % (key, f"[{', '.join(str(row) for row in CAM0_IMU.tolist())}]")}
+    names = ("--frames", "lidar,cam") * key.startswith("extrinsic")
+    if key != "T_cam_lidar":
+        done = run("tree", name, *names, files=files)
+        assert (done.status, done.out) == (2, "")
+        assert f"'{key}': the key does not say its direction: give --direction parent-from-child (takes points of cam" in done.err
+        names = (*names, "--direction", "child-from-parent")
+    found = json.loads(run("lookup", name, "cam", "lidar", *names, "-f", "json", "--to", "matrix", files=files).out)
+    assert np.array(found["matrix"])[:3, :3] == pytest.approx(CAM0_IMU[:3, :3])
 
 
 def test_an_unknown_key_in_a_block_is_about_that_camera(tmp_path: Path) -> None:

@@ -79,7 +79,10 @@ def refusal(tmp_path: Path, *texts: str | bytes) -> str:
     return str(caught.value).replace(f"{tmp_path}/", "")
 
 
-@pytest.mark.parametrize("text", [LISTED, ROS, JSON], ids=["list", "ros", "json"])
+FRAME_IDS = LISTED.replace("{name:", "{child_frame_id:").replace("parent:", "frame_id:")
+
+
+@pytest.mark.parametrize("text", [LISTED, FRAME_IDS, ROS, JSON], ids=["list", "frame ids", "ros", "json"])
 def test_all_spellings_make_the_same_tree(tmp_path: Path, text: str) -> None:
     expected, found = tree_of(tmp_path, NESTED), tree_of(tmp_path, text)
     assert set(found.frames) == set(expected.frames)

@@ -122,6 +122,15 @@ def test_stamps_before_1970_have_a_place_in_ros_2_only(run: Run, tmp_path: Path)
     assert done.err.endswith("stamp 2147483648.000000000 has no place in mcap, whose seconds are -2147483648 .. 2147483647\n")
 
 
+def test_a_tree_of_2038_and_later_has_a_place_in_ros_1(run: Run) -> None:
+    stamps = (2_147_483_648_000_000_001, 4_294_967_295_999_999_999)
+    samples = ", ".join(f"{{stamp_ns: {stamp}, xyz: [1, 2, 3]}}" for stamp in stamps)
+    files = {"t.yaml": f"frames: [{{name: b, parent: a, samples: [{samples}]}}]\n"}
+    assert run("tree", "t.yaml", "-o", "t.bag", files=files).err == ""
+    back = run("tree", "t.bag", "-f", "yaml", "--quiet").out
+    assert back == run("tree", "t.yaml", "-f", "yaml", "--quiet").out
+
+
 def test_rows_whose_stamps_go_back_keep_their_order_and_are_logged_in_order(run: Run, tmp_path: Path) -> None:
     text = as_tum([5, 3, 9], [[float(at), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for at in range(3)])
     run("convert", "-i", "w.tum", "-o", "w.mcap", files={"w.tum": text})
@@ -305,6 +314,20 @@ def test_what_is_killed_while_it_writes_leaves_nothing(tmp_path: Path, form: str
         time.sleep(0.5)
         process.send_signal(signal.SIGKILL)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a limit of the size of files is one of POSIX")
+def test_a_bag_that_finds_no_room_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "t.yaml").write_text("frames: {a: {b: {xyz: [1, 2, 3]}}}\n")
+    code = (
+        "import resource, signal, sys; from frametool.cli import run; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024)); sys.exit(run(['tree', 't.yaml', '-o', 't.bag']))"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (5, "")
+    assert done.stderr == f"frametool: {tmp_path}: file too large\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["t.yaml"]
 
 
 def test_a_name_that_is_no_text_is_refused() -> None:

@@ -4,6 +4,7 @@ r"""What Kalibr prints and keeps as results-cam-*.txt and results-imucam-*.txt: 
         q: [-0.00087935 -0.00270995 -0.0008824 0.99999555] +- [..]    x y z w, of the inverse rotation
         t: [-0.02997144 -0.00027389 0.00036353] +- [..]               cam0 as seen from cam1, metres
     T_ci:  (imu0 to cam0):                                            takes points of imu0 to cam0
+    Transformation T_cam0_imu0 (imu0 to cam0, T_ci):                  the same
     [[ 0.00852045 .. ]]                                               four rows of four
 
 The q of a baseline turns the other way than the matrix T_cn_cnm1 of the same camchain does: Kalibr's quaternions are
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 # a baseline by its two numbers; a matrix between two frames; one below the number of its IMU
 _HEAD = re.compile(
-    r"(?im)^[ \t]*(?:(?P<name>baseline T_(?P<to>\d+)_(?P<of>\d+)):|(?P<key>T_\w+|Baseline):?[ \t]*"
-    r"\((?P<source>\w+) to (?P<target>\w+)\)|(?P<imu>IMU\d+):[ \t\r]*$|(?P<own>T_i_b)[ \t\r]*$)"
+    r"(?im)^[ \t]*(?:(?P<name>baseline T_(?P<to>\d+)_(?P<of>\d+)):|(?:Transformation[ \t]+)?(?P<key>T_\w+|Baseline):?"
+    r"[ \t]*\((?P<source>\w+) to (?P<target>\w+)(?:, T_\w+)?\)|(?P<imu>IMU\d+):[ \t\r]*$|(?P<own>T_i_b)[ \t\r]*$)"
 )
 _ROWS = re.compile(r"[^\n]*\n\s*\[\[([^\[\]]*(?:\]\s*\[[^\[\]]*)*)\]\]")
 _VECTOR = r"[^\n]*\n(?:[^\n]*\n)??[ \t]*{}:\s*\[([^\[\]]*)\]"
