@@ -116,7 +116,7 @@ def tell(source: Source, notes: list[Finding], most: int = 10) -> None:
 
 def alike(note: Finding) -> str:
     """Return what notes have in common that are told once, whatever the names and numbers in some are."""
-    return note.rule if note.rule in ("slash", "identity", "rounded") else note.message
+    return str(note.rule if note.rule in ("slash", "identity", "rounded") else note.message)
 
 
 def more_like_it(count: int) -> str:
