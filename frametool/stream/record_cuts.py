@@ -151,7 +151,7 @@ class RecordCutter:
         for own in parts:
             begin, first, last, after = (place + start for place in own[:4])
             part = Part(begin, first, last, after, own.problem, own.outside)
-            if (hit := matches.get(own.start)) is not None:
+            if not part.problem and (hit := matches.get(own.start)) is not None:
                 yield part, (hit[0], [(a + start, b + start) for a, b in hit[1]])
             else:
                 yield part, None if part.problem else self.match(text, first, last)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from flow import MOVE, flow
 from hypothesis import given
 from hypothesis import strategies as st
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 GOOD, TEXT, HUGE = '{"id": "a,]", "x": 1, "y": 2, "z": 3}', '{"x": "a", "y": 2, "z": 3}', '{"x": 1e999, "y": 2, "z": 3}'
 LAYOUTS = [
@@ -93,3 +97,15 @@ def test_nothing_is_written_of_an_array_whose_first_record_is_an_error(layout: s
 def test_an_empty_array_stays_what_it_is(text: str) -> None:
     for on_error in ("stop", "skip", "null"):
         assert flow(text.encode(), MOVE._replace(on_error=on_error), "json").text == text.encode()
+
+
+@pytest.mark.parametrize("between", [" ", "\n", "\n  "])
+@pytest.mark.parametrize("command", ["invert", "convert"])
+def test_a_comma_that_is_missing_between_records_is_an_error(run: Callable[..., Any], command: str, between: str) -> None:
+    record = '{"xyz":[1,2,3]}'
+    text = f"[{record},\n{record}{between}{record}]\n"
+    done = run(command, stdin=text)
+    assert done.status == 1
+    assert done.err == f"frametool: stdin:{2 + between.count(chr(10))}: a comma is missing before this record\n"
+    left = run(command, "--on-error", "skip", stdin=text)
+    assert (left.status, len(json.loads(left.out))) == (3, 2)
