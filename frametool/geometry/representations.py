@@ -96,8 +96,8 @@ class Representation:
     """
 
     __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns",
-        "in_degrees", "is_place", "kernels", "label", "name", "names", "overview", "searched", "shape", "summary", "whole",
+        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "in_degrees",
+        "is_place", "kernels", "label", "name", "names", "overview", "searched", "shape", "summary", "whole",
     )  # fmt: skip
 
     def __init__(
