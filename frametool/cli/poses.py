@@ -321,7 +321,7 @@ class ArgumentPoses(NamedTuple):
         return self.poses
 
 
-def _given(argument: str, request: Request) -> ArgumentPoses:
+def _given(argument: str | Source, request: Request) -> ArgumentPoses:
     """Read all poses of one of several arguments; warnings are kept, not told."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
@@ -405,8 +405,8 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
-    """Read the one pose of an argument."""
-    return _only(poses_from(argument, request), argument)
+    """Read the one pose of an argument; warn of what else stands there."""
+    return _only(_given(argument, request).only_poses(timed=False), argument)
 
 
 def _only(poses: list[Pose], argument: str | Source) -> Pose:
