@@ -321,7 +321,7 @@ class ArgumentPoses(NamedTuple):
         return self.poses
 
 
-def _given(argument: str, request: Request) -> ArgumentPoses:
+def _given(argument: str | Source, request: Request) -> ArgumentPoses:
     """Read all poses of one of several arguments; warnings are kept, not told."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
@@ -363,7 +363,11 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
     bare = [without_inverse(each)[0] for each in arguments]
     if bare.count("-") > 1:
         raise click.UsageError("standard input can be read once; only one argument may be -")
-    stream = next((at for at, each in enumerate(bare) if each == "-" or has_table(each)), None)
+    streams = [at for at, each in enumerate(bare) if each == "-" or has_table(each)]
+    if len(streams) > 1:
+        files = " and ".join(bare[at] for at in streams)
+        raise click.UsageError(f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")
+    stream = streams[0] if streams else None
     given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(given) if each and each.beside]
     at = [0, *says_more, *_several(given)][-1] if stream is None else stream
@@ -401,8 +405,8 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
-    """Read the one pose of an argument."""
-    return _only(poses_from(argument, request), argument)
+    """Read the one pose of an argument; warn of what else stands there."""
+    return _only(_given(argument, request).only_poses(timed=False), argument)
 
 
 def _only(poses: list[Pose], argument: str | Source) -> Pose:

@@ -390,10 +390,10 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     what = "this text"
     if begin.xml:
         likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].magic))
-        what = f"XML with the root element {bare(''.join(begin.elements[:1]))}"
-    named = first_of(likely, _MOST_NAMED)
+        what = f"XML with the root element {bare(begin.elements[0])}" if begin.elements else "XML without an element"
+    named = f"forms: {first_of(likely, _MOST_NAMED)}" if likely else "none of those read here is XML"
     return FormatError(
-        f"cannot tell the form of {what}; forms: {named}; `frametool formats` lists all, --in FORM names one",
+        f"cannot tell the form of {what}; {named}; `frametool formats` lists all, --in FORM names one",
         source=name or "stdin",
         line=1,
     )

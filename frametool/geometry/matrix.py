@@ -63,27 +63,29 @@ def gram(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Six[N]:
 
 def defect(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
     """Return the largest entry of |R R^T - 1|: how far the rows are from orthonormal."""
-    return _beyond(1.0, *gram(a, b, c, d, e, f, g, h, i), xp)
+    aa, bb, cc, ab, ac, bc = gram(a, b, c, d, e, f, g, h, i)
+    return largest_of([abs(aa - 1.0), abs(bb - 1.0), abs(cc - 1.0), abs(ab), abs(ac), abs(bc)], xp)
 
 
-def _beyond(wanted: N | float, aa: N, bb: N, cc: N, ab: N, ac: N, bc: N, xp: Functions[N]) -> N:
-    """Return the largest entry by which a Gram matrix differs from `wanted` times the identity."""
-    return largest_of([abs(aa - wanted), abs(bb - wanted), abs(cc - wanted), abs(ab), abs(ac), abs(bc)], xp)
-
-
-def is_multiple(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N, xp: Functions[N], one: float = 1.0) -> Condition:
+def is_multiple(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N, one: float = 1.0) -> Condition:
     """Tell from its Gram matrix whether a matrix is a rotation times another number than 1, whose square is `one`."""
     square = (aa + bb + cc) / 3.0
-    return (_beyond(square, aa, bb, cc, ab, ac, bc, xp) <= EQUAL * square) & (abs(square - one) > EQUAL * one)
+    alike = _within((1.0 - EQUAL) * square, (1.0 + EQUAL) * square, aa, bb, cc, ab, ac, bc)
+    return alike & (abs(square - one) > EQUAL * one)
 
 
 def is_near(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
-    """Tell from its Gram matrix G whether all singular values of a matrix lie in 0.9 .. 1.1.
+    """Tell from its Gram matrix G whether all singular values of a matrix lie in 0.9 .. 1.1."""
+    return _within(NEAREST, FURTHEST, aa, bb, cc, ab, ac, bc)
 
-    G - 0.81 and 1.21 - G are both positive definite: so are their leading minors (Sylvester).
+
+def _within(low: N | float, high: N | float, aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
+    """Return True if the eigenvalues of a Gram matrix G lie between two numbers.
+
+    G - low and high - G are both positive definite: so are their leading minors (Sylvester).
     """
-    return _is_positive(aa - NEAREST, bb - NEAREST, cc - NEAREST, ab, ac, bc) & _is_positive(
-        FURTHEST - aa, FURTHEST - bb, FURTHEST - cc, -ab, -ac, -bc
+    return _is_positive(aa - low, bb - low, cc - low, ab, ac, bc) & _is_positive(
+        high - aa, high - bb, high - cc, -ab, -ac, -bc
     )
 
 
@@ -143,7 +145,7 @@ def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Function
     right: Condition = determinant(a, b, c, d, e, f, g, h, i) > SINGULAR
     if not xp.furthest(off) <= TOLERATED:
         products = gram(a, b, c, d, e, f, g, h, i)
-        right, off = right & is_near(*products), xp.where(is_multiple(*products, xp), inf, off)
+        right, off = right & is_near(*products), xp.where(is_multiple(*products), inf, off)
     return xp.where(right, off, inf)
 
 
@@ -199,7 +201,7 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
         problem = f"matrix {_shown(entries)} is singular; no rotation is nearest to it"
     elif off <= TOLERATED:
         return None
-    elif is_multiple(*products, floats, ldexp(1.0, min(-2 * exponent, 1000))):
+    elif is_multiple(*products, ldexp(1.0, min(-2 * exponent, 1000))):
         size = ldexp(sqrt(sum(products[:3]) / 3.0), exponent)
         problem = f"matrix is {size:.6g} times a rotation: a similarity, not a pose (--scale takes it as one)"
     else:

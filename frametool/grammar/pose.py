@@ -35,7 +35,7 @@ from frametool.grammar.rotation_spelling import (
     is_rotation,
     read_rotation,
 )
-from frametool.text.numbers import parse_length, parse_number
+from frametool.text.numbers import NotFinite, parse_length, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -223,7 +223,7 @@ def read_scale(value: Any) -> float:
     try:
         scale = parse_number(value)
     except ValueInvalid as error:
-        raise Misfit(str(error), (SCALE,)) from None
+        raise (NotARotation if isinstance(error, NotFinite) else Misfit)(str(error), (SCALE,)) from None
     if scale <= 0.0:
         raise NotARotation(f"scale is {value}; it must be positive", (SCALE,))
     return scale

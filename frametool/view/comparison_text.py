@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import atan2, degrees, hypot
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from frametool.text.csv_line import quoted
@@ -10,7 +12,7 @@ from frametool.text.csv_line import quoted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-LABEL, CELL, NAME = 16, 10, 18  # characters
+WIDTH, LABEL, CELL, NAME, LONGEST = 80, 16, 10, 18, 24  # characters; a longer name does not push the rest aside
 COLUMNS = ("rmse", "mean", "median", "p95", "max")
 TITLES = ("est", "ate", "max", "deg", "along", "across", "up", "rpe", "kitti", "scale", "paired")
 CSV_TITLES = (
@@ -24,7 +26,8 @@ LARGE = 1e5
 def write_comparison(found: dict[str, Any]) -> str:
     """Write the numbers of one comparison: the pairs first, then the fit, then the errors."""
     poses, settings = found["poses"], found["settings"]
-    width = max(NAME, *(len(found[side]) + 2 for side in ("ref", "est")))
+    longest = 2 + max(len(found["ref"]), len(found["est"]))
+    width = max(NAME, longest if longest <= LONGEST else 0)
     duration = "" if found["ref_duration_s"] is None else f", {found['ref_duration_s']:.3f} s"
     share = 100 * poses["paired"] / max(poses["possible"], 1)
     how = {
@@ -33,8 +36,8 @@ def write_comparison(found: dict[str, Any]) -> str:
         "number": ", by number",
     }[settings["match"]]
     lines = [
-        f"{found['ref']:<{width}}reference: {poses['ref']} poses{duration}, {found['path_m']['ref']:.3f} m",
-        f"{found['est']:<{width}}{poses['paired']} of {poses['possible']} poses paired ({share:.0f} %){how}",
+        f"{found['ref'] + '  ':<{width}}reference: {poses['ref']} poses{duration}, {found['path_m']['ref']:.3f} m",
+        f"{found['est'] + '  ':<{width}}{poses['paired']} of {poses['possible']} poses paired ({share:.0f} %){how}",
     ]
     if found["offset_s"]:
         side = "behind" if found["offset_s"] > 0 else "ahead"
@@ -46,7 +49,10 @@ def write_comparison(found: dict[str, Any]) -> str:
         lines.append(f"{'mount':<{width}}{place} m" + (f", turned by {turn:.3f} deg" if turn else ""))
     each = "  ".join(f"{kind} {_short(value)}" for kind, value in found["ate_by_alignment"].items())
     lines += [f"{'fit ' + settings['align'] + '; ate m':<{width}}{each}"]
-    lines.append(" " * LABEL + "".join(f"{title:>{CELL}}" for title in COLUMNS))
+    indent = " " * LABEL
+    folded = partial(fill, width=WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    lines = [*map(folded, lines)]
+    lines.append(indent + "".join(f"{title:>{CELL}}" for title in COLUMNS))
     ate = found["ate"]
     for label, key in (("ate m", "m"), ("ate deg", "deg"), ("ate rot", "rot"), ("ate full", "full"),
                        ("  along m", "along_m"), ("  across m", "across_m"), ("  up m", "up_m")):  # fmt: skip

@@ -275,3 +275,11 @@ def test_records_with_stamps_are_a_trajectory(run: Run) -> None:
     assert (alone["m"], alone["deg"]) == (wanted["m"], None)
     mixed = lines + '{"xyz": [1, 2, 3]}\n'
     assert "some poses have a stamp and some have none" in run("compare", "drone-ref.tum", "-", stdin=mixed, files=FILES).err
+
+
+@pytest.mark.parametrize("name", ["e.tum", "est-" + "by-some-slam-" * 3 + "in-may.tum"])
+def test_text_fits_eighty_columns_whatever_files_are_called(run: Run, name: str) -> None:
+    files = {f"ref-{name}": FILES["drone-ref.tum"], name: FILES["drone-est.tum"]}
+    lines = run("compare", f"ref-{name}", name, files=files).out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert any(line.startswith(name) for line in lines)

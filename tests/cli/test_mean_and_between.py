@@ -276,3 +276,10 @@ def test_of_many_left_out_the_rest_are_counted(run: Run) -> None:
     found = robust(run, stdin=rows)
     assert (found.status, found.err.count("left out")) == (3, 21)
     assert found.err.endswith("frametool: warning: 5 more poses left out\n")
+
+
+def test_relative_of_two_trajectories_says_what_it_takes_and_what_compares_them(run: Run) -> None:
+    row = "1 0 0 0 0 0 0 1\n"
+    done = run("relative", "a.tum", "b.tum", files={"a.tum": row, "b.tum": row})
+    assert (done.status, done.out) == (2, "")
+    assert "only one argument may hold rows, a.tum and b.tum do; frametool compare takes two trajectories" in done.err

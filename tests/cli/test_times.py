@@ -73,11 +73,11 @@ def test_resample_warns_of_stamps_out_of_order_and_doubled_as_compare_does(run: 
         assert "warning: odd.tum: 1 poses have the stamp of another; the last counts\n" in done.err
 
 
-@pytest.mark.parametrize(("times", "warns"), [("0\n1\n2\n", False), ("0\n2\n1\n", True), ("0\n1\n1\n", True)])
-def test_times_of_a_file_that_go_back_or_stand_twice_are_answered_with_a_warning(run: Run, times: str, *, warns: bool) -> None:
+@pytest.mark.parametrize(("times", "warnings"), [("0\n1\n2\n", 0), ("0\n2\n1\n", 1), ("0\n1\n1\n", 1)])
+def test_times_of_a_file_that_go_back_or_stand_twice_are_answered_with_a_warning(run: Run, times: str, warnings: int) -> None:
     done = run("lookup", "drive.yaml", "map", "base", "--times", "times.txt", "-f", "tum", files=FILES | {"times.txt": times})
     assert [row[:1] for row in done.out.splitlines()] == times.split()
-    assert ("warning: times.txt: stamps are out of order or doubled; used as they stand" in done.err) == warns
+    assert done.err.count("warning: times.txt: stamps are out of order or doubled; used as they stand") == warnings
 
 
 # --- options -------------------------------------------------------------------------------------------------------

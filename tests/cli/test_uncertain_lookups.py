@@ -292,3 +292,10 @@ def test_a_sigma_reaches_lookups_of_a_batch_and_of_merged_trees(run: Run) -> Non
     done = run("batch", stdin=lines)
     first, second = map(entries_of, done.out.splitlines())
     assert first == second == entries_of(run("lookup", "robot.yaml", "map", "tool", "--covariance", "-f", "json").out)
+
+
+@pytest.mark.parametrize(("beside", "left_out"), [("stamp: 3", "'stamp'"), ("note: far", "'note'"), ("name: a", "")])
+def test_what_else_the_pose_of_a_transform_says_is_told_to_be_left_out(run: Run, beside: str, left_out: str) -> None:
+    done = run("apply", "--transform", f"{{xyz: [1, 2, 3], {beside}}}", "1", "2", "3")
+    assert (done.status, done.out) == (0, "point: [2.0, 4.0, 6.0]\n")
+    assert done.err == (left_out and f"frametool: warning: argument: {left_out} left out: only its pose is used\n")

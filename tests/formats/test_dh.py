@@ -140,6 +140,8 @@ def test_headers_have_many_names(written: str, column: tuple[str, str] | None) -
         ("- {theta: 0, d: 90deg, a: 2, alpha: 0}\n", "a.csv:1:17: '90deg' is not a length"),
         ("- {theta: 0, d: 1, a: 2, alpha: 2cm}\n", "a.csv:1:33: '2cm' is not an angle"),
         ("thta,d,a,alpha\n0,1,2,3\n", "a.csv:1:1: unknown column 'thta'; did you mean 'theta'?"),
+        ("theta,d,a,alpha\n0,null,1,0\n", "a.csv:2:3: 'null' is empty where a number is expected"),
+        ("- {theta: true, d: 0, a: 1, alpha: 0}\n", "a.csv:1:11: 'true' is a truth value where a number is expected"),
         ("theta,d,a,alpha\n,1,2,3\n", "a.csv:2:1: '' is empty where a number is expected"),
     ],
 )

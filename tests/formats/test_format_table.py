@@ -473,3 +473,13 @@ def test_a_form_that_was_written_is_refused_as_an_output_with_what_to_write(run:
     for output in (("-f", name), ("-o", f"a{UNSUPPORTED[name].suffixes[0]}")):
         found = run("convert", *output, stdin="x,y,z\n1,2,3\n")
         assert (found.status in (1, 2), found.out, found.err.count("\n"), remedy in found.err) == (True, "", 1, True)
+
+
+@pytest.mark.parametrize(("data", "said"), [
+    (b"<note/>", "cannot tell the form of XML with the root element note; none of those read here is XML; `frametool "),
+    (b"<!DOCTYPE note", "cannot tell the form of XML without an element; none of those read here is XML; `frametool "),
+])  # fmt: skip
+def test_xml_where_no_form_is_xml_names_no_forms(run: Callable[..., Any], data: bytes, said: str) -> None:
+    found = run("convert", "file.xml", files={"file.xml": data})
+    assert (found.status, found.out) == (1, "")
+    assert said in found.err

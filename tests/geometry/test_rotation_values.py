@@ -410,3 +410,14 @@ def test_one_item_loads_no_numpy() -> None:
         "sys.exit(bool({'numpy', 'dataclasses', 'typing', 'decimal', 'yaml', 'rich', 'click'} & set(sys.modules)))"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_singular_values_of_more_than_a_thousandth_apart_are_no_multiple() -> None:
+    """Whichever way they are turned: an entry of the Gram matrix may be off by less than the values are."""
+    turns = batch((60,)).as_matrix()
+    entries = turns[:30] @ np.diag([1.0025, 1.0016, 0.9989]) @ turns[30:]
+    nearest = Rotation.from_matrix(entries, normalize=True)
+    assert np.max(nearest.distance(Rotation.from_matrix(turns[:30] @ turns[30:]))) < 1e-2
+    for each in entries:
+        with pytest.raises(ValueInvalid, match="normalize it"):
+            Rotation.from_matrix(each)

@@ -126,3 +126,9 @@ def test_what_is_no_scale_of_a_pose_passes(run: Run) -> None:
     assert [json.loads(line) for line in done.out.splitlines()] == [
         {"point": [2.0, 2.0, 3.0], "scale": size} for size in range(20)
     ]
+
+
+@pytest.mark.parametrize("scale", [".nan", ".inf", "1e999", "0", "-1"])
+def test_a_scale_that_is_none_is_bad_data_as_other_numbers_are(run: Run, scale: str) -> None:
+    for pose in (f"{{xyz: [1, 2, 3], scale: {scale}}}", "{xyz: [1, 2, .nan]}"):
+        assert run("apply", "--transform", pose, "1", "2", "3").status == 1

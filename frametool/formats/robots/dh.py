@@ -66,7 +66,7 @@ KINDS = {
 _BRACKETED = r"(.+?)[ _]*[\[(] *([\w°]+) *[\])]"
 _SUFFIXED = r"(.+)_([a-z]+)"
 _INDEX = r"[ _]*[({\[]*(?:i|n|j|k)(?: *[-_] *1)?[)}\]]*$"  # theta_i, a_(i-1), alpha_{i-1}
-_VARIABLE = r"([^\W\d]\w*)\*?(?: *([-+]) *(.+))?"  # q1, d3*, q2 - pi/2
+_VARIABLE = r"(?!(?i:null|none|true|false)\b)([^\W\d]\w*)\*?(?: *([-+]) *(.+))?"  # q1, d3*, q2 - pi/2
 _STARRED = r"(.*?) *\*"
 
 

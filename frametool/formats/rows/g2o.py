@@ -63,8 +63,10 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
             unknown[words[0]] += 1
             first = first or number
     if unknown:
-        counts = listing((f"{count} {tag}" for tag, count in unknown.items()), 3)
-        message = f"lines of unknown tags left out: {counts}{did_you_mean(next(iter(unknown)), kinds)}"
+        tag = next(iter(unknown))
+        near = did_you_mean(tag, [each for each in kinds if each.startswith(tag)] or kinds)
+        counts = listing((f"{count} {each}" for each, count in unknown.items()), 3)
+        message = f"lines of unknown tags left out: {counts}{near}"
         options.tally.note(message, first)
     if only_others > 0:
         as_poses = "edges in it, which measure and are no tree; as poses: frametool convert FILE --edges"
