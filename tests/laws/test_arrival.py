@@ -41,7 +41,6 @@ READ = {
 }  # fmt: skip
 WHOLE: dict[tuple[str, str], Outcome] = {}
 SEAMS = {  # a beginning of the line, a file, cuts: why the pieces differ today
-    (MOVE, "bad.json", "byte by byte, line by line, in halves, the first line alone"): "an array goes on behind a broken record, at a place that depends on what has arrived",
     (MOVE, "odometry.yaml", "byte by byte, line by line"): "a large sigma is warned of in records that come alone, and not in a block of several",
     (MOVE, "odometry.jsonl", "byte by byte, line by line"): "a large sigma is warned of in records that come alone, and not in a block of several",
 }
