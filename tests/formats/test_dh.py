@@ -10,7 +10,7 @@ import pytest
 
 from frametool.errors import BadAnswer, FormatError, Unanswered
 from frametool.formats.load import load
-from frametool.formats.robots.dh import Column, column_of
+from frametool.formats.robots.dh import Amount, Column, column_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -170,3 +170,9 @@ def test_a_name_beside_columns_is_that_of_the_robot(tmp_path: Path) -> None:
 def test_a_joint_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadAnswer, match="'q9'"):
         read(tmp_path, SCARA, dh="standard", joints={"q9": 1.0})
+
+
+def test_degrees_and_radians_of_one_angle_are_added() -> None:
+    total = Amount(90.0, degrees=True).plus(Amount(0.25))
+    assert (total.degrees, total.number) == (False, pi / 2 + 0.25)
+    assert Amount(0.25).plus(Amount(90.0, degrees=True)).number == pi / 2 + 0.25

@@ -304,3 +304,12 @@ def test_rows_of_csv_in_bulk_are_those_written_one_by_one(use: Use, precision: t
     singly = [use(*apply, data=npy(records[at : at + 1])).out.splitlines()[1] for at in range(50)]
     assert rows[1:] == singly
     assert [float(row.split(",")[-1]) for row in rows[1:]] == [float(str(value)) for value in power]
+
+
+def test_whole_numbers_in_a_column_of_stamps_are_seconds(run: Any) -> None:
+    names = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    rows = np.array([(2, 1, 2, 3, 0, 0, 0, 1), (3, 1, 2, 3, 0, 0, 0, 1)], [("t", "<i8"), *((name, "<f8") for name in names)])
+    file = io.BytesIO()
+    np.save(file, rows)
+    done = run("convert", "-i", "rows.npy", "-f", "tum", "--quiet", files={"rows.npy": file.getvalue()})
+    assert [line.split()[0] for line in done.out.splitlines()] == ["2.000000000", "3.000000000"]
