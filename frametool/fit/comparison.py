@@ -341,15 +341,6 @@ def _by_alignment(pairs: Pairs, first: Pairs, up: Array) -> dict[str, float | No
     return found
 
 
-def _shared_turn(est: Trajectory, ref: Trajectory) -> Rotation | None:
-    """Return the rotation of REF's body in EST's if it is clear and the same all the way."""
-    if ref.rotation is None or est.rotation is None:
-        return None
-    turns = est.rotation.inverse() @ ref.rotation
-    shared = turns.mean()
-    return shared if float(shared.angle()) > max(APART, STEADY * _spread(turns)) else None
-
-
 def _spread(rotations: Rotation) -> float:
     """Return the rms angle of rotations from their mean."""
     return sqrt((rotations.distance(rotations.mean()) ** 2).mean())

@@ -111,11 +111,11 @@ MOST_LINES = {  # code lines of a room, and behind it what is aimed at; a featur
     "cli": 6_532,  # 5 200
     "ros": 1_234,  # with recordings 1 900
     "recordings": 1_144,
-    "fit": 2_630,  # 2 200
+    "fit": 2_624,  # 2 200
     "view": 2_159,  # 1 800
     "explain": 1_236,  # 1 000
 }
-MOST_IN_ALL = 44_843  # 36 000
+MOST_IN_ALL = 44_837  # 36 000
 MOST_FILES = 311  # 190
 MOST_OF_PAGES = 1_900
 
