@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer as TransformBuffer
     from frametool.frames.lookups import FrameTree as FrameTree
     from frametool.frames.trajectory import Trajectory as Trajectory
+    from frametool.geometry.camera import Camera as Camera
     from frametool.geometry.rotation import Rotation as Rotation
     from frametool.geometry.transform import Transform as Transform
     from frametool.lint.tree_diff import diff as diff
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _HOMES = {
+    "Camera": "frametool.geometry.camera",
     "calc": "frametool.calc",
     "FORMATS": "frametool.formats.table",
     "FollowController": "frametool.sim.drivers",
