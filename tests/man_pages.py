@@ -9,10 +9,9 @@ from pathlib import Path
 import click
 
 from frametool import __version__
+from frametool.cli.command import EXIT_CODES, option_groups, option_row
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.help import topic, topics
-from frametool.cli.group import option_groups, option_row
-from frametool.cli.options import EXIT_CODES
 
 FOLDER = Path(__file__).resolve().parent.parent / "frametool" / "data" / "share" / "man" / "man1"
 
@@ -45,7 +44,7 @@ def _of_command(name: str, about: str, command: click.Command) -> str:
 
 
 def _overview() -> str:
-    from frametool.cli.group import HELP
+    from frametool.cli.commands import HELP
 
     lines = [*_heading("frametool", "the calculator for rigid-body frames"), ".SH SYNOPSIS", ".B frametool", "COMMAND [OPTIONS] .."]
     lines += [".SH DESCRIPTION", *_prose(HELP), ".SH COMMANDS"]

@@ -65,7 +65,7 @@ def run(arguments: list[str]) -> int:
 
 def _run(arguments: list[str], own: int | None) -> int:
     """Run one command, whose errors may have an exit code of its own; trouble with stdout is the caller's."""
-    from frametool.cli.group import answered, called
+    from frametool.cli.commands import answered, called
     from frametool.cli.stderr import say_error, wants_json
     from frametool.errors import FrametoolError
 

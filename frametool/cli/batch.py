@@ -12,12 +12,11 @@ import sys
 from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from io import BytesIO, TextIOBase, TextIOWrapper
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import click
 
-from frametool.cli.commands import TROUBLE
-from frametool.cli.group import answered, called, called_in, group
+from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.shell_words import NAME, ShellWords, split
 from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.cli.trees import TreeCache
@@ -30,7 +29,6 @@ from frametool.stream.row_layout import PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from typing import BinaryIO
 
 MOST_JOINED = 1000  # lines of one command
 _ASSIGNMENT = re.compile(rf"[ \t]*({NAME})[ \t]*=[ \t]*")

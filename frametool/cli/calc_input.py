@@ -21,20 +21,20 @@ from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import LONGEST, CalcError, frame_text
 from frametool.calc.rules import wanted
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
+from frametool.cli.command import Text
 from frametool.cli.commands.help import topic
-from frametool.cli.options import Text
 from frametool.cli.poses import source_of
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say_error, tell
 from frametool.cli.trees import load_tree
-from frametool.documents.source import HEAD, decode, opened
+from frametool.documents.source import HEAD, Source, decode, opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
 from frametool.formats.table import FORMATS, is_trajectory
 from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit
 from frametool.grammar.readers import tell as tell_notes
-from frametool.grammar.result import Result
+from frametool.grammar.result import Result, Style
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
-    from frametool.documents.source import Source
-    from frametool.grammar.result import Style
 
 OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
 LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import inputs
+from frametool.cli.command import inputs
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
 from frametool.formats.detect import of_folder
 from frametool.formats.table import BAG, FORMATS, by_suffix, holds_arrays, writers
 from frametool.frames.stamps import format_stamp
-from frametool.stream.faults import Fault
+from frametool.stream.faults import BadRows, Fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from frametool.cli.streaming import Stream
     from frametool.geometry.types import Rigid
     from frametool.ros.point_clouds import PointCloud
-    from frametool.stream.faults import BadRows
 
 PLACES: dict[str, Callable[[PointCloud], str]] = {
     "stamp_ns": lambda cloud: str(cloud.stamp_ns),

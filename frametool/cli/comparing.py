@@ -9,22 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import inputs as running
-from frametool.cli.group import option
-from frametool.cli.options import TEXT, Parsed, together
+from frametool.cli.command import Inputs, option, together
+from frametool.cli.command import inputs as running
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
 from frametool.errors import ValueInvalid, shown, warn
-from frametool.stream.faults import MOST, STOP
+from frametool.stream.faults import MOST, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.fit.comparison import Comparison, Delta, Settings
     from frametool.frames.trajectory import Trajectory
-    from frametool.stream.faults import BadRows
 
 LONGEST = 2.0**62  # nanoseconds
 NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9, "": 1e9}
@@ -115,45 +112,28 @@ def _read_lengths(text: str) -> tuple[float, ...]:
 
 ALIGN = ("se3", "sim3", "yaw", "origin", "none")
 pairing_options = together(
-    option("--match", type=click.Choice(("interpolate", "nearest")), metavar="HOW",
-                 help="interpolate or nearest  [default: interpolate]"),
-    option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
-                 help="that is interpolated  [default: 3 median intervals]"),
-    option("--max-diff", "max_diff_ns", type=Parsed("time", read_span), metavar="TIME",
-                 help="of nearest stamps  [default: 10ms]"),
-    option("--min-match", type=Parsed("share", _read_share), metavar="SHARE",
-                 help="fewer partners are an error  [default: 10%]"),
-    option("--start", type=Parsed("time", _read_limit), metavar="TIME",
-                 help="first pair, a stamp of REF; +5s is after the first"),
-    option("--end", type=Parsed("time", _read_limit), metavar="TIME", help="last pair"),
-    option("--offset", type=Parsed("offset", _read_offset), metavar="TIME|auto",
-                 help="what EST's clock is behind; auto:LIMIT finds it"),
-    option("--mount", type=TEXT, metavar="POSE|auto",
-                 help="REF's body in EST's; also FILE:BODY:POINT"),
-    option("--align", type=click.Choice(ALIGN), metavar="FIT",
-                 help=f"{', '.join(ALIGN)}  [default: se3]"),
-    option("--align-first", type=Parsed("length", _read_first), metavar="N|10s|5m",
-                 help="fit by the first pairs alone"),
-    option("--up", type=Parsed("axis", _read_up), metavar="AXIS",
-                 help="of REF's world: z, -y ..  [default: z]"),
+    option("--match HOW", "interpolate or nearest  [default: interpolate]", ("interpolate", "nearest")),
+    option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span, name="max_gap_ns"),
+    option("--max-diff TIME", "of nearest stamps  [default: 10ms]", read_span, name="max_diff_ns"),
+    option("--min-match SHARE", "fewer partners are an error  [default: 10%]", _read_share),
+    option("--start TIME", "first pair, a stamp of REF; +5s is after the first", _read_limit, under="Time"),
+    option("--end TIME", "last pair", _read_limit),
+    option("--offset TIME|auto", "what EST's clock is behind; auto:LIMIT finds it", _read_offset),
+    option("--mount POSE|auto", "REF's body in EST's; also FILE:BODY:POINT"),
+    option("--align FIT", f"{', '.join(ALIGN)}  [default: se3]", ALIGN),
+    option("--align-first N|10s|5m", "fit by the first pairs alone", _read_first),
+    option("--up AXIS", "of REF's world: z, -y ..  [default: z]", _read_up),
 )  # fmt: skip
 error_options = together(
-    option("--delta", "deltas", type=Parsed("deltas", _read_deltas), metavar="1m,5deg,..",
-                 help="of rpe: m, s, deg, frames  [default: 1m,10m,100m]"),
-    option("--all-pairs", is_flag=True, help="rpe from every pose, not in a chain"),
-    option("--tolerance", requires=("all_pairs",), type=Parsed("share", _read_share), metavar="SHARE",
-                 help="of the delta of all pairs  [default: 10%]"),
-    option("--pairs-from", type=click.Choice(("reference", "estimate")), metavar="WHICH",
-                 help="reference or estimate  [default: reference]"),
-    option("--segments", type=Parsed("lengths", _read_lengths), metavar="100,200,..",
-                 help="of kitti, metres  [default: 100,200,..,800]"),
-    option("--segment-step", type=click.IntRange(1), metavar="N",
-                 help="one from every N-th pair  [default: 10]"),
-    option("--as", "like", type=click.Choice(("evo",)), help="what evo does where nothing else is said"),
+    option("--delta 1m,5deg,..", "of rpe: m, s, deg, frames  [default: 1m,10m,100m]", _read_deltas, name="deltas"),
+    option("--all-pairs", "rpe from every pose, not in a chain"),
+    option("--tolerance SHARE", "of the delta of all pairs  [default: 10%]", _read_share, requires=("all_pairs",)),
+    option("--pairs-from WHICH", "reference or estimate  [default: reference]", ("reference", "estimate")),
+    option("--segments 100,200,..", "of kitti, metres  [default: 100,200,..,800]", _read_lengths),
+    option("--segment-step N", "one from every N-th pair  [default: 10]", click.IntRange(1)),
+    option("--as", "what evo does where nothing else is said", ("evo",), name="like"),
 )  # fmt: skip
-trajectory_options = together(
-    option("--on-error", type=click.Choice((STOP, "skip")), default=STOP, show_default=True, help="bad rows"),
-)  # fmt: skip
+trajectory_options = option("--on-error", "bad rows", (STOP, "skip"), default=STOP, under="Rows")
 
 
 def trajectory(

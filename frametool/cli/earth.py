@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import inputs
+from frametool.cli.command import inputs
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
 from frametool.geometry.place import UTM, Earth, Origin, Place, kernels
-from frametool.geometry.representations import POSITIONS
+from frametool.geometry.representations import POSITIONS, Notation
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.place import read_at
 from frametool.grammar.readers import Misfit, Reading, tell
@@ -22,7 +22,6 @@ from frametool.grammar.readers import Misfit, Reading, tell
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.geometry.representations import Notation
     from frametool.geometry.types import Vector
 
 FIRST = "first"

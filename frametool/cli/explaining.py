@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FULL, pose_reading_options, together
+from frametool.cli.command import Inputs, option, together
+from frametool.cli.options import FULL, pose_reading_options
 from frametool.cli.output import Output
 from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of, without_inverse
 from frametool.cli.streaming import Stream, stream_options
@@ -18,7 +18,6 @@ from frametool.errors import FormatError, heard_by, warn
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.operations import WrittenPose
@@ -31,8 +30,7 @@ ONE_RECORD = "--explain derives one record; write it as an argument"
 
 def explain_option(**rest: Any) -> Callable[[Any], Any]:
     """Return --explain, with what it says of other options."""
-    about = "derive the result step by step (help explain)"
-    return option("--explain", type=click.Choice(FORMS), metavar="[=FORM]", help=about, **rest)
+    return option("--explain [=FORM]", "derive the result step by step (help explain)", FORMS, under="Result", **rest)
 
 
 EXPLAIN = explain_option()

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import ColumnNames, together
-from frametool.cli.trees import frame_name
+from frametool.cli.command import Inputs, option, together
+from frametool.cli.options import ColumnNames
+from frametool.cli.trees import CarriedSigmas, frame_name
 from frametool.errors import UnknownFrame
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frametool.cli.explaining import PoseTask
-    from frametool.cli.group import Inputs
-    from frametool.cli.trees import CarriedSigmas
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Components
@@ -30,9 +28,8 @@ ONE_LOOKUP = ("times", "source_at", "fixed", "explain")  # which a table does no
 
 def _column_option(end: str, *excludes: str) -> Callable[..., Any]:
     about = f"column of a table with each row's {end}"
-    return option(
-        f"--{end.lower()}-column", excludes=(*ONE_LOOKUP, *excludes), type=ColumnNames(), metavar="NAME", help=about
-    )
+    under = "Time" if end == "time" else "Rows"
+    return option(f"--{end.lower()}-column NAME", about, ColumnNames(), excludes=(*ONE_LOOKUP, *excludes), under=under)
 
 
 column_options = together(  # `RowFrames` takes them

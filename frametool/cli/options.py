@@ -9,145 +9,26 @@ import os
 import re
 import sys
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import INPUTS, Inputs, WithHelp, check_together, inputs, option
-from frametool.cli.sink import checked_by
+from frametool.cli.command import Inputs, Text, inputs, option, together
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
-from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
+    from frametool.cli.command import Adds
     from frametool.formats.load import Rules
     from frametool.grammar.result import Result
 
-    Function = TypeVar("Function", bound=Callable[..., Any])
-
-# an argument that begins like this is a number, whatever short options there are
-NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 STREAMED = ("records", "rows", "arrays")
 READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
-
-
-class Command(WithHelp):
-    """A command whose arguments may be negative numbers.
-
-    click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
-    own check of misspelled options; `Text` takes the blank off again.
-    """
-
-    def make_parser(self, ctx: click.Context) -> Any:
-        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
-        parser: Any = super().make_parser(ctx)
-        parse = parser.parse_args
-
-        def parse_once(args: list[str]) -> Any:
-            found = parse(args=args)
-            told = [] if ctx.resilient_parsing else found[2]
-            for each in told:
-                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
-                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
-            return found
-
-        parser.parse_args = parse_once
-        return parser
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
-        if any(map(_is_negative, args)):
-            options = {name for each in self.get_params(ctx) for name in each.opts}
-            args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
-        if "inv" in args:
-            args = _joined(args, ctx, always=self.name in OF_POSES)
-        for name in {*OPTIONAL}.intersection(args):
-            args = _with_value(args, name, *OPTIONAL[name])
-        rest = super().parse_args(ctx, args)
-        if not ctx.resilient_parsing:
-            check_together(ctx)
-        return rest
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
-        given = ctx.meta[INPUTS] = Inputs.of(ctx)
-        with checked_by(given.refuse_idle):
-            result = ctx.invoke(self.callback or (lambda _: 0), given)
-        given.refuse_idle()
-        _say_not_needed(given)
-        return result
-
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """End every help with the exit codes, those of most commands unless its epilog says others."""
-        formatter.write_paragraph()
-        formatter.write_text(self.epilog or EXIT_CODES)
-
-
-# options that may stand bare, and their values: the first is what they mean then
-OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
-
-
-OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
-
-
-def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
-    """Write the word `inv` before a pose as inv(POSE); before what may be no pose it is a name, unless `always`."""
-    joined: list[str] = []
-    for each in reversed(args):
-        is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))
-        if each == "inv" and is_pose and not joined[-1].startswith("--"):
-            joined.append(f"inv({joined.pop()})")
-        elif each == "inv" and always:
-            raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
-        else:
-            joined.append(each)
-    return joined[::-1]
-
-
-def _is_negative(argument: str) -> bool:
-    """Tell whether an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
-    is_long = argument[:2] == "--" and argument[2:3].isalpha()
-    return argument[:1] == "-" and not is_long and re.match(NEGATIVE, argument) is not None
-
-
-def _with_value(args: list[str], option: str, *values: str) -> list[str]:
-    """Join an option with the value behind it, or its usual one: click would take any argument there for its value."""
-    joined = []
-    for before, each, behind in zip(["", *args], args, [*args[1:], ""], strict=False):
-        if each == option:
-            joined.append(f"{option}={behind if behind in values else values[0]}")
-        elif before != option or each not in values:
-            joined.append(each)
-    return joined
-
-
-class Text(click.types.StringParamType):
-    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
-
-    name = "text"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
-        """Remove the blank."""
-        return value[1:] if value[:1] == " " and _is_negative(value[1:]) else value
-
-    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
-        """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
-        return {}
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
-        """Offer what begins as the incomplete word does."""
-        from click.shell_completion import CompletionItem
-
-        offered = self.offers(ctx, incomplete)
-        if offered is None:
-            return [CompletionItem(incomplete, type="file")]
-        return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]
 
 
 class Utf8(Text):
@@ -160,33 +41,6 @@ class Utf8(Text):
         return super().convert(value, param, ctx)
 
 
-class File(Text):
-    """A file's name."""
-
-    name = "file"
-
-    def offers(self, ctx: click.Context, incomplete: str) -> None:  # noqa: ARG002
-        """Leave it to the shell."""
-        return
-
-
-class Parsed(Text):
-    """A text that a function reads; what it refuses is a wrong value of the option."""
-
-    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
-        """Keep what it is called, and what reads it."""
-        self.name = name
-        self.parse = parse
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it."""
-        try:
-            return self.parse(super().convert(value, param, ctx)) if isinstance(value, str) else value
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
-
-
-Number = partial(Parsed, "number", parse_number)  # finite, read as documents read theirs
 FULL = -1  # digits: as many as the number has
 
 
@@ -315,63 +169,42 @@ def _names_in(path: str) -> list[str]:
         return []  # nothing to offer, and a completion must not print
 
 
-TEXT = Text()
 UTF8 = Utf8()
-FILE = File()
-
-
-def together(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
-    """Return what adds several options to a command, in this order in its help."""
-
-    def add(function: Function) -> Function:
-        for add_option in reversed(options):
-            function = add_option(function)
-        return function
-
-    return add
 
 
 # --- inputs --------------------------------------------------------------------------------------------------------
 
-verbose_option = option("-v", "--verbose", is_flag=True, help="say what each input was taken for")
-in_option = option(
-    "--in", "input_forms", type=Form(READ, "read"), multiple=True, metavar="FORM",
-    help="form of the input (`frametool formats`), once a file",
-)  # fmt: skip
-_CAMERA_AXES = option(
-    "--camera-axes", "camera_axes", type=click.Choice(CAMERA_AXES),
-    help="what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
-)  # fmt: skip
-_STAMPS = option(
-    "--stamps", "stamps", type=FILE, metavar="FILE", help="times of the poses of a form without, one a line"
+_of_files, _of_times, _of_rotations, _of_results, _of_forms = (
+    partial(option, under=heading) for heading in ("Files", "Time", "Rotations", "Result", "Forms")
 )
-_EDGES = option("--edges", "edges", is_flag=True, help="read the edges of a g2o graph instead of its vertices")
-_TOPIC = option(
-    "--topic", "topics", type=TEXT, multiple=True, metavar="NAME", help="read only this topic; may be repeated"
-)
+verbose_option = _of_files("-v --verbose", "say what each input was taken for")
+_IN = "form of the input (`frametool formats`), once a file"
+in_option = _of_files("--in FORM", _IN, Form(READ, "read"), name="input_forms", multiple=True)
+_CAMERA_AXES = _of_forms(
+    "--camera-axes", "what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
+    CAMERA_AXES,
+)  # fmt: skip
+_STAMPS = _of_forms("--stamps FILE", "times of the poses of a form without, one a line")
+_EDGES = _of_forms("--edges", "read the edges of a g2o graph instead of its vertices")
+_TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)
+_ORDER = _of_forms("--from", "order of quaternions in lists of numbers", ORDERS, name="order")
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
-    option("-j", "--joint", "joints", type=TEXT, multiple=True, metavar="NAME=VALUE",
-             help="value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; may be repeated"),
-    option("--joints", "joint_files", type=FILE, multiple=True, metavar="FILE",
-             help="values of joints: a map, JointState messages, CSV, MJCF:KEY"),
-    option("--frames", "named_frames", type=TEXT, multiple=True, metavar="WORLD,BODY",
-             help="names of frames that a form does not name; may be repeated, in the order of the files"),
-    option("--direction", "direction", type=click.Choice(DIRECTIONS),
-             help="of matrices whose key does not say which frame they are seen from"),
+    _of_forms("-j --joint NAME=VALUE", "value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; "
+              "may be repeated", name="joints", multiple=True),
+    _of_forms("--joints FILE", "values of joints: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
+              multiple=True),
+    _of_forms("--frames WORLD,BODY", "names of frames that a form does not name; may be repeated, "
+              "in the order of the files", name="named_frames", multiple=True),
+    _of_forms("--direction", "of matrices whose key does not say which frame they are seen from", DIRECTIONS),
     _CAMERA_AXES,
-    option("--dh", "dh", type=click.Choice(DH), help="which Denavit-Hartenberg parameters a table holds"),
+    _of_forms("--dh", "which Denavit-Hartenberg parameters a table holds", DH),
     _STAMPS,
 )  # fmt: skip
 
 
-_ORDER = option("--from", "order", type=click.Choice(ORDERS), help="order of quaternions in lists of numbers")
-
-
-def reading_options(
-    *, streams: bool = False, order: bool = True, topics: bool = True
-) -> Callable[[Function], Function]:
+def reading_options(*, streams: bool = False, order: bool = True, topics: bool = True) -> Adds:
     """Add to a command the options that say how files of frames are read; `opened` heeds them.
 
     streams: the command has those of streams too, `--in`, `--quiet` and `--from` among them
@@ -379,8 +212,8 @@ def reading_options(
     """
     if streams:
         return together(_TOPIC, *_READING)
-    quiet = option("--quiet", "quiet", is_flag=True, help="no word on what files were taken for")
-    return together(in_option, quiet, *[_TOPIC] * topics, *_READING, *[_ORDER] * order)
+    quiet = _of_files("--quiet", "no word on what files were taken for")
+    return together(in_option, *[_TOPIC] * topics, quiet, *_READING, *[_ORDER] * order)
 
 
 def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
@@ -400,28 +233,17 @@ def say_if_verbose(text: str) -> None:
         say(text)
 
 
-def _say_not_needed(given: Inputs) -> None:
-    """Say on stderr which options change nothing, where only what was read or is written shows whether they do."""
-    forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
-    for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
-        if chosen and not given.quiet and not any(ask in asks for _, asks in given.forms_read):
-            why = f": {forms} does not leave that open" if forms else " here"
-            say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
-
-
 # --- results -------------------------------------------------------------------------------------------------------
 
-_PRECISION = option(
-    "--precision", type=Digits(), metavar="N|full", help="digits after the point  [default: full; overviews 6]"
-)
+_PRECISION = _of_results("--precision N|full", "digits after the point  [default: full; overviews 6]", Digits())
 _PLACE = (
-    option("-o", "--output", type=FILE, metavar="FILE", help="write this file, whole or not at all"),
-    option("--force", is_flag=True, requires=("output", "report"), help="let --output replace a file"),
+    _of_results("-o --output FILE", "write this file, whole or not at all"),
+    _of_results("--force", "let --output replace a file", requires=("output", "report")),
 )
 
 
 def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
-    return option("-f", "--format", "format_name", type=WrittenForm(("text", *forms)), help=text)
+    return option("-f --format", text, WrittenForm(("text", *forms)), name="format_name")
 
 
 MESSAGES = ("pose", "tf", "path", "point", "fix")
@@ -437,25 +259,23 @@ def parse_messages(text: str) -> tuple[str, ...]:
 
 
 _RECORDING = (
-    option("--messages", "messages", type=Parsed("messages", parse_messages), metavar="KIND,..", default=(),
-             help=f"messages of a recording: {', '.join(MESSAGES)}  [default: as the rows are]"),
-    option("--topic-out", "topic_out", type=TEXT, metavar="NAME", help="the topic of a recording with one"),
+    _of_results("--messages KIND,..", f"messages of a recording: {', '.join(MESSAGES)}  [default: as the rows are]",
+                parse_messages, default=()),
+    _of_results("--topic-out NAME", "the topic of a recording with one"),
 )  # fmt: skip
 # of commands that have no --frames for what they read
-frames_out_option = option(
-    "--frames", "recorded_frames", type=TEXT, metavar="WORLD,BODY",
-    help="what the frames of poses in a recording are called; adds /tf",
-)  # fmt: skip
+_FRAMES_OUT = "what the frames of poses in a recording are called; adds /tf"
+frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, name="recorded_frames")
 
 
-def result_options(*what: str) -> Callable[[Function], Function]:
+def result_options(*what: str) -> Adds:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     forms = writers(*what)
     recording = [] if set(forms).isdisjoint(writers("recording")) else _RECORDING
-    return together(_form_option(forms, "form of the result"), _PRECISION, *recording, *_PLACE)
+    return together(_form_option(forms, "form of the result"), *_PLACE, _PRECISION, *recording)
 
 
-def list_options(*more: str) -> Callable[[Function], Function]:
+def list_options(*more: str) -> Adds:
     """Add to a command the options that shape and place a list for people, which is text wherever it goes.
 
     more: forms beside text and those of reports
@@ -463,29 +283,28 @@ def list_options(*more: str) -> Callable[[Function], Function]:
     return together(_form_option((*writers("report"), *more), "form of the result  [default: text]"), *_PLACE)
 
 
-# how rotations are written
-rotation_options = together(
-    option(
-        "--to", "notations", type=Notations(), metavar="REP[,REP..]",
-        help="representations of the result  [default: quaternion]",
-    ),
-    option("--deg", is_flag=True, help="angles in degrees"),
-    option("--keep-sign", is_flag=True, help="leave the quaternion's sign as it comes out"),
-    option("--local-axes", "local_axes", type=click.Choice(("enu", "ned", "grid", "ecef")),
-             help="what rotations at a place on the Earth are given in (help earth)"),
-    option("--origin", "origin", type=TEXT, metavar="PLACE|first", help="where east north up 0 0 0 is"),
-    option("--zone", "zone", type=TEXT, metavar="32N", help="the one zone of UTM"),
+_TO = together(
+    _of_rotations("--to REP[,REP..]", "representations of the result  [default: quaternion]", Notations(),
+                  name="notations"),
+    _of_rotations("--deg", "angles in degrees"),
 )  # fmt: skip
-# how poses are read; commands have it with `rotation_options`
-pose_options = option("--normalize", is_flag=True, help="take any non-zero quaternion, matrices off by 0.1")
+_SIGNS = together(
+    _of_rotations("--keep-sign", "leave the quaternion's sign as it comes out"),
+    _of_rotations("--local-axes", "what rotations at a place on the Earth are given in (help earth)",
+                  ("enu", "ned", "grid", "ecef")),
+    _of_rotations("--origin PLACE|first", "where east north up 0 0 0 is"),
+    _of_rotations("--zone 32N", "the one zone of UTM"),
+)  # fmt: skip
+# how poses are read; how rotations are written; both
+pose_options = _of_rotations("--normalize", "take any non-zero quaternion, matrices off by 0.1")
+rotation_options = together(_TO, _SIGNS)
+whole_pose_options = together(_TO, pose_options, _SIGNS)
+scale_option = option("--scale", "take a matrix s R as a similarity of scale s")
 
 
-scale_option = option("--scale", is_flag=True, help="take a matrix s R as a similarity of scale s")
-
-
-def pose_result_options(*what: str) -> Callable[[Function], Function]:
+def pose_result_options(*what: str) -> Adds:
     """Add to a command the options that say how poses are read, and those of its result."""
-    return together(rotation_options, pose_options, result_options(*what))
+    return together(whole_pose_options, result_options(*what))
 
 
 # --- times ---------------------------------------------------------------------------------------------------------
@@ -577,34 +396,26 @@ def at_ns(chosen: int | str | None) -> int | None:
     return chosen if isinstance(chosen, int) else None
 
 
+LIMIT = Time(latest=False)
 # how moving frames are taken
 rules_options = together(
-    option("--moving", is_flag=True, help="an edge with one stamp answers only that instant"),
-    option(
-        "--cache", type=Time(latest=False), metavar="SECONDS", help="forget what is older  [default: nothing]"
-    ),
+    _of_times("--moving", "an edge with one stamp answers only that instant"),
+    _of_times("--cache SECONDS", "forget what is older  [default: nothing]", LIMIT),
 )
-times_option = option(
-    "--times", excludes=("explain",), type=TEXT, metavar="TIMES",
-    help="many: T,T,.., START:STOP:STEP, or the stamps of FILE",
-)
-LIMIT = Time(latest=False)
-offset_option = option(
-    "--time-offset", "time_offset", type=LIMIT, metavar="SECONDS", help="add this to all stamps read"
-)
+_TIMES = "many: T,T,.., START:STOP:STEP, or the stamps of FILE"
+times_option = _of_times("--times TIMES", _TIMES, excludes=("explain",))
+offset_option = _of_times("--time-offset SECONDS", "add this to all stamps read", LIMIT)
 limit_options = together(
+    _of_times("--start TIME", "leave out what is before", LIMIT),
+    _of_times("--stop TIME", "leave out what is after", LIMIT),
     offset_option,
-    option("--start", type=LIMIT, metavar="TIME", help="leave out what is before"),
-    option("--stop", type=LIMIT, metavar="TIME", help="leave out what is after"),
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
 moving_options = together(rules_options, offset_option, reading_options(order=False), verbose_option)
-tree_options = together(moving_options, _ORDER, pose_options, rotation_options)
-color_option = option(
-    "--color", type=click.Choice(("auto", "always", "never")), default="auto", show_default=True,
-    help="colour of the text; auto is on a terminal, and NO_COLOR is heeded",
-)  # fmt: skip
+tree_options = together(moving_options, _ORDER, whole_pose_options)
+_COLOR = "colour of the text; auto is on a terminal, and NO_COLOR is heeded"
+color_option = _of_results("--color", _COLOR, ("auto", "always", "never"), default="auto")
 
 
 def window_of(given: Inputs) -> tuple[int, int] | None:

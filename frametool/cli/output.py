@@ -29,18 +29,17 @@ from frametool.formats.table import (
     is_trajectory,
     writers,
 )
-from frametool.geometry.representations import EARTH_FRAMES, notation
+from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from contextlib import AbstractContextManager
 
-    from frametool.cli.group import Inputs
+    from frametool.cli.command import Inputs
     from frametool.cli.sink import Write
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
-    from frametool.geometry.representations import Notation
     from frametool.grammar.pose import Pose
     from frametool.stream.record_results import Rows
     from frametool.stream.request import Operation

@@ -14,7 +14,7 @@ from frametool.grammar.result import Recorded
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frametool.cli.group import Inputs
+    from frametool.cli.command import Inputs
 
 
 def recorded(chosen: Inputs, form: str, output: str | None) -> Recorded:

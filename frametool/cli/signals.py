@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-from contextlib import contextmanager
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from types import FrameType
 
 # those that the system has: Windows knows no SIGHUP
@@ -43,7 +42,7 @@ class _Signals:
         self.interrupted = True
 
 
-_signals = _Signals()
+STATE = _Signals()
 
 
 def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
@@ -51,7 +50,7 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
     caught = [each for each in ENDING if signal.getsignal(each) not in (signal.SIG_IGN, None)]
     try:
         for number in caught:
-            signal.signal(number, _signals.end)
+            signal.signal(number, STATE.end)
         return run(arguments)
     except Terminated as error:
         return die_of(str(error))
@@ -62,20 +61,7 @@ def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
 
 def clean_up() -> None:
     """Let what ends the run be raised from here on, in the middle of an import too."""
-    _signals.cleans_up = True
-
-
-@contextmanager
-def whole_lines() -> Iterator[None]:
-    """Hold Ctrl-C back until a block of lines is written."""
-    _signals.writing = True
-    try:
-        yield
-    finally:
-        _signals.writing = False
-    if _signals.interrupted:
-        _signals.interrupted = False
-        raise KeyboardInterrupt
+    STATE.cleans_up = True
 
 
 def die_of(name: str) -> int:

@@ -9,14 +9,15 @@ import math
 import os
 import sys
 from contextlib import ExitStack
+from functools import partial
 from itertools import combinations
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FULL, TEXT, Digits, Number, Parsed, together
+from frametool.cli.command import Inputs, option, together
+from frametool.cli.options import FULL, Digits
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
@@ -28,77 +29,71 @@ from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
 from frametool.sim.drivers import LAWS, LEADERS, TARGETS, Mailbox, built_in, scripted
 from frametool.sim.readers import parse_seconds, parse_spawn, read_commands, read_script
-from frametool.sim.simulate import RunSummary, simulate
+from frametool.sim.simulate import RunSummary, SimulationStep, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.cli.group import Inputs
     from frametool.cli.sink import Write
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
-    from frametool.sim.simulate import SimulationStep
     Watch = Callable[[SimulationStep], None]
 
-NUMBER = Number()
-SPAWN_TYPE = Parsed("x,y,theta", parse_spawn)
-SECONDS = Parsed("seconds", parse_seconds)
-DURATION = Parsed("seconds", lambda text: math.inf if text == "inf" else parse_seconds(text))
-LEADER = option("--leader", type=TEXT, default="still", show_default=True, metavar="NAME|FILE|-",
-                      help="still, circle, square, figure8, random, a file of commands, or - for standard input")
+
+
+def parse_duration(text: str) -> float:
+    """Read seconds, or inf."""
+    return math.inf if text == "inf" else parse_seconds(text)
+
+
+_LEADER = "still, circle, square, figure8, random, a file of commands, or - for standard input"
+LEADER = option("--leader NAME|FILE|-", _LEADER, default="still")
+_of_turtles = partial(option, under="Turtles")
 
 
 def follow_options(duration: str) -> Callable[[Any], Any]:
     """Add to a command the options of followers; `duration` is how long it runs by default."""
-    options = [
-        option("--followers", type=click.IntRange(0, 1000), default=1, show_default=True, metavar="N",
-                     help="each follows the one before, the first follows turtle1"),
-        option("--law", type=click.Choice(tuple(LAWS)), default="ros1", show_default=True,
-                     help="the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)"),
-        option("--rate", type=NUMBER, metavar="HZ", help="control steps a second"),
-        option("--gain-linear", type=NUMBER, metavar="K", help="speed for each metre of distance"),
-        option("--gain-angular", type=NUMBER, metavar="K", help="turn rate for each radian of bearing"),
-        option("--max-linear", type=NUMBER, metavar="V", help="fastest speed in m/s  [default: none]"),
-        option("--max-angular", type=NUMBER, metavar="W", help="fastest turn in rad/s  [default: none]"),
-        option("--target", type=click.Choice(TARGETS), default="leader", show_default=True,
-                     help="the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m"),
-        option("--delay", type=SECONDS, default=0.0, metavar="S",
-                     help="follow where the target was so long ago, looked up through world  [default: 0]"),
-        option("--spawn", type=SPAWN_TYPE, default="4,2,0", show_default=True, metavar="X,Y,THETA",
-                     help="where turtle2 begins: metres, radians (or 90deg)"),
-        option("--duration", type=DURATION, default=duration, show_default=True, metavar="S",
-                     help="simulated seconds, or inf"),
-        option("--turtlesim", type=click.Choice(VARIANTS), default="ros1", show_default=True,
-                     help="whose turtlesim"),
-        option("--holonomic", is_flag=True, help="let linear.y count in ROS 2, as the node's parameter does"),
-        option("--seed", type=click.IntRange(0), default=0, show_default=True, help="of the random leader"),
-    ]  # fmt: skip
-    return together(*options)
-
-
-def output_options(function: Any) -> Any:
-    """Add to a command the options that say what is shown of a run."""
-    options = (
-        option("--emit", type=click.Choice(EMITS), default="commands", show_default=True,
-                     help="followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`"),
-        option("--reach", type=NUMBER, default=0.5, show_default=True, metavar="D",
-                     help="metres that count as having come to the target"),
-        option("--realtime", is_flag=True, help="one simulated second a second, instead of as fast as possible"),
-        option("--live", is_flag=True, help="draw the turtles in the terminal, in real time"),
-        option("--view", type=TEXT, metavar="FILE.html", help="show their frames over time in a page, as `view`"),
-        option("-f", "--format", "format_name", type=click.Choice(FORMS),
-                     help="form of the records  [default: text on a terminal, yaml otherwise]"),
-        option("--precision", type=Digits(), metavar="N|full",
-                     help="digits after the point  [default: the shortest text that reads back to the same bits]"),
-        option("-o", "--output", type=TEXT, metavar="FILE",
-                     help="write there instead of stdout, whole or not at all"),
-        option("--plot", type=TEXT, metavar="FILE", help="draw the result into a .svg, .html or .png"),
-        option("--force", requires=("output", "plot", "view"), is_flag=True,
-               help="let --output and --plot replace existing files"),
+    return together(
+        option("--followers N", "each follows the one before, the first follows turtle1", click.IntRange(0, 1000),
+               default=1),
+        option("--law", "the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)", (*LAWS,),
+               default="ros1"),
+        option("--rate HZ", "control steps a second", parse_number),
+        _of_turtles("--gain-linear K", "speed for each metre of distance", parse_number),
+        _of_turtles("--gain-angular K", "turn rate for each radian of bearing", parse_number),
+        _of_turtles("--max-linear V", "fastest speed in m/s  [default: none]", parse_number),
+        _of_turtles("--max-angular W", "fastest turn in rad/s  [default: none]", parse_number),
+        _of_turtles("--target", "the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m", TARGETS,
+                    default="leader"),
+        _of_turtles("--delay S", "follow where the target was so long ago, looked up through world  [default: 0]",
+                    parse_seconds, default=0.0),
+        option("--spawn X,Y,THETA", "where turtle2 begins: metres, radians (or 90deg)", parse_spawn, default="4,2,0"),
+        option("--duration S", "simulated seconds, or inf", parse_duration, default=duration),
+        _of_turtles("--turtlesim", "whose turtlesim", VARIANTS, default="ros1"),
+        _of_turtles("--holonomic", "let linear.y count in ROS 2, as the node's parameter does"),
+        _of_turtles("--seed", "of the random leader", click.IntRange(0), default=0),
     )  # fmt: skip
-    return together(*options)(function)
+
+
+output_options = together(  # what is shown of a run
+    option("--emit", "followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`", EMITS,
+           default="commands"),
+    _of_turtles("--reach D", "metres that count as having come to the target", parse_number, default=0.5),
+    _of_turtles("--realtime", "one simulated second a second, instead of as fast as possible"),
+    option("--live", "draw the turtles in the terminal, in real time"),
+    option("--view FILE.html", "show their frames over time in a page, as `view`"),
+    option("-f --format", "form of the records  [default: text on a terminal, yaml otherwise]", FORMS,
+           name="format_name"),
+    option("--precision N|full", "digits after the point  [default: the shortest text that reads back to the same "
+           "bits]", Digits(), under="Result"),
+    option("-o --output FILE", "write there instead of stdout, whole or not at all", under="Result"),
+    option("--plot FILE", "draw the result into a .svg, .html or .png"),
+    option("--force", "let --output and --plot replace existing files", requires=("output", "plot", "view"),
+           under="Result"),
+)  # fmt: skip
 
 
 class SimOutput(NamedTuple):

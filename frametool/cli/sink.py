@@ -11,7 +11,7 @@ from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from frametool.cli.signals import clean_up, whole_lines
+from frametool.cli.signals import STATE, clean_up
 from frametool.errors import FileProblem, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
@@ -110,6 +110,19 @@ def _encoded(text: str) -> bytes:
         return text.encode()
     except UnicodeEncodeError as error:
         raise ValueInvalid(f"{shown(error.object[error.start :])} cannot be written as UTF-8 text") from None
+
+
+@contextmanager
+def whole_lines() -> Iterator[None]:
+    """Hold Ctrl-C back until a block of lines is written."""
+    STATE.writing = True
+    try:
+        yield
+    finally:
+        STATE.writing = False
+    if STATE.interrupted:
+        STATE.interrupted = False
+        raise KeyboardInterrupt
 
 
 @contextmanager

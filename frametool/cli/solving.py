@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import inputs
+from frametool.cli.command import inputs
 from frametool.cli.stderr import say, say_error
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY

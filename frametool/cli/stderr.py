@@ -6,13 +6,12 @@ import os
 import sys
 from contextlib import contextmanager, suppress
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from frametool.errors import FrametoolError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from typing import TextIO
 
 
 class BatchLine(NamedTuple):
@@ -81,7 +80,7 @@ def say_warning(message: str, rule: str = "") -> None:
     With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
     """
     if rule == "slash":
-        from frametool.cli.group import inputs
+        from frametool.cli.command import inputs
 
         if inputs().quiet:
             return

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import option
+from frametool.cli.command import Inputs, option, together
 from frametool.cli.options import (
-    FILE,
     STREAMED,
     UTF8,
     ColumnNames,
@@ -20,26 +19,21 @@ from frametool.cli.options import (
     in_option,
     input_forms,
     say_if_verbose,
-    together,
     verbose_option,
 )
 from frametool.cli.stderr import say, say_error
-from frametool.documents.source import HEAD, has_line, has_record
+from frametool.documents.source import HEAD, Source, has_line, has_record
 from frametool.errors import FileProblem, FormatError
 from frametool.formats.table import FORMATS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-    from typing import TypeVar
 
-    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
-    from frametool.documents.source import Source
     from frametool.stream.request import Request
     from frametool.stream.run import Outcome
 
-    Function = TypeVar("Function", bound=Callable[..., Any])
     About = Callable[[], str] | None  # what else there is to say of a form
 
 BAGS = (".bag", ".mcap", ".db3")
@@ -47,29 +41,24 @@ _STREAMS = ", ".join(readers(*STREAMED))
 RECORDS = readers("records")
 
 
+_of_rows = partial(option, under="Rows")
 _ROWS = (
-    option("--from", "given", type=Notations(), metavar="REP", help="what unnamed numbers are"),
-    option("--columns", type=ColumnNames(), metavar="NAME,..", multiple=True,
-           help="our columns, by name or number; once for each pose"),
-    option("--keep", is_flag=True, help="add the result's columns, leave ours"),
-    option("--prefix", type=UTF8, default="", metavar="TEXT", help="begin the names of the result's columns so"),
-    option("--no-header", "header", is_flag=True, callback=lambda _context, _option, chosen: not chosen,
-           help="a table without names; columns are numbered"),
-    option("--on-error", type=click.Choice(ON_ERROR), default=STOP, show_default=True, help="bad rows"),
-    option("--max-errors", type=click.IntRange(0), default=MOST, show_default=True, metavar="N",
-           help="report at most N bad rows, count all"),
-    option("--quiet", is_flag=True, help="no progress and no word on forms on stderr"),
+    option("--from REP", "what unnamed numbers are", Notations(), name="given", under="Rotations"),
+    _of_rows("--columns NAME,..", "our columns, by name or number; once for each pose", ColumnNames(), multiple=True),
+    _of_rows("--keep", "add the result's columns, leave ours"),
+    _of_rows("--prefix TEXT", "begin the names of the result's columns so", UTF8, default=""),
+    _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
+    _of_rows("--max-errors N", "report at most N bad rows, count all", click.IntRange(0), default=MOST),
+    _of_rows("--no-header", "a table without names; columns are numbered", name="header",
+             callback=lambda _context, _option, chosen: not chosen),
+    option("--quiet", "no progress and no word on forms on stderr", under="Files"),
 )  # fmt: skip
-_INPUT = option(
-    "-i", "--input", "input_path", type=FILE, metavar="FILE", help="stream this file instead of standard input"
-)
-SEVERAL = option(
-    "-i", "--input", "input_path", type=FILE, multiple=True, metavar="FILE",
-    help="stream this file, not stdin; several clouds become one",
-)  # fmt: skip
+_INPUT = _of_rows("-i --input FILE", "stream this file instead of standard input", name="input_path")
+_SEVERAL = "stream this file, not stdin; several clouds become one"
+SEVERAL = _of_rows("-i --input FILE", _SEVERAL, name="input_path", multiple=True)
 
 
-def stream_options(function: Function, first: Any = _INPUT) -> Function:
+def stream_options(function: Any, first: Any = _INPUT) -> Any:
     """Add to a command the options of streams; `Stream` takes them.  first: the option for the input."""
     return together(first, in_option, *_ROWS, verbose_option)(function)
 

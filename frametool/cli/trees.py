@@ -9,15 +9,15 @@ import os
 import sys
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from frametool.cli.group import inputs
-from frametool.cli.options import Text, input_forms
+from frametool.cli.command import Text, inputs
+from frametool.cli.options import input_forms
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
-from frametool.documents.source import noting_files, states_of
+from frametool.documents.source import FileState, noting_files, states_of
 from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
@@ -25,9 +25,7 @@ from frametool.grammar.names import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
-    from typing import TypeVar
 
-    from frametool.documents.source import FileState
     from frametool.formats.load import EdgePlace, FrameFile, Rules
     from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer

@@ -14,11 +14,10 @@ import click
 import pytest
 from in_process import run_line
 
+from frametool.cli.command import EXIT_CODES, HEADINGS
 from frametool.cli.commands import COMMANDS, examples
 from frametool.cli.commands.help import questions, topic, topics
 from frametool.cli.commands.sim import SUBCOMMANDS
-from frametool.cli.group import GROUPS
-from frametool.cli.options import EXIT_CODES
 from frametool.errors import FileProblem
 from frametool.geometry.conventions import AXES
 from frametool.geometry.representations import REPRESENTATIONS
@@ -132,9 +131,9 @@ def test_the_cookbook_lists_its_questions_and_shows_those_with_a_word(run: Calla
 def test_common_options_are_explained_in_one_place(run: Callable[..., Any]) -> None:
     text = run("help", "common").out
     shown = {option.name: option for words in WORDS for option in options_of(words)}
-    for title, names in GROUPS.items():
-        assert f"\n{title}:\n" in text
-        assert all(re.search(rf"(?m)^  (?:-\w, )?{shown[name].opts[-1]}\b", text) for name in names)
+    assert all(f"\n{title}:\n" in text for title in HEADINGS[1:])
+    common = [option for option in shown.values() if getattr(option, "under", HEADINGS[0]) != HEADINGS[0]]
+    assert all(re.search(rf"(?m)^  (?:-\w, )?{option.opts[-1]}\b", text) for option in common)
 
 
 def test_programs_are_told_all_commands_options_values_and_exit_codes(run: Callable[..., Any]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from frametool.cli.group import group
+from frametool.cli.commands import group
 from frametool.formats.table import FORMATS, Format, readers
 
 if TYPE_CHECKING:

@@ -169,7 +169,7 @@ def test_transforms_that_are_not_read_are_not_passed_over(run: Run, tmp_path: Pa
 def test_frames_complete_from_the_recording(folder: Path) -> None:
     from click.shell_completion import ShellComplete
 
-    from frametool.cli.group import group
+    from frametool.cli.commands import group
 
     complete = ShellComplete(group, {}, "frametool", "_FRAMETOOL_COMPLETE")
     found = complete.get_completions(["record", str(folder / "run.mcap"), "--into"], "")

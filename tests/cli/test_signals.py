@@ -130,7 +130,7 @@ main(["lookup", "robot.yaml", "map", "tool"])
 """
 
 
-@pytest.mark.parametrize("module", ["contextlib", "frametool.cli.signals", "click", "frametool.cli.group", "frametool.formats.load", "yaml"])
+@pytest.mark.parametrize("module", ["contextlib", "frametool.cli.signals", "click", "frametool.cli.command", "frametool.formats.load", "yaml"])
 def test_ctrl_c_during_the_start_prints_nothing(module: str) -> None:
     call = [sys.executable, "-I", "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}\n{HURRIED}", module]
     done = subprocess.run(call, cwd=ROOT / "examples", capture_output=True, check=False, preexec_fn=by_default)

@@ -170,7 +170,7 @@ def test_poses_written_in_batches_are_those_written_one_by_one(run: Run, form: s
 
 
 def test_the_machine_forms_of_echo_do_not_wait_for_the_end() -> None:
-    from frametool.cli.group import Inputs
+    from frametool.cli.command import Inputs
     from frametool.cli.output import Output
     from frametool.grammar.pose_algebra import result_at
 

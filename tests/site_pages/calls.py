@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import click
 
-from frametool.cli.commands import COMMANDS
-from frametool.cli.group import Group
+from frametool.cli.commands import COMMANDS, Group
 
 
 @cache

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.command import option_groups, option_row
 from frametool.cli.commands.help import described, topics
-from frametool.cli.group import option_groups, option_row
 from site_pages.calls import commands
 from site_pages.cookbook import asked_about, topics_with
 from site_pages.markup import Page, Section, bullets, definitions, document, fenced, inline, links, see_also, slug

@@ -9,9 +9,9 @@ from functools import cache, cached_property
 
 import console
 
+from frametool.cli.command import HEADINGS
 from frametool.cli.commands.examples import names
 from frametool.cli.commands.help import topic, topics
-from frametool.cli.group import GROUPS
 from frametool.errors import FormatError
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
@@ -68,7 +68,7 @@ class Question:
         found = re.findall(r"frametool help (\w+)", f"{self.prose}\n{self.line}") + self.commands
         found += [name for each in self.commands if len(topics_with(each)) <= FEW for name in topics_with(each)]
         for option in (option for call in self.calls for option in call.options):
-            found += [_topic_of(heading) for heading, names in GROUPS.items() if option.name in names]
+            found += [_topic_of(heading) for heading in HEADINGS[1:] if heading.startswith(getattr(option, "under", HEADINGS[0]))]
             found += [name for name in topics() if option.opts[-1].startswith(f"--{name}")]
         own = words(f"{self.title} {self.line}")
         found += [name for name in topics() if len(own & rare_words()[name]) >= SHARED]

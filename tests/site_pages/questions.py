@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from frametool.cli.command import option_row
 from frametool.cli.commands.help import topics
-from frametool.cli.group import option_row
 from site_pages.cookbook import Question, questions
 from site_pages.markup import Page, Section, definitions, fenced, links, see_also
 

@@ -1,4 +1,26 @@
-"""One file a command, and the table of them; imports nothing."""
+"""One file a command, the table and the group of them, their calls and their misuse.
+
+Each command is imported when it is called; help and completion come from the table.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool import __version__
+from frametool.cli.command import WithHelp, show_help
+from frametool.cli.sink import writing
+from frametool.errors import SHOWN, any_near, did_you_mean, shown
+from frametool.stream.faults import Misused
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from click.shell_completion import CompletionItem
 
 # name -> (module, what it does); help, completion and the README's check are derived from this table
 COMMANDS = {
@@ -32,3 +54,149 @@ COMMANDS = {
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
 TROUBLE = {"diff": 2}  # command -> its one exit code for whatever goes wrong, as that of diff(1)
+
+HELP = """The calculator for rigid-body frames.
+
+\b
+  frametool lookup robot.yaml map camera_optical
+  frametool convert --from rpy_deg --to quaternion 0 0 90
+  frametool compose '{xyz: [1, 2, 3]}' '{rpy_deg: [0, 0, 90]}'
+
+Arguments are in the order TARGET SOURCE; the answer is the pose of SOURCE in TARGET, which maps points in SOURCE to
+points in TARGET. Metres, radians unless said, quaternions x, y, z, w. `frametool help WORD` finds what explains a word,
+`frametool help cookbook` has questions with their commands, `frametool examples -o examples` copies files to try.
+"""
+COMPLETION = "_FRAMETOOL_COMPLETE"  # the variable by which shells ask for completions
+
+
+class Group(WithHelp, click.Group):
+    """The commands of a table, each imported when it is called and not before."""
+
+    table = COMMANDS
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Answer a call without arguments with help; click's own way to it has changed with its versions."""
+        if not args and not ctx.resilient_parsing:
+            show_help(ctx)
+            ctx.exit()
+        return super().parse_args(ctx, args)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Name the commands, in the table's order."""
+        return list(self.table)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """Import one command, or say which ones there are."""
+        if cmd_name not in self.table:
+            otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
+            hint = any_near(cmd_name, self.table, otherwise)
+            raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
+        found: click.Command = import_module(self.table[cmd_name][0]).command
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from the table, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in self.table.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete command names from the table."""
+        from click.shell_completion import CompletionItem
+
+        named = [CompletionItem(name, help=row[1]) for name, row in self.table.items() if name.startswith(incomplete)]
+        return named + click.Command.shell_complete(self, ctx, incomplete)
+
+
+def _show_version(ctx: click.Context, _: click.Parameter, chosen: bool) -> None:  # click's signature
+    """Print the version; a literal, because asking importlib.metadata for it takes 25 ms."""
+    if chosen:
+        with writing(None) as write:
+            write(f"frametool {__version__}\n{_surroundings() if ctx.params.get('all_versions') else ''}")
+        ctx.exit()
+
+
+EXTRAS = {"rosbags": "bag", "pyarrow": "arrow", "laspy": "las", "matplotlib": "plot"}  # package -> extra with it
+
+
+def _surroundings() -> str:
+    """Return the versions of Python and of the packages there are, one a line, for a report of a fault."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    lines = [f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"]
+    for package in ("numpy", "click", "rich", "pyyaml", *EXTRAS):
+        try:
+            found = version(package)
+        except PackageNotFoundError:
+            found = "not installed"
+        lines.append(f"{package} {found}{f' (extra {EXTRAS[package]})' if package in EXTRAS else ''}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+@click.command(cls=Group, help=HELP)
+@click.option("-v", "all_versions", is_flag=True, is_eager=True,
+              help="with --version: of Python and of its packages too")  # fmt: skip
+@click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
+              help="Show the version and exit.")  # fmt: skip
+def group(all_versions: bool) -> None:
+    """Hold the commands."""
+
+
+def called(arguments: list[str]) -> object:
+    """Call a command and return its result.
+
+    Not by click's own `main`, which writes to stderr at Ctrl-C and turns a closed pipe into status 1.
+    """
+    if instruction := os.environ.get(COMPLETION):
+        from frametool.cli.completion import answer
+
+        answer(group, COMPLETION, instruction, " ".join(arguments))
+        return 0
+    with group.make_context("frametool", arguments) as ctx:
+        return group.invoke(ctx)
+
+
+def called_in(
+    parent: click.Context, words: Sequence[str], prepare: Callable[[click.Context], None] | None = None
+) -> object:
+    """Call the command that words begin with, in a context of the group that is there.
+
+    parent: context of the group
+    prepare: is shown the command's context before it runs
+    """
+    name, *rest = words
+    with group.get_command(parent, name).make_context(name, rest, parent=parent) as ctx:
+        if prepare:
+            prepare(ctx)
+        return ctx.command.invoke(ctx)
+
+
+def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
+    """Return the status of a call of a command; raise FrametoolError for all that a user did wrong."""
+    try:
+        result = call()
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except click.ClickException as error:
+        raise Misused(_usage(error, arguments)) from None
+    return result if isinstance(result, int) else 0
+
+
+def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
+    """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    from frametool.cli.replaced import replacement
+
+    ctx = getattr(error, "ctx", None)
+    message = error.format_message().replace("\n", " ").rstrip(".")
+    if isinstance(error, click.NoSuchOption):  # each version of click has its own words
+        name, near = error.option_name, error.possibilities or ()
+        message = f"no such option {shown(name)}{did_you_mean(name, near)}"
+    message = replacement(arguments) or message
+    for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
+        message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
+    if ctx is None or ctx.parent is None:
+        return message
+    pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
+    return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
+from frametool.cli.command import Inputs, argument, command_named, option
 from frametool.cli.comparing import comparisons, pairing_options, trajectory_options, write_trajectory
-from frametool.cli.group import option
-from frametool.cli.options import TEXT, Command, reading_options, result_options, rotation_options
+from frametool.cli.options import reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.stream.faults import ROWS_SKIPPED
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
-
-
-@click.command(cls=Command, name="align")
-@click.argument("ref", type=TEXT)
-@click.argument("est", type=TEXT)
+@command_named("align")
+@argument("ref")
+@argument("est")
 @pairing_options
-@option("--names", type=TEXT, metavar="REF,EST", help="names of the two worlds  [default: as they are called]")
+@option("--names REF,EST", "names of the two worlds  [default: as they are called]")
 @trajectory_options
 @reading_options()
 @rotation_options

@@ -9,14 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
+from frametool.cli.command import Inputs, argument, command_named, option
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
-from frametool.cli.group import option
 from frametool.cli.options import (
-    FILE,
-    TEXT,
     TIME,
     ColumnNames,
-    Command,
     at_ns,
     offset_option,
     pose_result_options,
@@ -39,7 +36,6 @@ from frametool.text.numbers import NotFinite, parse_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.explain.derive import ByTree, DerivationStyle
     from frametool.explain.operations import WrittenPose
     from frametool.geometry.types import Components
@@ -48,31 +44,22 @@ if TYPE_CHECKING:
 CHOICES = ("point", "vector", "pose", "twist", "wrench")
 
 
-@click.command(cls=Command, name="apply")
-@click.argument("arguments", nargs=-1, type=FRAME, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
-@option("--transform", "pose", excludes=("at", "time_column"), type=TEXT, metavar="POSE",
-        help="move by this pose, not by a lookup")  # fmt: skip
-@option(
-    "--as",
-    "kinds",
-    type=click.Choice(CHOICES),
-    multiple=True,
-    metavar="KIND",
-    help="point, vector, pose, twist, wrench; once a --columns",
-)
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
+@command_named("apply", own=("input_path", "output"))
+@argument("arguments", FRAME, nargs=-1, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
+@option("--transform POSE", "move by this pose, not by a lookup", name="pose", excludes=("at", "time_column"))
+@option("--as KIND", "point, vector, pose, twist, wrench; once a --columns", CHOICES, name="kinds", multiple=True)
+@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
+@partial(stream_options, first=SEVERAL)
 @pose_result_options("points", "trajectory")
-@option("--covariance", excludes=("explain",), is_flag=True, help="also that of the tree's edges, or of --transform")
+@option("--covariance", "also that of the tree's edges, or of --transform", excludes=("explain",))
 @scale_option
 @EXPLAIN
-@option("--frame-column", type=ColumnNames(), metavar="NAME", help="column with each row's frame, without SOURCE")
-@option("--time-column", excludes=("at",), type=ColumnNames(), metavar="NAME",
-        help="column or key of each row's own time")  # fmt: skip
-@option("--at", type=TIME, metavar="TIME", help="move all at this time  [default: latest]")
+@option("--frame-column NAME", "column with each row's frame, without SOURCE", ColumnNames())
+@option("--time-column NAME", "column or key of each row's own time", ColumnNames(), excludes=("at",))
+@option("--at TIME", "move all at this time  [default: latest]", TIME)
 @rules_options
 @offset_option
 @reading_options(streams=True)
-@partial(stream_options, first=SEVERAL)
 def command(inputs: Inputs) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 

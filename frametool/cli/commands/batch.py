@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import click
-
-from frametool.cli.group import option
-from frametool.cli.options import FILE, Command
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.stderr import say
 from frametool.documents.source import opened
 from frametool.stream.faults import SKIP, STOP
 
 EXIT_CODES = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
 
-@click.command(cls=Command, name="batch", epilog=EXIT_CODES)
-@click.argument("file", default="-", type=FILE, metavar="[FILE]")
-@option("--on-error", "on_failure", type=click.Choice((STOP, SKIP)), default=STOP, show_default=True,
-              help="end at a line that fails, or report it and go on")
+@command_named("batch", epilog=EXIT_CODES)
+@argument("file", FILE, default="-", metavar="[FILE]")
+@option("--on-error", "end at a line that fails, or report it and go on", (STOP, SKIP), name="on_failure", default=STOP)
 def command(inputs: Inputs) -> int:
     """Run the commands of FILE, or of standard input, in one process: one a line, as typed behind frametool.
 

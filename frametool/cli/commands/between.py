@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.options import TEXT, Command, result_options, rotation_options
+from frametool.cli.command import Inputs, argument, command_named
+from frametool.cli.options import result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.poses import pose_source, usage_if_inline
 from frametool.cli.stderr import say
@@ -16,14 +17,13 @@ from frametool.grammar.pose_algebra import turn_between
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.grammar.readers import Vector
 
 OPPOSITE = 1e-8  # radians from half a turn at which no digit of the axis is left
 
 
-@click.command(cls=Command, name="between")
-@click.argument("vectors", nargs=-1, required=True, type=TEXT, metavar="V1 V2")
+@command_named("between", own=("notations",))
+@argument("vectors", nargs=-1, required=True, metavar="V1 V2")
 @rotation_options
 @result_options("poses")
 def command(inputs: Inputs) -> None:

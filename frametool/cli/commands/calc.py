@@ -10,17 +10,14 @@ import click
 
 from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import mentions_row, walk
+from frametool.calc.parser import Line, mentions_row, walk
 from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
-from frametool.cli.group import option
+from frametool.cli.command import Command, Inputs, argument, command_named, option
 from frametool.cli.options import (
-    FILE,
     ColumnNames,
-    Command,
-    pose_options,
     reading_options,
     result_options,
-    rotation_options,
+    whole_pose_options,
 )
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
@@ -30,10 +27,8 @@ from frametool.documents.source import read_text
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from frametool.calc.parser import Line
     from frametool.calc.rows import RowExpressions
     from frametool.calc.values import Term
-    from frametool.cli.group import Inputs
     from frametool.stream.request import Request
 
 KINDS = ("point", "vector", "pose")
@@ -54,20 +49,17 @@ def _begins_with_minus(argument: str) -> bool:
     return argument.startswith("-") and (behind[:1] in tuple('([{"') or (bool(bracket) and name in FUNCTIONS))
 
 
-@click.command(cls=CalcCommand, name="calc")
-@click.argument("arguments", nargs=-1, type=Expression(), metavar="[NAME=FILE ..] [EXPR ..]")
-@option("--tree", "trees", multiple=True, type=FILE, metavar="FILE",
-              help="the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]")
-@option("-e", "expressions", multiple=True, type=Expression(), metavar="NAME=EXPR",
-              help="a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE")
-@option("--as", "kind", type=click.Choice(KINDS), help="what the rows are  [default: as they look]")
-@option("--time-column", "time_column", type=ColumnNames(), metavar="NAME",
-              help="of the time of @ row  [default: the one that looks so]")
-@rotation_options
-@pose_options
+@command_named("calc", own=("input_path",), cls=CalcCommand)
+@argument("arguments", Expression(), nargs=-1, metavar="[NAME=FILE ..] [EXPR ..]")
+@option("--tree FILE", "the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]", name="trees", multiple=True)
+@option("-e NAME=EXPR", "a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE",
+    Expression(), name="expressions", multiple=True)
+@option("--as", "what the rows are  [default: as they look]", KINDS, name="kind")
+@option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", ColumnNames(), under="Time")
+@stream_options
+@whole_pose_options
 @result_options("points")
 @reading_options(streams=True)
-@stream_options
 def command(inputs: Inputs) -> int:
     """Calculate with poses whose frames are checked like units.
 

@@ -7,10 +7,8 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING
 
-import click
-
-from frametool.cli.group import EVERYTHING, option
-from frametool.cli.options import FILE, Command, Parsed, file_options
+from frametool.cli.command import EVERYTHING, FILE, Command, Inputs, argument, command_named, option
+from frametool.cli.options import file_options
 from frametool.cli.output import in_colour
 from frametool.cli.sink import writing
 from frametool.cli.stderr import folded, say
@@ -23,7 +21,8 @@ from frametool.lint.tree_diff import Tolerance, parse_tolerance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
+    import click
+
     from frametool.formats.load import FrameFile
     from frametool.stream.measurements import Measurement
 
@@ -45,17 +44,14 @@ class CheckCommand(Command):
         super().format_epilog(ctx, formatter)
 
 
-@click.command(cls=CheckCommand, name="check")
-@click.argument("files", nargs=-1, required=True, type=FILE)
-@option("-f", "--format", "form", type=click.Choice(tuple(WRITERS)), default="text", show_default=True,
-              help="how findings are written")  # fmt: skip
-@option("--strict", is_flag=True, help="let warnings fail too")
-@option("--measured", excludes=("each",), multiple=True, type=FILE, metavar="FILE",
-              help="compare these measurements (help solve) too")  # fmt: skip
-@option("--tolerance", requires=("measured",), metavar="LENGTH,ANGLE",
-              type=Parsed("tolerance", partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0)))),
-              help="what they may be off  [3 sigmas, or 10mm,1deg]")  # fmt: skip
-@option("--each", is_flag=True, help="check each file on its own; one without frames is a warning")
+@command_named("check", cls=CheckCommand)
+@argument("files", FILE, nargs=-1, required=True)
+@option("-f --format", "how findings are written", (*WRITERS,), name="form", default="text")
+@option("--strict", "let warnings fail too")
+@option("--measured FILE", "compare these measurements (help solve) too", excludes=("each",), multiple=True)
+@option("--tolerance LENGTH,ANGLE", "what they may be off  [3 sigmas, or 10mm,1deg]", requires=("measured",),
+        kind=partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0))))  # fmt: skip
+@option("--each", "check each file on its own; one without frames is a warning")
 @file_options
 def command(inputs: Inputs) -> int:
     """Look for mistakes in FILES, trees and recordings, taken as one tree.

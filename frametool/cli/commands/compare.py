@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.command import OPTIONAL, Inputs, argument, command_named, option
 from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
-from frametool.cli.group import option
-from frametool.cli.options import OPTIONAL, TEXT, Command, Parsed, list_options, reading_options
+from frametool.cli.options import list_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
@@ -19,7 +19,6 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.fit.comparison import Comparison
     from frametool.fit.limits import Limit
 
@@ -46,18 +45,16 @@ def _read_limits(text: str) -> list[Limit]:
     return parse_limits(text)
 
 
-@click.command(cls=Command, name="compare", epilog=EXIT_CODES)
-@click.argument("ref", type=TEXT)
-@click.argument("est", nargs=-1, required=True, type=TEXT, metavar="EST..")
+@command_named("compare", epilog=EXIT_CODES)
+@argument("ref")
+@argument("est", nargs=-1, required=True, metavar="EST..")
 @pairing_options
 @error_options
-@option("--rows", type=click.Choice(OPTIONAL["--rows"]), metavar="[=ate|rpe|kitti]",
-              help="one a pair, step or stretch of path: CSV, JSON")  # fmt: skip
-@option("--explain", type=click.Choice(("text",)), metavar="", help="the formulas with this run's numbers")
-@option("--fail", "limits", type=Parsed("limits", _read_limits), metavar="LIMIT,..",
-              help="end with 1 where a number passes one: ate>5cm")  # fmt: skip
-@option("--report", type=Parsed("report", _read_report), metavar="FILE.html|svg",
-              help="also a picture of it, in one file; -o: instead")  # fmt: skip
+@option("--rows [=ate|rpe|kitti]", "one a pair, step or stretch of path: CSV, JSON", OPTIONAL["--rows"])
+@option("--explain", "the formulas with this run's numbers", ("text",), under="Result")
+@option("--fail LIMIT,..", "end with 1 where a number passes one: ate>5cm", _read_limits,
+    name="limits")  # fmt: skip
+@option("--report FILE.html|svg", "also a picture of it, in one file; -o: instead", _read_report)
 @trajectory_options
 @reading_options()
 @list_options("markdown", "latex")

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.command import Inputs, argument, command_named
 from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
-from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
+from frametool.cli.options import offset_option, pose_result_options, scale_option
 from frametool.cli.poses import rows_among, without_inverse
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import product
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
-
-@click.command(cls=Command, name="compose")
-@click.argument("poses", nargs=-1, required=True, type=TEXT, metavar="POSE POSE ..")
+@command_named("compose")
+@argument("poses", nargs=-1, required=True, metavar="POSE POSE ..")
+@pose_stream_options
 @pose_result_options("poses")
 @scale_option
 @EXPLAIN
 @offset_option
-@pose_stream_options
 def command(inputs: Inputs) -> int:
     """Multiply poses, left to right: a_from_b, b_from_c -> a_from_c.
 

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.command import Command, Inputs, argument, command_named, option
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
-from frametool.cli.group import option
 from frametool.cli.options import (
-    TEXT,
     AxesName,
     ColumnNames,
-    Command,
-    Number,
     frames_out_option,
     limit_options,
     pose_result_options,
@@ -32,20 +29,17 @@ from frametool.cli.poses import (
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
-from frametool.geometry.representations import REPRESENTATIONS, notation
+from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result
-from frametool.text.numbers import parse_angle
+from frametool.grammar.result import Result, Style
+from frametool.text.numbers import parse_angle, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
-    from frametool.geometry.representations import Notation
-    from frametool.grammar.result import Style
     from frametool.stream.request import Operation
 
 
@@ -59,37 +53,21 @@ class ConvertCommand(Command):
         super().format_epilog(ctx, formatter)
 
 
-@click.command(cls=ConvertCommand, name="convert", short_help="one rotation or pose in other representations")
-@click.argument("values", nargs=-1, type=TEXT, metavar="[VALUES.. | POSE]")
-@option(
-    "--axes",
-    type=AxesName(),
-    metavar="NAME",
-    help="the pose at the same place in these axes (help axes)",
-)
-@option(
-    "--world-axes", "world", type=AxesName(), metavar="A_from_B", help="axes of the frame it is seen from (help axes)"
-)
-@option("--all-axes", excludes=("axes", "world"), type=AxesName(), metavar="A_from_B",
-        help="axes of both: unity_from_ros, or x,-y,-z")  # fmt: skip
-@option(
-    "--find",
-    type=TEXT,
-    metavar="A,B,C",
-    help="Euler conventions with these angles (help euler)",
-)
-@option(
-    "--tolerance", requires=("find",), type=Number(), default=1e-6, metavar="RAD",
-    help="how near --find wants it  [default: 1e-06]",
-)
+@command_named("convert", own=("given", "notations"), cls=ConvertCommand)
+@argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
+@option("--axes NAME", "the pose at the same place in these axes (help axes)", AxesName())
+@option("--world-axes A_from_B", "axes of the frame it is seen from (help axes)", AxesName(), name="world")
+@option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", AxesName(), excludes=("axes", "world"))
+@option("--find A,B,C", "Euler conventions with these angles (help euler)")
+@option("--tolerance RAD", "how near --find wants it  [default: 1e-06]", parse_number, requires=("find",), default=1e-6)
+@pose_stream_options
 @pose_result_options("poses", "points")
 @frames_out_option
 @EXPLAIN
-@option("--unwrap", is_flag=True, help="let angles go on beyond half a turn")
-@option("--time-column", requires=("time_offset", "start", "stop"), type=ColumnNames(), metavar="NAME",
-        help="column or key of stamps, for the next three")  # fmt: skip
+@option("--unwrap", "let angles go on beyond half a turn")
+@option("--time-column NAME", "column or key of stamps, for the next three", ColumnNames(),
+    requires=("time_offset", "start", "stop"), under="Time")  # fmt: skip
 @limit_options
-@pose_stream_options
 def command(inputs: Inputs) -> int:
     """Write one rotation or pose in other representations.
 

@@ -4,40 +4,33 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
-from frametool.cli.group import option
-from frametool.cli.options import FILE, TIME, Command, Parsed, at_ns, file_options, list_options
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.options import TIME, at_ns, file_options, list_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_sides
-from frametool.formats.load import lines_of
+from frametool.formats.load import EdgePlace, lines_of
 from frametool.lint.findings import github_command
-from frametool.lint.tree_diff import Tolerance, diff, entry, parse_tolerance
+from frametool.lint.tree_diff import Tolerance, TreeComparison, diff, entry, parse_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frametool.cli.group import Inputs
-    from frametool.formats.load import EdgePlace
-    from frametool.lint.tree_diff import TreeComparison
 
 DIFFERENT, TROUBLE = 1, 2
 EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with files too."
 
 
-@click.command(cls=Command, name="diff", epilog=EXIT_CODES)
-@click.argument("a", type=FILE)
-@click.argument("b", type=FILE)
-@option("--with-a", multiple=True, type=FILE, metavar="FILE", help="merge this file into A; may be repeated")
-@option("--with-b", multiple=True, type=FILE, metavar="FILE", help="merge this file into B; may be repeated")
-@option("--at", type=TIME, metavar="TIME",
-              help="compare at this time: seconds, nanoseconds with ns  [default: the latest of each]")  # fmt: skip
-@option("--seen-from", type=FRAME, metavar="FRAME",
-              help="tell how far frames moved as seen from here too  [default: the root of A]")  # fmt: skip
-@option("--tolerance", type=Parsed("tolerance", parse_tolerance), default=Tolerance(), metavar="LENGTH,ANGLE",
-              help="what still counts as the same, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]")  # fmt: skip
-@option("--all", "everything", is_flag=True, help="list the frames that did not move, too")
+@command_named("diff", epilog=EXIT_CODES)
+@argument("a", FILE)
+@argument("b", FILE)
+@option("--with-a FILE", "merge this file into A; may be repeated", multiple=True)
+@option("--with-b FILE", "merge this file into B; may be repeated", multiple=True)
+@option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]", TIME)
+@option("--seen-from FRAME", "tell how far frames moved as seen from here too  [default: the root of A]", FRAME)
+@option("--tolerance LENGTH,ANGLE", "what still counts as the same, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]",
+    parse_tolerance, default=Tolerance())  # fmt: skip
+@option("--all", "list the frames that did not move, too", name="everything")
 @file_options
 @list_options("github")
 def command(inputs: Inputs) -> int:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FILE, Command, Parsed, Skipped, Time, result_options, rules, tree_options
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.options import LIMIT, Skipped, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import NoDataAt, warn
-from frametool.frames.lookups import checked_rate
+from frametool.frames.lookups import Replayed, checked_rate
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import result_at
 from frametool.text.numbers import parse_number
@@ -21,24 +21,20 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.cli.group import Inputs
-    from frametool.frames.lookups import Replayed
     from frametool.grammar.result import Result
 
-STAMP = Time(latest=False)
-RATE = Parsed("rate", lambda text: checked_rate(parse_number(text)))
 
 
-@click.command(cls=Command, name="echo")
-@click.argument("tree", type=FILE)
-@click.argument("target", type=FRAME)
-@click.argument("source", type=FRAME)
-@option("--rate", type=RATE, default=1.0, show_default=True, metavar="HZ",
-              help="blocks a second, in the time of the recording")  # fmt: skip
-@option("--start", type=STAMP, metavar="T", help="begin there  [default: when all edges have data]")
-@option("--stop", type=STAMP, metavar="T", help="end there  [default: when the first edge has no more]")
-@option("-l", "--limit", type=click.IntRange(1), metavar="N", help="at most so many blocks")
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this file too; may be repeated")
+@command_named("echo")
+@argument("tree", FILE)
+@argument("target", FRAME)
+@argument("source", FRAME)
+@option("--rate HZ", "blocks a second, in the time of the recording", lambda text: checked_rate(parse_number(text)),
+        default=1.0)
+@option("--start T", "begin there  [default: when all edges have data]", LIMIT, under="Time")
+@option("--stop T", "end there  [default: when the first edge has no more]", LIMIT, under="Time")
+@option("-l --limit N", "at most so many blocks", click.IntRange(1))
+@option("--with FILE", "merge this file too; may be repeated", name="more", multiple=True, under="Files")
 @tree_options
 @result_options("poses")
 def command(inputs: Inputs) -> int:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import os
 from os.path import splitext
-from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FILE, Command, Text
+from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option
 from frametool.cli.sink import refuse_existing, writing
 from frametool.errors import FileProblem, nearest, printable, shown
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
 
 def folder() -> str:
@@ -60,11 +56,10 @@ class Example(Text):
         return dict.fromkeys(names(), "")
 
 
-@click.command(cls=Command, name="examples")
-@click.argument("name", type=Example(), required=False)
-@option("-o", "--output", type=FILE, metavar="FOLDER|FILE",
-              help="copy all files into this folder, or NAME into this file")  # fmt: skip
-@option("--force", requires=("output",), is_flag=True, help="let --output replace files")
+@command_named("examples")
+@argument("name", Example(), required=False)
+@option("-o --output FOLDER|FILE", "copy all files into this folder, or NAME into this file", FILE, under="Result")
+@option("--force", "let --output replace files", requires=("output",), under="Result")
 def command(inputs: Inputs) -> None:
     """List the example files, print one, or copy them.
 

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.command import FILE, Inputs, argument, command_named
 from frametool.cli.options import (
-    FILE,
     STREAMED,
-    Command,
-    pose_options,
     reading_options,
     result_options,
-    rotation_options,
+    whole_pose_options,
 )
 from frametool.cli.output import Output
 from frametool.cli.streaming import RECORDS, Stream, stream_options
@@ -26,19 +24,17 @@ from frametool.stream.joint_rows import JointRows, echoed, joint_poses, names_in
 from frametool.stream.request import Operation, Request
 
 if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
     from frametool.formats.load import FrameFile
 
 
-@click.command(cls=Command, name="fk")
-@click.argument("tree", type=FILE, metavar="URDF")
-@click.argument("base", type=FRAME, metavar="BASE")
-@click.argument("tip", type=FRAME, metavar="TIP")
+@command_named("fk", own=("input_path", "joints"))
+@argument("tree", FILE, metavar="URDF")
+@argument("base", FRAME, metavar="BASE")
+@argument("tip", FRAME, metavar="TIP")
 @reading_options(streams=True)
-@pose_options
-@rotation_options
-@result_options("poses")
 @stream_options
+@whole_pose_options
+@result_options("poses")
 def command(inputs: Inputs) -> int:
     """Add the pose of TIP in BASE to rows of joint values.
 

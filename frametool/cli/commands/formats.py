@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import click
-
-from frametool.cli.options import Command, Form, list_options
+from frametool.cli.command import Inputs, argument, command_named
+from frametool.cli.options import Form, list_options
 from frametool.cli.output import Output
 from frametool.formats.table import FORMATS
 from frametool.view.report_text import form_entry, write_form, write_forms
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
-
-@click.command(cls=Command, name="formats")
-@click.argument("name", type=Form(FORMATS, "known"), required=False)
+@command_named("formats")
+@argument("name", Form(FORMATS, "known"), required=False)
 @list_options()
 def command(inputs: Inputs) -> None:
     """List the forms of files that are read and written: their suffixes, what their numbers mean, what they leave open.

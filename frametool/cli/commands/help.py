@@ -11,10 +11,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool import __version__
+from frametool.cli.command import (
+    EXIT_CODES,
+    Inputs,
+    Text,
+    argument,
+    command_named,
+    grouped,
+    option,
+    option_groups,
+    option_row,
+    show_help,
+    write_options,
+)
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.examples import example
-from frametool.cli.group import GROUPS, option, option_groups, option_row, show_help, write_options
-from frametool.cli.options import EXIT_CODES, Command, Text
 from frametool.cli.sink import writing
 from frametool.errors import any_near, shown
 from frametool.formats.table import FORMATS
@@ -22,7 +33,6 @@ from frametool.formats.table import FORMATS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from frametool.cli.group import Inputs
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "topics")
 MADE = {  # topics that are no file of their own
@@ -97,7 +107,7 @@ def cookbook(words: tuple[str, ...]) -> str:
 
 def _commands(ctx: click.Context) -> dict[str, click.Command]:
     """Return all commands and subcommands by their names."""
-    from frametool.cli.group import group
+    from frametool.cli.commands import group
 
     found: dict[str, click.Command] = {}
     for name in COMMANDS:
@@ -139,9 +149,8 @@ def common(ctx: click.Context) -> str:
     for command in _commands(ctx).values():
         found = {each.name or "": each for each in command.params if isinstance(each, click.Option)} | found
     formatter = ctx.make_formatter()
-    write_options(
-        formatter, {title: [found[name] for name in names if name in found] for title, names in GROUPS.items()}
-    )
+    groups = grouped(found.values())
+    write_options(formatter, {title: options for title, options in groups.items() if title != "Options"})
     return f"{MADE['common']}\n\n{formatter.getvalue()}"
 
 
@@ -191,10 +200,10 @@ class Topic(Text):
         return topics() | MADE | {name: row[1] for name, row in COMMANDS.items()}
 
 
-@click.command(cls=Command, name="help")
-@click.argument("words", type=Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
-@option("-f", "--format", "form", type=click.Choice(("text", "json")), default="text", show_default=True,
-              help="json, of all or a COMMAND: options, values, exit codes")  # fmt: skip
+@command_named("help")
+@argument("words", Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
+@option("-f --format", "json, of all or a COMMAND: options, values, exit codes", ("text", "json"), name="form",
+    default="text")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, inputs: Inputs) -> None:
     """Explain a subject on one screen, or a command; find any word in them and in the cookbook.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
+from frametool.cli.command import Inputs, argument, command_named
 from frametool.cli.explaining import EXPLAIN, PoseTask
-from frametool.cli.options import TEXT, Command, Parsed, pose_result_options
+from frametool.cli.options import pose_result_options
 from frametool.cli.poses import combinations
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.grammar.pose import LEFT_OUT
@@ -17,8 +16,6 @@ from frametool.text.numbers import parse_number
 
 MOST = 1_000_000  # fractions of a range
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
 
 def fractions_of(text: str) -> list[float]:
@@ -39,10 +36,10 @@ def fractions_of(text: str) -> list[float]:
     return [float(start + at * step) for at in range(count)]
 
 
-@click.command(cls=Command, name="interpolate")
-@click.argument("a", type=TEXT)
-@click.argument("b", type=TEXT)
-@click.argument("fractions", nargs=-1, required=True, type=Parsed("number", fractions_of), metavar="FRACTION..")
+@command_named("interpolate", own=("notations",))
+@argument("a")
+@argument("b")
+@argument("fractions", fractions_of, nargs=-1, required=True, metavar="FRACTION..")
 @pose_result_options("poses")
 @EXPLAIN
 def command(inputs: Inputs) -> int:

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import click
-
+from frametool.cli.command import Inputs, argument, command_named
 from frametool.cli.explaining import EXPLAIN, PoseTask, pose_stream_options
-from frametool.cli.options import TEXT, Command, offset_option, pose_result_options, scale_option
-
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
+from frametool.cli.options import offset_option, pose_result_options, scale_option
 
 
-@click.command(cls=Command, name="invert")
-@click.argument("pose", type=TEXT, default="-")
+@command_named("invert")
+@argument("pose", default="-")
+@pose_stream_options
 @pose_result_options("poses")
 @scale_option
 @EXPLAIN
 @offset_option
-@pose_stream_options
 def command(inputs: Inputs) -> int:
     """Turn poses around: a_from_b -> b_from_a; named frames change places.
 

@@ -6,24 +6,21 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.explaining import EXPLAIN, PoseTask
-from frametool.cli.group import option
 from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
-    FILE,
     TIME,
-    Command,
     Skipped,
     at_ns,
     limit_options,
-    pose_options,
     read_times,
     reading_options,
     result_options,
-    rotation_options,
     rules,
     rules_options,
     times_option,
+    whole_pose_options,
     window_of,
 )
 from frametool.cli.streaming import stream_options
@@ -36,7 +33,6 @@ from frametool.stream.faults import NULL, SKIP
 
 if TYPE_CHECKING:
 
-    from frametool.cli.group import Inputs
     from frametool.cli.output import Output
     from frametool.frames.lookups import Frames
 
@@ -44,29 +40,26 @@ if TYPE_CHECKING:
 WITH_COVARIANCE = ("json", "yaml", "csv")
 
 
-@click.command(cls=Command, name="lookup")
-@click.argument("tree", type=FILE)
-@click.argument("target", type=FRAME, required=False, metavar="TARGET")
-@click.argument("source", type=FRAME, required=False, metavar="SOURCE")
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@option("--at", excludes=("times", "start", "stop"), type=TIME, metavar="TIME",
-        help="seconds, nanoseconds with ns  [default: latest]")  # fmt: skip
-@option("--source-at", requires=("fixed",), excludes=("times", "start", "stop"), type=TIME, metavar="TIME",
-        help="the time at SOURCE, with --fixed; --at: at TARGET")  # fmt: skip
-@option("--fixed", requires=("source_at",), excludes=("times", "start", "stop"), type=FRAME, metavar="FRAME",
-        help="what stands still between the two times: map")  # fmt: skip
-@option("--covariance", excludes=("explain", "fixed"), is_flag=True,
-        help="how sure it is, by the edges' sigmas (help covariance)")  # fmt: skip
+@command_named("lookup", own=("times", "notations"))
+@argument("tree", FILE)
+@argument("target", FRAME, required=False, metavar="TARGET")
+@argument("source", FRAME, required=False, metavar="SOURCE")
+@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
+@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", TIME, excludes=("times", "start", "stop"))
+@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", TIME,
+    excludes=("times", "start", "stop"), requires=("fixed",))  # fmt: skip
+@option("--fixed FRAME", "what stands still between the two times: map", FRAME, excludes=("times", "start", "stop"),
+    requires=("source_at",))  # fmt: skip
+@option("--covariance", "how sure it is, by the edges' sigmas (help covariance)", excludes=("explain", "fixed"))
 @times_option
 @limit_options
 @rules_options
 @reading_options(streams=True)
-@pose_options
-@rotation_options
+@stream_options
+@whole_pose_options
 @result_options("poses")
 @EXPLAIN
 @column_options
-@stream_options
 def command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 

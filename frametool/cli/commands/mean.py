@@ -7,31 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.command import Inputs, argument, command_named, option
 from frametool.cli.explaining import PoseTask, pose_stream_options
-from frametool.cli.group import option
-from frametool.cli.options import TEXT, ColumnNames, Command, pose_result_options
+from frametool.cli.options import ColumnNames, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
 from frametool.errors import ValueInvalid, warn
 from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
     from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
 
 
-@click.command(cls=Command, name="mean")
-@click.argument("poses", nargs=-1, type=TEXT, metavar="[POSE.. | FILE]")
-@option(
-    "--weights",
-    type=ColumnNames(),
-    metavar="NAME | W,W,..",
-    help="column or key of each pose's weight, or the weights of the POSEs",
-)
-@option("--robust", is_flag=True, help="leave out poses that do not agree with the rest, and tell them")
-@pose_result_options("poses")
+@command_named("mean")
+@argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
+@option("--weights NAME | W,W,..", "column or key of each pose's weight, or the weights of the POSEs", ColumnNames())
+@option("--robust", "leave out poses that do not agree with the rest, and tell them")
 @pose_stream_options
+@pose_result_options("poses")
 def command(inputs: Inputs) -> int:
     """Average poses: the mean position, the mean rotation, and how far the poses lie from them.
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FILE, TEXT, Command, file_options, offset_option, result_options
+from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.options import file_options, offset_option, result_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import opened, state
@@ -15,17 +15,16 @@ from frametool.lint.monitor_report import clocks_differ, monitor
 
 if TYPE_CHECKING:
 
-    from frametool.cli.group import Inputs
     from frametool.errors import FormatError
 
 FAILED = 1
 MOST_TOLD = 3  # frames that come by the topics of two robots
 
 
-@click.command(cls=Command, name="monitor")
-@click.argument("recording", type=TEXT)
-@click.argument("frames", nargs=-1, type=TEXT, metavar="[TARGET SOURCE]")
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="read this file too; may be repeated")
+@command_named("monitor")
+@argument("recording")
+@argument("frames", nargs=-1, metavar="[TARGET SOURCE]")
+@option("--with FILE", "read this file too; may be repeated", name="more", multiple=True, under="Files")
 @offset_option
 @file_options
 @result_options("report")

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FILE, LIMIT, TEXT, Command, Text, pose_options, reading_options, verbose_option
+from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option
+from frametool.cli.options import LIMIT, pose_options, reading_options, verbose_option
 from frametool.cli.output import opened_place
 from frametool.cli.recording import copied_as, folder_of, refuse_input
 from frametool.cli.stderr import say, say_error
@@ -23,7 +23,6 @@ from frametool.view.progress import ProgressBar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 lookup, 5 file."
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
@@ -45,21 +44,18 @@ class Between(Text):
         return start, stop
 
 
-@click.command(cls=Command, name="record", epilog=EXIT_CODES)
-@click.argument("tree", type=FILE, metavar="RECORDING")
-@option("-o", "--output", type=FILE, metavar="FILE", help="write this file or folder, whole or not at all")
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE",
-              help="add the edges of this tree that are missing; may be repeated")  # fmt: skip
-@option("--replace", requires=("more",), is_flag=True, help="let --with replace edges that are there with other values")
-@option("--into", type=FRAME, metavar="FRAME", help="move the messages of each --topic into this frame")
-@option("--topic", "moved_topics", type=TEXT, multiple=True, metavar="NAME",
-              help="a topic whose messages move, or whose transforms count; may be repeated")  # fmt: skip
-@option("--on-error", type=click.Choice(ON_ERROR[:2]), default=STOP, show_default=True,
-              help="at a message that cannot be moved")  # fmt: skip
-@option("--between", type=Between(), metavar="START,STOP", help="leave out what was logged before and after")
-@option("-f", "--format", "format_name", type=click.Choice(writers("recording")),
-              help="form of the copy  [default: by the name of --output]")  # fmt: skip
-@option("--force", requires=("output",), is_flag=True, help="let --output replace a file")
+@command_named("record", own=("topics",), epilog=EXIT_CODES)
+@argument("tree", FILE, metavar="RECORDING")
+@option("-o --output FILE", "write this file or folder, whole or not at all")
+@option("--with FILE", "add the edges of this tree that are missing; may be repeated", name="more", multiple=True)
+@option("--replace", "let --with replace edges that are there with other values", requires=("more",))
+@option("--into FRAME", "move the messages of each --topic into this frame", FRAME)
+@option("--topic NAME", "a topic whose messages move, or whose transforms count; may be repeated", name="moved_topics",
+    multiple=True)  # fmt: skip
+@option("--on-error", "at a message that cannot be moved", ON_ERROR[:2], default=STOP)
+@option("--between START,STOP", "leave out what was logged before and after", Between())
+@option("-f --format", "form of the copy  [default: by the name of --output]", writers("recording"), name="format_name")
+@option("--force", "let --output replace a file", requires=("output",), under="Result")
 @reading_options(topics=False)
 @verbose_option
 @pose_options

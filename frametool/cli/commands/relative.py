@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
+from frametool.cli.command import Inputs, argument, command_named, option
 from frametool.cli.explaining import EXPLAIN, PoseTask, one_argument, pose_stream_options
-from frametool.cli.group import option
-from frametool.cli.options import TEXT, ColumnNames, Command, limit_options, pose_result_options, window_of
+from frametool.cli.options import ColumnNames, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among, without_inverse
 from frametool.cli.stderr import say
 from frametool.grammar.pose import Pose
 from frametool.grammar.pose_algebra import relative_names
 
-if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
 
-
-@click.command(cls=Command, name="relative")
-@click.argument("a", type=TEXT, required=False)
-@click.argument("b", type=TEXT, required=False)
+@command_named("relative")
+@argument("a", required=False)
+@argument("b", required=False)
+@pose_stream_options
 @pose_result_options("poses")
-@option("--consecutive", excludes=("first", "explain"), is_flag=True,
-        help="of a stream, each row seen from the row before it")  # fmt: skip
-@option("--first", excludes=("explain",), is_flag=True, help="of a stream, each row seen from the first")
-@option(
-    "--velocity",
-    requires=("consecutive",),
-    is_flag=True,
-    help="with --consecutive, also the twist from row to row, m/s and rad/s",
-)
-@option(
-    "--time-column",
-    requires=("velocity", "time_offset", "start", "stop"),
-    type=ColumnNames(),
-    metavar="NAME",
-    help="with --velocity, the column or key of the stamps  [default: stamp, t ..]",
-)
+@option("--consecutive", "of a stream, each row seen from the row before it", excludes=("first", "explain"))
+@option("--first", "of a stream, each row seen from the first", excludes=("explain",))
+@option("--velocity", "with --consecutive, also the twist from row to row, m/s and rad/s", requires=("consecutive",))
+@option("--time-column NAME", "with --velocity, the column or key of the stamps  [default: stamp, t ..]", ColumnNames(),
+    requires=("velocity", "time_offset", "start", "stop"))
 @EXPLAIN
 @limit_options
-@pose_stream_options
 def command(inputs: Inputs) -> int:
     """Print B seen from A, inverse(A) B, with the distance and the angle between them.
 

@@ -6,40 +6,28 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli.command import Inputs, argument, command_named, option
 from frametool.cli.comparing import forms_of, parse_every, read_span, trajectory, trajectory_options, write_trajectory
-from frametool.cli.group import option
-from frametool.cli.options import (
-    TEXT,
-    Command,
-    Number,
-    Parsed,
-    offset_option,
-    read_times,
-    reading_options,
-    result_options,
-    rotation_options,
-)
+from frametool.cli.options import offset_option, read_times, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, warn
 from frametool.formats.table import by_name, writers
 from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from frametool.cli.group import Inputs
     from frametool.frames.trajectory import Trajectory
 
 
-@click.command(cls=Command, name="resample")
-@click.argument("path", type=TEXT, metavar="TRAJ")
-@option("--rate", type=Number(), metavar="HZ", help="so many poses a second, from the first on")
-@option("--at", "times", type=TEXT, metavar="FILE|TIMES",
-              help="at the stamps of a file; T,T,.., START:STOP:STEP")  # fmt: skip
-@option("--every", type=Parsed("step", parse_every), metavar="1m|5deg",
-              help="at even steps of the path, or of its turning")  # fmt: skip
-@option("--max-gap", "max_gap_ns", type=Parsed("time", read_span), metavar="TIME",
-              help="that is interpolated  [default: 3 median intervals]")  # fmt: skip
+@command_named("resample")
+@argument("path", metavar="TRAJ")
+@option("--rate HZ", "so many poses a second, from the first on", parse_number)
+@option("--at FILE|TIMES", "at the stamps of a file; T,T,.., START:STOP:STEP", name="times")
+@option("--every 1m|5deg", "at even steps of the path, or of its turning", parse_every)
+@option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span,
+    name="max_gap_ns")  # fmt: skip
 @trajectory_options
 @offset_option
 @reading_options()

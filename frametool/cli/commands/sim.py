@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, option
+from frametool.cli.commands import Group
 from frametool.cli.explaining import explain_option, significant
-from frametool.cli.group import Group, option
-from frametool.cli.options import EXIT_CODES, TEXT, Command
 from frametool.cli.poses import source_of, usage_if_inline
 from frametool.cli.signals import clean_up
 from frametool.cli.sim_output import (
-    DURATION,
     LEADER,
     SimOutput,
     follow_options,
     leader_of,
     output_options,
+    parse_duration,
     style_of,
 )
 from frametool.cli.sink import writing
@@ -29,15 +29,13 @@ from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.sim.drivers import HEADINGS, KEYS, FollowController, Heading, Mailbox
-from frametool.sim.scene import duration_ns, tutorial
+from frametool.sim.scene import Scene, duration_ns, tutorial
 from frametool.sim.scene_file import read_scene
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from frametool.cli.group import Inputs
     from frametool.sim.drivers import MakeLeader
-    from frametool.sim.scene import Scene
     from frametool.sim.turtle import Twist
 
 INSTEAD = "pipe key names into frametool sim follow --leader -"
@@ -67,7 +65,7 @@ class SimGroup(Group):
         return self.commands.get(cmd_name) or super().get_command(ctx, cmd_name)
 
 
-@click.command(cls=SimGroup, name="sim", help=HELP, epilog=EXIT_CODES)
+@click.group("sim", cls=SimGroup, help=HELP, epilog=EXIT_CODES)
 def command() -> None:
     """Hold the subcommands."""
 
@@ -76,11 +74,11 @@ LAW_OPTIONS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular
 SCENE_OPTIONS = ("followers", "spawn", "target", "delay", "duration", "turtlesim", "holonomic")
 
 
-@command.command(cls=Command, name="follow")
+@command.command("follow", cls=Command)
 @LEADER
 @follow_options("20")
 @output_options
-@option("--explain-step", type=click.IntRange(0), metavar="N", help="derive the command of step N, from 0")
+@option("--explain-step N", "derive the command of step N, from 0", click.IntRange(0), under="Result")
 @explain_option(requires=("explain_step",))
 def follow(inputs: Inputs) -> None:
     """Let turtle2 follow turtle1 by tf, as the tutorial does, and print its velocity commands.
@@ -149,10 +147,10 @@ def misuse() -> Iterator[None]:
         raise click.UsageError(str(error)) from None
 
 
-@command.command(cls=Command, name="run")
-@click.argument("scene", type=TEXT)
-@option("--duration", type=DURATION, metavar="S", help="simulated seconds, or inf  [default: the scene's]")
-@option("--seed", type=click.IntRange(0), help="of random leaders  [default: the scene's]")
+@command.command("run", cls=Command)
+@argument("scene")
+@option("--duration S", "simulated seconds, or inf  [default: the scene's]", parse_duration)
+@option("--seed", "of random leaders  [default: the scene's]", click.IntRange(0), under="Turtles")
 @output_options
 def run(inputs: Inputs) -> None:
     """Run SCENE, a YAML or JSON file, and print the followers' velocity commands.
@@ -191,7 +189,7 @@ ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 QUIT = b"qQ\x04"
 
 
-@command.command(cls=Command, name="teleop")
+@command.command("teleop", cls=Command)
 @follow_options("inf")
 @output_options
 def teleop(inputs: Inputs) -> None:

@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.comparing import read_span
-from frametool.cli.group import option
-from frametool.cli.options import (
-    FILE,
-    TEXT,
-    Command,
-    Parsed,
-    pose_options,
-    reading_options,
-    result_options,
-    rotation_options,
-)
+from frametool.cli.options import reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import tell
@@ -30,7 +21,6 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.view.solution_text import Solution
 
 REPORTS = {".json": "json", ".csv": "csv"}
@@ -52,28 +42,23 @@ def _read_names(text: str) -> list[str]:
     return names
 
 
-@click.command(cls=Command, name="solve", epilog=EXIT_CODES)
-@click.argument("files", nargs=-1, required=True, type=FILE, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
-@option("--root", excludes=SHAPES, type=TEXT, metavar="FRAME",
-        help="that all others are given in  [default: never a child]")  # fmt: skip
-@option("--fix", excludes=SHAPES, type=FILE, multiple=True, metavar="TREE",
-        help="exact edges, kept as they are; may be repeated")  # fmt: skip
-@option("--without", excludes=SHAPES, type=TEXT, multiple=True, metavar="FILE:LINE",
-              help="leave this row out; may be repeated")  # fmt: skip
-@option("--hand-eye", excludes=("points",), is_flag=True, help="where a camera sits, from poses of gripper and target")
-@option("--eye-to-hand", requires=("hand_eye",), is_flag=True, help="the camera stands still, the target moves")
-@option("--max-gap", "max_gap_ns", requires=("hand_eye",), type=Parsed("time", read_span), metavar="TIME",
-              help="between stamps that are paired  [default: 50ms]")  # fmt: skip
-@option("--points", is_flag=True, help="A<-B from points that are the same in both")
-@option("--scale", requires=("points",), is_flag=True, help="of A to B too")
-@option("--names", requires=("hand_eye", "points"), type=Parsed("names", _read_names), metavar="NAME,..",
-              help="BASE,GRIPPER,CAMERA,TARGET, or A,B")  # fmt: skip
-@option("--no-robust", is_flag=True, help="use all rows, wrong ones too")
-@option("--report", type=Parsed("report", _read_report), metavar="FILE.json|csv",
-              help="numbers of the fit and of each row")  # fmt: skip
+@command_named("solve", epilog=EXIT_CODES)
+@argument("files", FILE, nargs=-1, required=True, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
+@option("--root FRAME", "that all others are given in  [default: never a child]", excludes=SHAPES)
+@option("--fix TREE", "exact edges, kept as they are; may be repeated", FILE, excludes=SHAPES, multiple=True)
+@option("--without FILE:LINE", "leave this row out; may be repeated", excludes=SHAPES, multiple=True)
+@option("--hand-eye", "where a camera sits, from poses of gripper and target", excludes=("points",))
+@option("--eye-to-hand", "the camera stands still, the target moves", requires=("hand_eye",))
+@option("--max-gap TIME", "between stamps that are paired  [default: 50ms]", read_span,
+    name="max_gap_ns", requires=("hand_eye",))  # fmt: skip
+@option("--points", "A<-B from points that are the same in both")
+@option("--scale", "of A to B too", requires=("points",))
+@option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names,
+    requires=("hand_eye", "points"))  # fmt: skip
+@option("--no-robust", "use all rows, wrong ones too")
+@option("--report FILE.json|csv", "numbers of the fit and of each row", _read_report)
 @reading_options()
-@pose_options
-@rotation_options
+@whole_pose_options
 @result_options("tree", "trajectory")
 def command(inputs: Inputs) -> int:
     """Solve for the transforms that measurements mean, with sigmas; what does not agree is left out and named.

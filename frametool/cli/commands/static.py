@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import TEXT, Command, pose_result_options, reading_options, together
+from frametool.cli.command import Inputs, argument, command_named, option, together
+from frametool.cli.options import pose_result_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
 from frametool.cli.trees import load_tree
@@ -22,17 +22,15 @@ from frametool.ros.publisher import FLAGS, moving_frames, read_flags, read_posit
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.cli.group import Inputs
     from frametool.grammar.pose import Pose
 
 
 def _flag(name: str) -> Callable[..., Any]:
-    metavar = "FRAME" if name.endswith("id") else "N"
-    return option(f"--{name}", type=TEXT, metavar=metavar, help="as static_transform_publisher has it")
+    return option(f"--{name} {'FRAME' if name.endswith('id') else 'N'}", "as static_transform_publisher has it")
 
 
-@click.command(cls=Command, name="static")
-@click.argument("arguments", nargs=-1, type=TEXT, metavar="[TREE | X Y Z .. PARENT CHILD]")
+@command_named("static")
+@argument("arguments", nargs=-1, metavar="[TREE | X Y Z .. PARENT CHILD]")
 @together(*map(_flag, FLAGS))
 @reading_options()
 @pose_result_options("tree")

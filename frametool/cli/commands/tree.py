@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FILE, TIME, Command, at_ns, color_option, result_options, rules, tree_options
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.options import TIME, at_ns, color_option, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import load_tree
 
-if TYPE_CHECKING:
 
-    from frametool.cli.group import Inputs
-
-
-@click.command(cls=Command, name="tree")
-@click.argument("tree", type=FILE)
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@option("--at", type=TIME, metavar="TIME", help="seconds, nanoseconds with ns  [default: latest of each edge]")
+@command_named("tree", own=("notations", "joints"))
+@argument("tree", FILE)
+@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
+@option("--at TIME", "seconds, nanoseconds with ns  [default: latest of each edge]", TIME)
 @color_option
 @tree_options
 @result_options("tree", "trajectory")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.group import option
-from frametool.cli.options import FILE, TEXT, TIME, Command, Parsed, at_ns, color_option, moving_options, rules
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
@@ -20,7 +20,6 @@ from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
 
-    from frametool.cli.group import Inputs
     from frametool.view.frame_scene import FrameScene
 
     Eye = tuple[float, float]
@@ -36,28 +35,25 @@ def _eye(text: str) -> Eye:
     return parse_eye(text)
 
 
-@click.command(cls=Command, name="view")
-@click.argument("tree", type=FILE)
-@click.argument("target", type=FRAME, required=False)
-@click.argument("source", type=FRAME, required=False)
-@option("--with", "more", multiple=True, type=FILE, metavar="FILE", help="merge this tree too; may be repeated")
-@option("--frame", "fixed", type=FRAME, metavar="FIXED",
-              help="what all is seen in  [default: TARGET, or the root of most frames]")
-@option("--at", type=TIME, metavar="TIME",
-              help="seconds, nanoseconds with ns  [default: the first time that all edges have]")
-@option("--below", type=FRAME, metavar="FRAME", help="only this frame and those that hang from it")
-@option("--only", type=TEXT, metavar="REGEX", help="only frames whose name matches")
-@option("--path", "path_only", is_flag=True, help="only the frames between TARGET and SOURCE")
-@option("--from", "eye", type=Parsed("eye", _eye), default="slanted", show_default=True, metavar="EYE",
-              help="slanted, front, side, top, or AZ,EL in degrees")
+@command_named("view")
+@argument("tree", FILE)
+@argument("target", FRAME, required=False)
+@argument("source", FRAME, required=False)
+@option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
+@option("--frame FIXED", "what all is seen in  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
+@option("--at TIME", "seconds, nanoseconds with ns  [default: the first time that all edges have]", TIME)
+@option("--below FRAME", "only this frame and those that hang from it", FRAME)
+@option("--only REGEX", "only frames whose name matches")
+@option("--path", "only the frames between TARGET and SOURCE", name="path_only")
+@option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye",
+    default="slanted")
 @moving_options
-@option("-f", "--format", "form", type=click.Choice(FORMS),
-              help="form of the picture  [default: by the suffix of --output, else text]")
-@option("-o", "--output", type=FILE, metavar="FILE", help="write there instead of stdout, whole or not at all")
-@option("--force", requires=("output",), is_flag=True, help="let --output replace an existing file")
-@option("--overlay", is_flag=True, help="lay TREE over a second tree, named in TARGET's place: what has moved?")
-@option("--sliders", excludes=("overlay",), is_flag=True, help="a slider for each joint of a URDF robot, on its page")
-@option("--open", "opens", is_flag=True, help="show the page in the browser")
+@option("-f --format", "form of the picture  [default: by the suffix of --output, else text]", FORMS, name="form")
+@option("-o --output FILE", "write there instead of stdout, whole or not at all")
+@option("--force", "let --output replace an existing file", requires=("output",), under="Result")
+@option("--overlay", "lay TREE over a second tree, named in TARGET's place: what has moved?")
+@option("--sliders", "a slider for each joint of a URDF robot, on its page", excludes=("overlay",))
+@option("--open", "show the page in the browser", name="opens")
 @color_option
 def command(inputs: Inputs) -> None:
     """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.

@@ -1,0 +1,447 @@
+"""What a command is: its inputs, its arguments and options as data, its help, and how click parses it.
+
+An option that was given, and that nobody has asked for when the first result is written, would be ignored: it is a
+usage error, and nothing is written.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import reduce
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from frametool.cli.sink import checked_by, writing
+from frametool.cli.stderr import say
+from frametool.errors import ValueInvalid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from frametool.geometry.place import Earth
+
+    Adds = Callable[[Any], Any]
+
+# an argument that begins like this is a number, whatever short options there are
+NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
+EVERYTHING = "frametool.everything"  # a key in a context's `meta`
+INPUTS = "frametool.inputs"  # the key in a context's `meta`
+# what stands for an option of several values in a command without it
+WITHOUT = {"input_forms": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
+# options that any way may ignore: they are about what is said, not about what is done
+OF_MESSAGES = ("quiet", "verbose")
+
+
+class Inputs:
+    """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
+
+    forms_read: the forms of what was read, each with the options that say what it leaves open
+    reads_trees: whether files of frames are opened: --in is then about these too
+    earth: what the options say of places on the Earth, made when first needed
+    """
+
+    def __init__(self, values: Mapping[str, Any], idle: dict[str, str] | None = None) -> None:
+        """Keep the values; idle: the options that were given, each as it is called."""
+        self._values = {**values}
+        self._idle = {} if idle is None else idle
+        self.forms_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
+        self.reads_trees = False
+        self.earth: Earth | None = None
+
+    @classmethod
+    def of(cls, context: click.Context) -> Inputs:
+        """Return what a context has parsed."""
+        idle = {name: called for name, called in told_options(context).items() if name not in OF_MESSAGES}
+        return cls(context.params, idle)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of an argument or option, which counts as asked for; None where the command has none."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        self._idle.pop(name, None)
+        return self._values.get(name, WITHOUT.get(name))
+
+    def peek(self, name: str) -> Any:
+        """Return a value that is looked at and not used."""
+        return self._values.get(name, WITHOUT.get(name))
+
+    def ask(self, *names: str) -> None:
+        """Count options as asked for."""
+        for name in names:
+            self._idle.pop(name, None)
+
+    def leave(self, **values: Any) -> None:
+        """Put what other readers have left in the place of what was given."""
+        self._values |= values
+
+    def but(self, **values: Any) -> Inputs:
+        """Return these inputs with other values."""
+        return Inputs(self._values | values, self._idle)
+
+    def idle(self) -> set[str]:
+        """Return the options that were given and that nobody has asked for."""
+        return {*self._idle}
+
+    def refuse_idle(self) -> None:
+        """Raise a usage error for options that were given and that nobody has asked for."""
+        if self._idle:
+            has = "has" if len(self._idle) == 1 else "have"
+            raise click.UsageError(f"{', '.join(self._idle.values())} {has} no effect here")
+
+
+class Option(click.Option):
+    """An option with what it says about others of its command, by the names of their parameters, and its place in help.
+
+    excludes: those that cannot stand beside it
+    requires: without any of these it has no meaning
+    under: the first word of its heading
+    """
+
+    def __init__(self, names: Any, excludes: Any = (), requires: Any = (), under: str = "Options", **rest: Any) -> None:
+        """Keep these beside what click keeps."""
+        super().__init__(names, **rest)
+        self.excludes, self.requires, self.under = excludes, requires, under
+
+
+def told_options(context: click.Context) -> dict[str, str]:
+    """Return the options that stand on the command line, by their parameters, each as it is called."""
+    told = click.core.ParameterSource.COMMANDLINE
+    return {
+        each.name or "": each.opts[-1] for each in context.command.params
+        if isinstance(each, click.Option) and context.get_parameter_source(each.name or "") is told
+    }  # fmt: skip
+
+
+def check_together(context: click.Context) -> None:
+    """Raise a usage error for options that do not belong together."""
+    told = told_options(context)
+    known = {each.name: each for each in context.command.params if isinstance(each, Option)}
+    for name, called in told.items():
+        if name not in known:
+            continue
+        if other := next((told[each] for each in known[name].excludes if each in told), ""):
+            raise click.UsageError(f"{called} and {other} exclude each other", context)
+        needed = known[name].requires
+        if needed and told.keys().isdisjoint(needed):
+            choices = " or ".join(known[each].opts[-1] for each in needed if each in known)
+            raise click.UsageError(f"{called} needs {choices}", context)
+
+
+def inputs() -> Inputs:
+    """Return the inputs of the running command; where none runs, nothing is set but --quiet."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return Inputs({"quiet": True})
+    found: Inputs = context.meta.get(INPUTS) or Inputs(context.params)
+    return found
+
+
+def show_help(ctx: click.Context, *, everything: bool = False) -> None:
+    """Print the help of a command, with `everything` of all its options."""
+    ctx.meta[EVERYTHING] = everything
+    with writing(None) as write:
+        write(f"{ctx.get_help()}\n")
+
+
+def _help(ctx: click.Context, option: click.Parameter, chosen: bool) -> None:  # click's signature
+    if chosen:
+        show_help(ctx, everything=option is HELP_ALL)
+        ctx.exit()
+
+
+def option_row(option: click.Option) -> tuple[str, str]:
+    """Return the names of an option with what it takes, and its meaning; long lists of choices stand in the latter."""
+    names, text = ", ".join((*option.opts, *option.secondary_opts)), option.help or ""
+    taken = option.metavar or option.type.name.upper()
+    if isinstance(option.type, click.Choice) and not option.metavar:
+        taken = f"[{'|'.join(option.type.choices)}]"
+        if len(taken) > LONGEST_CHOICE:
+            taken = option.opts[-1].strip("-").upper()
+            what, bracket, default = text.partition("  [")
+            text = f"{what}: {', '.join(option.type.choices)}{bracket}{default}"
+    if option.show_default and option.default is not None:
+        text += f"  [default: {option.default}]"
+    return names if option.is_flag or option.count else f"{names} {taken}", text
+
+
+# made without click's translations: those load `locale`, 2 ms of every start
+HELP_OPTION = click.Option(
+    ["-h", "--help"], is_flag=True, is_eager=True, expose_value=False, callback=_help,
+    help="this message; --help-all explains every option",
+)  # fmt: skip
+HELP_ALL = click.Option(
+    ["--help-all"], is_flag=True, is_eager=True, expose_value=False, callback=_help, hidden=True, help="all options"
+)
+
+
+HEADINGS = (
+    "Options", "Files (help formats)", "Time (help time)", "Rotations (help rotations, help earth)",
+    "Rows (help streams)", "Result (help errors)", "Forms that leave something open (help formats)",
+    "Turtles (help turtles)",
+)  # fmt: skip
+WIDEST = 24  # of the left column
+LONGEST_CHOICE = 14  # of choices beside their option
+LONGEST_LINE = 62  # of names of common options
+
+
+def grouped(options: Iterable[click.Parameter], own: Sequence[str] = ()) -> dict[str, list[click.Option]]:
+    """Return options under their headings, `own` ones among the first; no heading is empty."""
+    found: dict[str, list[click.Option]] = {title: [] for title in HEADINGS}
+    for each in options:
+        if isinstance(each, click.Option) and not each.hidden:
+            under = HEADINGS[0] if each.name in own else getattr(each, "under", HEADINGS[0])
+            found[next(title for title in HEADINGS if title.startswith(under))].append(each)
+    return {title: each for title, each in found.items() if each}
+
+
+def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
+    """Return the options of a command under their headings, those that it is about first."""
+    return grouped(command.get_params(ctx), getattr(command, "own", ()))
+
+
+def write_options(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[click.Option]]) -> None:
+    """Write options under their headings, each with its meaning."""
+    rows = {title: list(map(option_row, options)) for title, options in groups.items()}
+    width = max((len(left) for each in rows.values() for left, _ in each if len(left) <= WIDEST), default=0)
+    for title, each in rows.items():
+        formatter.write(f"{title}:\n")
+        with formatter.indentation():
+            formatter.write_dl([(left.ljust(width), text) for left, text in each], WIDEST, col_spacing=1)
+
+
+def _write_names(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[click.Option]]) -> None:
+    """Write a line of names for each heading; what one of 80 columns has no room for is left to --help-all."""
+    rows = []
+    for title, options in groups.items():
+        line = " ".join(each.opts[0] for each in options)
+        cut = f"{line[:LONGEST_LINE].rpartition(' ')[0]} .." if len(line) > LONGEST_LINE else line
+        rows.append((title.partition(" ")[0], cut))
+    with formatter.section("Common options (explained by --help-all and help common)"):
+        formatter.write_dl(rows)
+
+
+def _is_negative(argument: str) -> bool:
+    """Tell whether an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
+    is_long = argument[:2] == "--" and argument[2:3].isalpha()
+    return argument[:1] == "-" and not is_long and re.match(NEGATIVE, argument) is not None
+
+
+class Text(click.types.StringParamType):
+    """A text argument, without the blank that shields negative numbers; as a file's name it may hold any bytes."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        """Remove the blank."""
+        return value[1:] if value[:1] == " " and _is_negative(value[1:]) else value
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
+        """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
+        return {}
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:  # noqa: ARG002
+        """Offer what begins as the incomplete word does."""
+        from click.shell_completion import CompletionItem
+
+        offered = self.offers(ctx, incomplete)
+        if offered is None:
+            return [CompletionItem(incomplete, type="file")]
+        return [CompletionItem(word, help=about) for word, about in offered.items() if word.startswith(incomplete)]
+
+
+class File(Text):
+    """A file's name."""
+
+    name = "file"
+
+    def offers(self, ctx: click.Context, incomplete: str) -> None:  # noqa: ARG002
+        """Leave it to the shell."""
+        return
+
+
+class Parsed(Text):
+    """A text that a function reads; what it refuses is a wrong value of the option."""
+
+    def __init__(self, parse: Callable[[str], Any]) -> None:
+        """Keep what reads it."""
+        self.parse = parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read it."""
+        try:
+            return self.parse(super().convert(value, param, ctx)) if isinstance(value, str) else value
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+
+TEXT = Text()
+FILE = File()
+
+
+def _kind(kind: Any) -> click.ParamType[Any]:
+    """Return the type of words that a value may be, or of what a function reads."""
+    if isinstance(kind, click.ParamType):
+        return kind
+    return click.Choice(kind) if isinstance(kind, tuple) else Parsed(kind)
+
+
+def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any) -> Adds:
+    """Return an option as its help has it: `-o --output FILE`; a flag, where no word follows and no kind is said.
+
+    kind: the words a value may be, or what reads it; text, or a file, unless it is said
+    name: of the parameter, where it is not that of the option
+    """
+    words = spec.split()
+    names = [each for each in words if each.startswith("-")]
+    taken = " ".join(words[len(names) :])
+    if taken or kind:
+        more["type"] = _kind(kind or (FILE if taken == "FILE" else TEXT))
+    else:
+        more["is_flag"] = True
+    shows = "[default" not in about and more.get("default") not in (None, (), "")
+    names += [name] * bool(name)
+    return click.option(*names, cls=Option, help=about, metavar=taken or None, show_default=shows, **more)
+
+
+def argument(name: str, kind: Any = TEXT, metavar: str | None = None, **more: Any) -> Adds:
+    """Return an argument; optional where it has a default, `required=False` or any number of values."""
+    return click.argument(name, type=_kind(kind), metavar=metavar, **more)
+
+
+def command_named(name: str, cls: type[click.Command] | None = None, **more: Any) -> Callable[[Any], click.Command]:
+    """Return what makes a function a command."""
+    return click.command(name=name, cls=cls or Command, **more)
+
+
+def together(*options: Adds) -> Adds:
+    """Return what adds several options to a command, in this order in its help."""
+    return lambda function: reduce(lambda made, add: add(made), reversed(options), function)
+
+
+class WithHelp(click.Command):
+    """A command with -h, --help and --help-all.
+
+    own: the options that it is about although they have a heading elsewhere
+    """
+
+    def __init__(self, *args: Any, own: Sequence[str] = (), **kwargs: Any) -> None:
+        """Add --help-all, which click does not know."""
+        super().__init__(*args, **kwargs)
+        self.params.append(HELP_ALL)
+        self.own = own
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options of this command, and a line for each group that others have too; then the commands."""
+        groups = option_groups(self, ctx)
+        formatter.write_paragraph()
+        if ctx.meta.get(EVERYTHING):
+            write_options(formatter, groups)
+        else:
+            write_options(formatter, {"Options": groups.pop("Options")})
+            if groups:
+                _write_names(formatter, groups)
+        if isinstance(self, click.Group):
+            self.format_commands(ctx, formatter)
+
+    def get_help_option(self, ctx: click.Context) -> click.Option | None:  # noqa: ARG002 - click's signature
+        """Return the one help option."""
+        return HELP_OPTION
+
+
+
+
+class Command(WithHelp):
+    """A command whose arguments may be negative numbers.
+
+    click takes `-1e-3` for options. A blank before each such argument keeps it from doing so without giving up its
+    own check of misspelled options; `Text` takes the blank off again.
+    """
+
+    def make_parser(self, ctx: click.Context) -> Any:
+        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
+        parser: Any = super().make_parser(ctx)
+        parse = parser.parse_args
+
+        def parse_once(args: list[str]) -> Any:
+            found = parse(args=args)
+            told = [] if ctx.resilient_parsing else found[2]
+            for each in told:
+                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
+                    raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
+            return found
+
+        parser.parse_args = parse_once
+        return parser
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Shield negative numbers (-j is an option where joints are), give bare options their values, then parse."""
+        if any(map(_is_negative, args)):
+            options = {name for each in self.get_params(ctx) for name in each.opts}
+            args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
+        if "inv" in args:
+            args = _joined(args, ctx, always=self.name in OF_POSES)
+        for name in {*OPTIONAL}.intersection(args):
+            args = _with_value(args, name, *OPTIONAL[name])
+        rest = super().parse_args(ctx, args)
+        if not ctx.resilient_parsing:
+            check_together(ctx)
+        return rest
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
+        given = ctx.meta[INPUTS] = Inputs.of(ctx)
+        with checked_by(given.refuse_idle):
+            result = ctx.invoke(self.callback or (lambda _: 0), given)
+        given.refuse_idle()
+        _say_not_needed(given)
+        return result
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """End every help with the exit codes, those of most commands unless its epilog says others."""
+        formatter.write_paragraph()
+        formatter.write_text(self.epilog or EXIT_CODES)
+
+
+# options that may stand bare, and their values: the first is what they mean then
+OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
+
+
+OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  # they have no other arguments
+
+
+def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
+    """Write the word `inv` before a pose as inv(POSE); before what may be no pose it is a name, unless `always`."""
+    joined: list[str] = []
+    for each in reversed(args):
+        is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))
+        if each == "inv" and is_pose and not joined[-1].startswith("--"):
+            joined.append(f"inv({joined.pop()})")
+        elif each == "inv" and always:
+            raise click.UsageError("inv stands before the pose whose inverse is meant; nothing follows it", ctx)
+        else:
+            joined.append(each)
+    return joined[::-1]
+
+
+def _with_value(args: list[str], option: str, *values: str) -> list[str]:
+    """Join an option with the value behind it, or its usual one: click would take any argument there for its value."""
+    joined = []
+    for before, each, behind in zip(["", *args], args, [*args[1:], ""], strict=False):
+        if each == option:
+            joined.append(f"{option}={behind if behind in values else values[0]}")
+        elif before != option or each not in values:
+            joined.append(each)
+    return joined
+
+
+def _say_not_needed(given: Inputs) -> None:
+    """Say on stderr which options change nothing, where only what was read or is written shows whether they do."""
+    forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
+    for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
+        if chosen and not given.quiet and not any(ask in asks for _, asks in given.forms_read):
+            why = f": {forms} does not leave that open" if forms else " here"
+            say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
+
+
