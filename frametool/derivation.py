@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, alternatives, shown
 from frametool.explain import derive
-from frametool.explain.derive import ByTree, DerivationStyle
-from frametool.explain.follow import FollowStep, derive_follow
+from frametool.explain.derive import ByTree, DerivationStyle, FollowStep, derive_follow
 from frametool.explain.operations import WrittenPose
 from frametool.explain.run import DIGITS
 from frametool.frames.lookups import Frames

@@ -161,7 +161,7 @@ class SimOutput(NamedTuple):
             drawing, suffix = Drawing(scene), suffix_of(self.plot)
             pictures[self.plot] = drawing.watch, lambda: drawn(run_picture(drawing), suffix, last_commands(drawing))
         if self.view:
-            from frametool.view.html_page import RunPage
+            from frametool.view.exports import RunPage
 
             page = RunPage()
             pictures[self.view] = page.watch, page.content

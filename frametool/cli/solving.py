@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Components
     from frametool.stream.measurements import Measurement
     from frametool.stream.samples import HandEyeSamples
-    from frametool.view.solution_text import Solution, SolvedFrame, SolvedRow
+    from frametool.view.fit_text import Solution, SolvedFrame, SolvedRow
 
 NAMES = ("base", "gripper", "camera", "target")
 SHARES = 1000  # of the way, as progress counts it
@@ -40,7 +40,7 @@ def solved_tree(
 ) -> Solution:
     """Solve the tree that the measurements of files mean, beside what is fixed."""
     from frametool.fit.measured_tree import solve_tree
-    from frametool.view.progress import ProgressBar
+    from frametool.view.tree_text import ProgressBar
 
     measurements = _measurements(files, without, normalize=normalize)
     measured = dict.fromkeys(name for each in measurements for name in each[:2])
@@ -91,7 +91,7 @@ def _measurements(files: Sequence[str], places: Sequence[str], *, normalize: boo
 
 
 def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], list[Any]]) -> Solution:
-    from frametool.view.solution_text import Solution
+    from frametool.view.fit_text import Solution
 
     frames = [_solved_frame(found, name, fixed) for name in sorted(found.frames, key=lambda name: name != found.root)]
     unknown = [each.name for each in frames if each.parent and each.name not in found.fixed and not each.covariance]
@@ -109,7 +109,7 @@ def _tree_solution(found: TreeSolution, fixed: dict[tuple[str, str], list[Any]])
 
 def _solved_frame(found: TreeSolution, name: str, fixed: dict[tuple[str, str], list[Any]]) -> SolvedFrame:
     """Return the entry of a frame: in the root, or as --fix has it."""
-    from frametool.view.solution_text import SolvedFrame
+    from frametool.view.fit_text import SolvedFrame
 
     parent, is_fixed = found.parents.get(name), name in found.fixed
     pose, covariance = found.pose(name, parent).components, None
@@ -132,7 +132,7 @@ def _numbers(components: Iterable[Any]) -> Any:
 
 def _side(parent: str, name: str, pose: Transform, covariance: Array, rows: int) -> list[SolvedFrame]:
     """Return a root and the one frame in it."""
-    from frametool.view.solution_text import SolvedFrame
+    from frametool.view.fit_text import SolvedFrame
 
     root = SolvedFrame(parent, None, IDENTITY, None, rows, checked=True)
     return [root, SolvedFrame(name, parent, _numbers(pose.components), _listed(covariance), rows, checked=True)]
@@ -144,7 +144,7 @@ def _row(
     """Return a row of a report: how far it is off in metres, and in radians where it has turned."""
     from math import hypot
 
-    from frametool.view.solution_text import SolvedRow
+    from frametool.view.fit_text import SolvedRow
 
     parts = residual.tolist()
     angle = hypot(*parts[3:]) if len(parts) > 3 else None
@@ -207,7 +207,7 @@ def _hand_eye_names(said: Sequence[str] | None, found: Sequence[str | None]) -> 
 
 
 def _hand_eye_solution(found: HandEye, samples: HandEyeSamples, names: tuple[str, str, str, str]) -> Solution:
-    from frametool.view.solution_text import Solution
+    from frametool.view.fit_text import Solution
 
     holder, other, camera, target = names
     count = int(found.used.sum())
@@ -230,10 +230,10 @@ def solved_points(files: Sequence[str], *, names: Sequence[str] | None, scale: b
     """Solve the transform between two files of matched points."""
     from frametool.cli.comparing import forms_of
     from frametool.cli.trees import answers
-    from frametool.fit.matched_points import solve_points
+    from frametool.fit.closed_forms import solve_points
     from frametool.stream.faults import BadRows
     from frametool.stream.samples import matched, read_points
-    from frametool.view.solution_text import Solution
+    from frametool.view.fit_text import Solution
 
     def policy(name: str) -> BadRows:
         return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))

@@ -116,7 +116,7 @@ class Stream:
         if not is_bag(self.path):
             return None
         from frametool.grammar.edges import Tally
-        from frametool.recordings.records import open_records
+        from frametool.recordings.messages import open_records
 
         self._opened = open_records(self.path, self.inputs.topics, Tally())
         self.within = "json"
@@ -366,7 +366,7 @@ class Stream:
         from contextlib import closing, nullcontext
 
         from frametool.stream.run import run
-        from frametool.view.progress import ProgressBar
+        from frametool.view.tree_text import ProgressBar
 
         bad = self.policy(self.name, counted)
         with (

@@ -12,7 +12,7 @@ from frametool.fit.comparison import AUTO, EVO, Delta, Settings, parse_delta
 from frametool.fit.comparison import compare as compared
 from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.fit.numbers import whole_estimate
-from frametool.fit.resampling import resampled, stamps_at_rate, stamps_every
+from frametool.fit.pairs import resampled, stamps_at_rate, stamps_every
 from frametool.frames.lookups import FrameTree, taken
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation
@@ -24,10 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import TypeAlias
 
+    from frametool.fit.closed_forms import MeanFit, PointsFit
     from frametool.fit.comparison import Comparison
     from frametool.fit.hand_eye import HandEye
-    from frametool.fit.matched_points import PointsFit
-    from frametool.fit.robust_mean import MeanFit
     from frametool.geometry.types import Numbers
 
     Given: TypeAlias = Trajectory | str | PathLike[str]
@@ -206,9 +205,9 @@ def solve_points(
     Returns .transform (target_from_source), .scale, .covariance, .used and more.
     Raises ValueInvalid where the points are too few, lie on a line, or are mirrored.
     """
-    from frametool.fit import matched_points
+    from frametool.fit import closed_forms
 
-    found = matched_points.solve_points(target, source, weights=weights, scale=scale, robust=robust)
+    found = closed_forms.solve_points(target, source, weights=weights, scale=scale, robust=robust)
     for sentence in found.hints:
         warn(sentence)
     return found
@@ -220,9 +219,9 @@ def solve_mean(poses: Batch, *, weights: Numbers | None = None, robust: bool = T
     weights: (n,), in proportion to 1 / variance
     Returns .transform, .covariance (of one pose), .used and more.  Raises ValueInvalid where there is no mean.
     """
-    from frametool.fit import robust_mean
+    from frametool.fit import closed_forms
 
-    return robust_mean.solve_mean(_poses(poses, "poses"), weights=weights, robust=robust)
+    return closed_forms.solve_mean(_poses(poses, "poses"), weights=weights, robust=robust)
 
 
 def _poses(given: Any, name: str) -> Transform:

@@ -10,11 +10,10 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.fit import pairs as pairing
-from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, fitted, principal_axes
-from frametool.fit.clock import LIMIT_S, clock_offset
-from frametool.fit.metrics import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
-from frametool.fit.mounting import lever_arm
-from frametool.fit.robust import require_near
+from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, fitted, lever_arm, principal_axes
+from frametool.fit.least_squares import require_near
+from frametool.fit.numbers import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
+from frametool.fit.pairs import LIMIT_S, clock_offset
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import way
 from frametool.geometry import earth, quaternion
@@ -26,7 +25,7 @@ from frametool.grammar.names import EARTH_FRAMES
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.fit.metrics import AbsoluteErrors, RelativeErrors, SegmentErrors
+    from frametool.fit.numbers import AbsoluteErrors, RelativeErrors, SegmentErrors
     from frametool.fit.pairs import Pairs
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array, Rigid

@@ -13,15 +13,30 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.least_squares import align_vectors, applied, inverse, length, solve_normal
-from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
-from frametool.fit.rigid_arrays import log as rotvecs_of
-from frametool.fit.robust import KEPT, LEAST, deviations, draws, fitted_sigmas, lengths, require_near, settled
+from frametool.fit.least_squares import (
+    KEPT,
+    LEAST,
+    PoseArrays,
+    align_vectors,
+    applied,
+    deviations,
+    draws,
+    fitted_sigmas,
+    inverse,
+    inverse_left_jacobian,
+    length,
+    lengths,
+    require_near,
+    settled,
+    skew,
+    solve_normal,
+)
+from frametool.fit.least_squares import log as rotvecs_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from frametool.fit.robust import Mask, Rows
+    from frametool.fit.least_squares import Mask, Rows
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Indices
 

@@ -1,17 +1,33 @@
-"""Least squares that every fit shares: normal equations, and the rotation between vectors."""
+"""What fits share: normal equations, poses as arrays of matrices, and which measurements are kept.
+
+rotations: (n, 3, 3); translations: (n, 3), metres.  An error or a step is (n, 6): metres and a rotation vector, both
+along the fixed axes of the parent frame, as the covariances of ROS: t + d[:3], Exp(d[3:]) R.
+u is how many sigmas a measurement is off, as the root of the mean square of its numbers; the sigmas come from medians
+where nobody gave them.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from random import Random
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from frametool.errors import ValueInvalid
+from frametool.geometry import arrays, floats, matrix, quaternion, vectors
 from frametool.geometry.rotation import Rotation
+from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import Array
+    from collections.abc import Callable, Iterator
+    from typing import Any, TypeAlias
 
+    from numpy.typing import NDArray
+
+    from frametool.geometry.types import Array, Quaternion
+
+    Mask: TypeAlias = NDArray[np.bool_]
+    Rows: TypeAlias = slice | list[int] | Mask
 
 class NotSettled(ValueInvalid):
     """Report equations that have no solution."""
@@ -73,3 +89,208 @@ def length(vectors: Array) -> Array:
     """Return the lengths of vectors, which lie along the last axis."""
     found: Array = np.linalg.norm(vectors, axis=-1)
     return found
+
+
+NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
+
+
+class PoseArrays(NamedTuple):
+    """Many poses, or one without the first axis."""
+
+    rotations: Any
+    translations: Any
+
+    @classmethod
+    def of(cls, transform: Transform) -> PoseArrays:
+        """Convert transforms."""
+        whole = transform.as_matrix()
+        return cls(whole[..., :3, :3].copy(), whole[..., :3, 3].copy())
+
+    @property
+    def transform(self) -> Transform:
+        """The same as transforms."""
+        x, y, z = np.moveaxis(self.translations, -1, 0)
+        return Transform.of(x, y, z, *as_quaternion(self.rotations))
+
+    @property
+    def inverse(self) -> PoseArrays:
+        """The poses the other way round."""
+        back = np.swapaxes(self.rotations, -1, -2)
+        return PoseArrays(back, -applied(back, self.translations))
+
+    def __matmul__(self, other: PoseArrays) -> PoseArrays:
+        """Compose: a_from_c = a_from_b @ b_from_c."""
+        return PoseArrays(self.rotations @ other.rotations, self.apply(other.translations))
+
+    def apply(self, points: Array) -> Array:
+        """Move points."""
+        moved: Array = applied(self.rotations, points) + self.translations
+        return moved
+
+    def at(self, index: Any) -> PoseArrays:
+        """Choose poses as numpy does."""
+        return PoseArrays(self.rotations[index], self.translations[index])
+
+    def stepped(self, steps: Array) -> PoseArrays:
+        """Add small steps: t + d[:3], Exp(d[3:]) R."""
+        return PoseArrays(exp(steps[..., 3:]) @ self.rotations, self.translations + steps[..., :3])
+
+    def errors(self, measured: PoseArrays) -> Array:
+        """Return [t - measured t, Log(R measured R')]."""
+        turned = log(self.rotations @ np.swapaxes(measured.rotations, -1, -2))
+        return np.concatenate([self.translations - measured.translations, turned], -1)
+
+
+def as_quaternion(rotations: Array) -> Quaternion:
+    """Return x, y, z, w >= 0 of rotation matrices."""
+    entries = matrix.nine(rotations[..., i, j] for i in range(3) for j in range(3))
+    return quaternion.unit(*matrix.to_quaternion(*entries, arrays), arrays)
+
+
+def exp(rotvecs: Array) -> Array:
+    """Return the rotation matrices of rotation vectors (.., 3), radians."""
+    x, y, z = np.moveaxis(rotvecs, -1, 0)
+    nine = quaternion.to_matrix(*vectors.from_rotvec(x, y, z, arrays))
+    return np.stack(nine, -1).reshape(*rotvecs.shape, 3)
+
+
+def log(rotations: Array) -> Array:
+    """Return the rotation vectors of rotation matrices (.., 3, 3)."""
+    x, y, z, w = as_quaternion(rotations)
+    return np.stack(vectors.as_rotvec(x, y, z, w, arrays), -1)
+
+
+def skew(v: Array) -> Array:
+    """Return [v]x of vectors (.., 3): [v]x a = v x a."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape, 3)
+
+
+def inverse_left_jacobian(rotvecs: Array) -> Array:
+    """Return J^-1(w): Log(Exp(d) Exp(w)) = w + J^-1(w) d for small d.
+
+    Source: Barfoot 2017, eq. 7.77b; I - [w]x / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) [w]x^2, a = |w|.
+    """
+    angle = length(rotvecs)
+    far = angle > NEAR
+    a = np.where(far, angle, 1.0)
+    sine, cosine = floats.half_sincos(a, arrays)
+    factor = np.where(far, 1.0 / a**2 - cosine / (2.0 * a * sine), 1.0 / 12.0)
+    crossed = skew(rotvecs)
+    return np.eye(3) - crossed / 2.0 + factor[..., None, None] * (crossed @ crossed)
+
+
+Model = TypeVar("Model")
+
+KEPT = 3.0  # sigmas: what is further off is left out
+CERTAIN = 2.5  # sigmas: up to here a first weight is 1
+MEDIAN_OF_THREE = 1.538  # the median of |r| of three numbers of deviation 1: the root of that of chi2 with 3 degrees
+MEDIAN_OF_SIX = 0.944  # the median of u of six numbers: the root of that of chi2 with 6 degrees, over 6
+LEAST = 1e-9  # metres, radians: no sigma is below
+FARTHEST = 1e100  # metres: sums of squares stay finite
+STEADY = 1e-3  # change of a first weight that is rest
+FIRST_ROUNDS = 30
+ROUNDS = 20  # of leaving out and taking back; in the second half nothing more is left out, so that they end
+
+
+def require_near(translations: Array, name: str) -> None:
+    """Refuse translations whose squares would overflow."""
+    if (farthest := np.abs(translations).max(initial=0.0)) > FARTHEST:
+        raise ValueInvalid(f"{name}: a place at {farthest:.3g} m; at most {FARTHEST:.0e} m can be fitted")
+
+
+def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
+    """Yield so many seeded choices of rows, the same for ever.
+
+    Of Python's generators only `random()` keeps its sequence between versions by promise, and numpy's keep none.
+    """
+    source = Random(0)  # noqa: S311 - no secret
+    for _ in range(count):
+        chosen: set[int] = set()
+        while len(chosen) < size:
+            chosen.add(int(source.random() * among))
+        yield sorted(chosen)
+
+
+class Settled(NamedTuple, Generic[Model]):
+    """A fit of the rows kept: residuals of all (n, 3 or 6), a sigma for each three of them, and u of all."""
+
+    model: Model
+    kept: Mask
+    residuals: Array
+    sigmas: Array
+    u: Array
+
+
+def settled(
+    model: Model,
+    residuals: Callable[[Model], Array],
+    rough: Callable[[Model, Array], Model],
+    fit: Callable[[Model, Array], Model],
+    *,
+    unknown: int,
+    robust: bool,
+) -> Settled[Model]:
+    """Fit, leave out what is further off than 3 sigmas, and fit the rest again until the rows stay.
+
+    residuals: (n, 3) or (n, 6) of a model; unknown: how many numbers each three of them share
+    rough, fit: a better model and the best one, by a weight for each row
+    """
+    count = len(residuals(model))
+    kept = np.ones(count, bool)
+    if robust:
+        share, weights = np.sqrt(1.0 - unknown / (3.0 * count)), np.zeros(count)
+        for _ in range(FIRST_ROUNDS):
+            before, off = weights, residuals(model)
+            u = deviations(off, np.array([median_sigma(part, share) for part in lengths(off).T]))
+            weights = first_weights(u)
+            if np.abs(weights - before).max() < STEADY:
+                break
+            model = rough(model, weights)
+        kept = u <= KEPT
+    for at in range(ROUNDS):
+        model = fit(model, kept.astype(float))
+        off = residuals(model)
+        sigmas = fitted_sigmas(off, kept, unknown)
+        u = deviations(off, sigmas)
+        near = u <= KEPT if at < ROUNDS // 2 else kept | (u <= KEPT)
+        if not robust or (near == kept).all():
+            break
+        kept = near
+    return Settled(model, kept, off, sigmas, u)
+
+
+def lengths(residuals: Array) -> Array:
+    """Return the length of each three of the numbers of a row."""
+    return length(residuals.reshape(len(residuals), -1, 3))
+
+
+def deviations(residuals: Array, sigmas: Array) -> Array:
+    """Return u of rows: the root of the mean square of their numbers in sigmas."""
+    off = lengths(residuals) / sigmas
+    u: Array = np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
+    return u
+
+
+def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:
+    """Return the sigma of each three numbers of weighted rows that share so many unknown ones."""
+    dof = max(3.0 * float(weights.sum()) - unknown, 1.0)
+    squares = (weights[:, None] * lengths(residuals) ** 2).sum(0)
+    return np.array([rms_sigma(each, dof) for each in squares.tolist()])
+
+
+def first_weights(u: Array) -> Array:
+    """Return min(1, 2.5 / u)^2."""
+    weights: Array = np.minimum(1.0, CERTAIN / np.maximum(u, 1e-12)) ** 2
+    return weights
+
+
+def median_sigma(lengths: Array, share: float = 1.0) -> float:
+    """Return the sigma of three numbers each by the median of their lengths; share q: what the fit leaves of noise."""
+    return max(float(np.median(lengths)) / (MEDIAN_OF_THREE * share), LEAST)
+
+
+def rms_sigma(squares: float, dof: float) -> float:
+    """Return the sigma per axis of a sum of squares with so many degrees of freedom."""
+    return max(float(np.sqrt(squares / dof)), LEAST)

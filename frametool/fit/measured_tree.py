@@ -9,19 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import ValueInvalid, alternatives, shown
-from frametool.fit.bodies import bodies_of, require_connected
-from frametool.fit.graph import bridges
-from frametool.fit.least_squares import NotSettled, inverse
-from frametool.fit.rigid_arrays import PoseArrays
+from frametool.fit.graph import bodies_of, bridges, require_connected
+from frametool.fit.least_squares import NotSettled, PoseArrays, inverse
 from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
-from frametool.fit.uncertainty import Uncertainty
-from frametool.fit.verdicts import judged, place_of
+from frametool.fit.verdicts import Uncertainty, judged, place_of
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from frametool.fit.bodies import Bodies, Fixed
+    from frametool.fit.graph import Bodies, Fixed
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Array
     from frametool.stream.measurements import Measurement

@@ -13,9 +13,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.fit.graph import SpanningTree, bridges, spanning_tree
-from frametool.fit.least_squares import applied, inverse, length, solve_normal
-from frametool.fit.rigid_arrays import PoseArrays, inverse_left_jacobian, skew
-from frametool.fit.robust import KEPT, LEAST, MEDIAN_OF_SIX, first_weights, median_sigma, rms_sigma
+from frametool.fit.least_squares import (
+    KEPT,
+    LEAST,
+    MEDIAN_OF_SIX,
+    PoseArrays,
+    applied,
+    first_weights,
+    inverse,
+    inverse_left_jacobian,
+    length,
+    median_sigma,
+    rms_sigma,
+    skew,
+    solve_normal,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

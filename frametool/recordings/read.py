@@ -294,7 +294,7 @@ class RecordingReader:
 
     def __init__(self, path: str, opened: ExitStack, tally: Tally) -> None:
         """Open its files, as long as the stack is."""
-        from frametool.recordings.types import MessageTypes
+        from frametool.recordings.made import MessageTypes
 
         self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
         if files[0].is_dir():

@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid
-from frametool.explain.follow import FollowStep, PlanarSample, Sighting
+from frametool.explain.derive import FollowStep, PlanarSample, Sighting
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.drivers import ARRIVED, frame_of
 from frametool.sim.simulate import CACHE_NS, simulate

@@ -20,11 +20,18 @@ from frametool.errors import (
 from frametool.formats.load import FrameFile, Rules, load_sources
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.grammar.edges import Edge, Options, stop
-from frametool.recordings.copy import RecordCopy
-from frametool.recordings.edges import MOST_NAMED, STATIC, EdgePlan, RecordedEdges, replaced
+from frametool.recordings.copy import (
+    MOST_NAMED,
+    MOVED_TYPES,
+    STATIC,
+    EdgePlan,
+    MessageMover,
+    RecordCopy,
+    RecordedEdges,
+    replaced,
+)
 from frametool.recordings.made import SECONDS_ROS2
-from frametool.recordings.moved import MOVED_TYPES, MessageMover
-from frametool.recordings.transforms import TYPES, RawTransform, recorded_edges
+from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
 from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
 
 if TYPE_CHECKING:
@@ -33,8 +40,7 @@ if TYPE_CHECKING:
     from frametool.errors import Finding
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import EdgeColumns, Report, Samples
-    from frametool.recordings.copy import Advance, Change
-    from frametool.recordings.edges import AddedEdge
+    from frametool.recordings.copy import AddedEdge, Advance, Change
     from frametool.recordings.read import Channel, RecordingReader
 
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.fit.metrics import statistics
-from frametool.view.comparison_text import write_comparison, write_table
+from frametool.fit.numbers import statistics
+from frametool.view.fit_text import write_comparison, write_table
 from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords, shade_of, write_svg
 from frametool.view.run_plot import ticks
 

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
 from frametool.errors import FileProblem, printable
-from frametool.view.projection import SLANTED, Projection, Size, axis_tips, nice, place_labels
+from frametool.view.scene import SLANTED, Projection, Size, axis_tips, nice, place_labels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.view.frame_scene import FrameScene
-    from frametool.view.projection import Label
+    from frametool.view.scene import FrameScene, Label
 
 # name -> light, dark
 PALETTE = {

@@ -16,7 +16,7 @@ from unicodedata import east_asian_width
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE
-from frametool.view.projection import SLANTED, Flat, Projection, Size, best_spot, nice, words_of
+from frametool.view.scene import SLANTED, Flat, Projection, Size, best_spot, nice, words_of
 from frametool.view.tree_text import coloured_console
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
-    from frametool.view.frame_scene import FrameScene
+    from frametool.view.scene import FrameScene
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column

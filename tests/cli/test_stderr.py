@@ -25,7 +25,7 @@ ALLOWED = {
     ("errors.py", "warn"), ("cli/stderr.py", "print"), ("view/tree_text.py", "print"),
     ("cli/__init__.py", "sys.stderr.write"),  # where no module can be opened, the voice cannot either
     ("view/pictures.py", "catch_warnings"),  # what a drawing library says of fonts
-    ("view/frame_scene.py", "catch_warnings"),  # what Python says of an expression
+    ("view/scene.py", "catch_warnings"),  # what Python says of an expression
     ("formats/trees/launch_python.py", "catch_warnings"),  # what Python says of a file of somebody else's
 }  # fmt: skip
 MOVE = ["apply", "--transform", "{xyz: [1, 0, 0]}"]

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted
-from frametool.fit.clock import clock_offset
+from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted, lever_arm
 from frametool.fit.comparison import Delta, parse_delta
-from frametool.fit.metrics import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
-from frametool.fit.mounting import lever_arm
-from frametool.fit.pairs import Pairs, by_number, interpolated, nearest
+from frametool.fit.numbers import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
+from frametool.fit.pairs import Pairs, by_number, clock_offset, interpolated, nearest
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

@@ -15,7 +15,7 @@ from worlds import COVARIANCE, SIGMA_M, SIGMA_RAD, World, inverted, world
 
 from frametool.errors import ValueInvalid
 from frametool.fit.measured_tree import TreeSolution, solve_tree
-from frametool.fit.measurements import BLUNDERS
+from frametool.fit.verdicts import BLUNDERS
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from frametool.fit.mounting import lever_arm
+from frametool.fit.alignment import lever_arm
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation
 

@@ -10,7 +10,7 @@ import pytest
 from rigs import replaced, small
 
 from frametool.errors import ValueInvalid
-from frametool.fit.robust_mean import solve_mean
+from frametool.fit.closed_forms import solve_mean
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.spread import mean_and_spread
 from frametool.geometry.transform import Transform

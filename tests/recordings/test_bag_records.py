@@ -18,7 +18,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from frametool.grammar.edges import Tally
-from frametool.recordings.records import open_records
+from frametool.recordings.messages import open_records
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,8 +10,8 @@ from chromium import CHROMIUM
 from console import ROOT
 
 import frametool
-from frametool.view.frame_scene import FrameScene
-from frametool.view.html_page import write_page
+from frametool.view.exports import write_page
+from frametool.view.scene import FrameScene
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,10 +12,9 @@ import pytest
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.geometry.transform import Transform
-from frametool.view.frame_scene import FrameScene
-from frametool.view.glb import write_glb
-from frametool.view.html_page import write_page
+from frametool.view.exports import write_glb, write_page
 from frametool.view.pictures import still_picture, write_svg
+from frametool.view.scene import FrameScene
 from frametool.view.terminal import TerminalPicture
 
 VALUES = (0.0, 1.0, -1.0, 1e-9, 1e-300, 5e-324, 1e9, 1e29, 1e150, 1e300, -1e300, 1.7e308, 123.456)

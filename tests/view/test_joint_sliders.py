@@ -14,7 +14,7 @@ from chromium import NEEDS_CHROMIUM
 from console import ROOT
 
 import frametool
-from frametool.view.html_page import SCRIPTS, WITH_JOINTS
+from frametool.view.exports import SCRIPTS, WITH_JOINTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,8 +19,8 @@ from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
 from frametool.geometry import euler, floats, quaternion, vectors
-from frametool.view.frame_scene import FrameScene
-from frametool.view.html_page import write_page
+from frametool.view.exports import write_page
+from frametool.view.scene import FrameScene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

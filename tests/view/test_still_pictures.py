@@ -17,7 +17,6 @@ import frametool
 from frametool.errors import FileProblem
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.transform import Transform
-from frametool.view.frame_scene import FrameScene
 from frametool.view.pictures import (
     HEIGHT,
     SIZE,
@@ -29,7 +28,7 @@ from frametool.view.pictures import (
     write_png,
     write_svg,
 )
-from frametool.view.projection import EYES, Projection, TakenBoxes, nice, place_labels
+from frametool.view.scene import EYES, FrameScene, Projection, TakenBoxes, nice, place_labels
 from frametool.view.terminal import Canvas, TerminalPicture
 
 if TYPE_CHECKING:

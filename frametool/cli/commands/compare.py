@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.fit.comparison import Comparison
-    from frametool.fit.limits import Limit
+    from frametool.fit.numbers import Limit
 
 PASSED, TROUBLE = 1, 2
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 holds, 1 passed, 2 trouble."
@@ -40,7 +40,7 @@ def _read_report(path: str) -> str:
 
 
 def _read_limits(text: str) -> list[Limit]:
-    from frametool.fit.limits import parse_limits
+    from frametool.fit.numbers import parse_limits
 
     return parse_limits(text)
 
@@ -84,7 +84,7 @@ def command(inputs: Inputs) -> int:
     try:
         found, skipped = comparisons(inputs.ref, est, inputs)
         from frametool.fit.numbers import numbers
-        from frametool.view.comparison_text import write_explanation
+        from frametool.view.fit_text import write_explanation
 
         every = [numbers(each) for each in found]
         asked = [(each, limit) for each in every for limit in limits or ()]
@@ -118,7 +118,7 @@ def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> Non
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
     """Write rows, a table, or each comparison by itself."""
     from frametool.fit.numbers import rows as rows_of
-    from frametool.view.comparison_text import write_comparison, write_table
+    from frametool.view.fit_text import write_comparison, write_table
 
     form = output.style.form
     if rows:

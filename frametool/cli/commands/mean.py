@@ -86,7 +86,7 @@ def _numbers(weights: str) -> list[float]:
 
 def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
     """Return the mean of what was gathered, with its spread, and what to say of each pose that was left out."""
-    from frametool.fit.robust_mean import covariance_of, solve_mean
+    from frametool.fit.closed_forms import covariance_of, solve_mean
     from frametool.geometry.spread import mean_and_spread
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain

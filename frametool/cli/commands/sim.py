@@ -107,8 +107,7 @@ def _explain(inputs: Inputs) -> None:
     form = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
     if form not in (None, "text"):
         raise click.UsageError(f"--explain-step derives one step in words; leave the format {form} out")
-    from frametool.explain.derive import DerivationStyle
-    from frametool.explain.follow import derive_follow
+    from frametool.explain.derive import DerivationStyle, derive_follow
     from frametool.sim.followed import follow_steps
 
     plan = DerivationStyle(style_of(inputs), significant(inputs.precision))

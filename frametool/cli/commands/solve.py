@@ -21,7 +21,7 @@ from frametool.stream.faults import ROWS_SKIPPED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frametool.view.solution_text import Solution
+    from frametool.view.fit_text import Solution
 
 REPORTS = {".json": "json", ".csv": "csv"}
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
@@ -99,7 +99,7 @@ def command(inputs: Inputs) -> int:
     else:
         chosen = {name: getattr(inputs, name) for name in ("root", "fix", "without", "normalize")}
         found = solving.solved_tree(files, robust=robust, **chosen)
-    from frametool.view.solution_text import write_left_out, write_solution
+    from frametool.view.fit_text import write_left_out, write_solution
 
     said = (write_left_out if inputs.quiet else write_solution)(found)
     if said:
@@ -159,7 +159,7 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
 
 def _write_report(found: Solution, path: str, *, force: bool) -> None:
     """Write the numbers of the fit as one document, or those of its rows as a table."""
-    from frametool.view.solution_text import report, row_report
+    from frametool.view.fit_text import report, row_report
 
     if REPORTS[splitext(path)[1].lower()] == "csv":
         from frametool.formats.rows.csv import write_points

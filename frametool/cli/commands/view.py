@@ -20,7 +20,7 @@ from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
 
-    from frametool.view.frame_scene import FrameScene
+    from frametool.view.scene import FrameScene
 
     Eye = tuple[float, float]
 
@@ -30,7 +30,7 @@ PIPE_SIZE = (100, 30)  # columns and lines where nobody says how many there are
 
 
 def _eye(text: str) -> Eye:
-    from frametool.view.projection import parse_eye
+    from frametool.view.scene import parse_eye
 
     return parse_eye(text)
 
@@ -86,7 +86,7 @@ def command(inputs: Inputs) -> None:
     if sliders and (chosen != "html" or tree == "-"):
         raise click.UsageError("--sliders move the joints of a robot on a page: give a file, and -o FILE.html")
     frames = load_tree(tree, inputs.more, rules(inputs))
-    from frametool.view.frame_scene import FrameScene
+    from frametool.view.scene import FrameScene
 
     ends = {} if overlay else {"target": target, "source": source}
     names = ends | {"fixed": inputs.fixed, "below": inputs.below}
@@ -135,12 +135,12 @@ def _content(
     """Return the picture in a form, and say what a still one does not show."""
     title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
     if form == "html":
-        from frametool.view.html_page import write_page
+        from frametool.view.exports import write_page
 
         joints = _joints(tree, scene) if sliders else []
         return write_page(scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, joints=joints)
     if form == "glb":
-        from frametool.view.glb import write_glb
+        from frametool.view.exports import write_glb
 
         return write_glb(scene)
     if form == "text":
@@ -161,7 +161,7 @@ def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
     """Return the joints of a robot's file that get a slider; its warnings came when its frames were read."""
     from frametool.errors import overheard
     from frametool.formats.robots.urdf import robot_of
-    from frametool.view.html_page import joint_sliders
+    from frametool.view.exports import joint_sliders
 
     (robot, posture), _ = overheard(robot_of, opened([tree])[0])
     return joint_sliders(robot, posture.still, scene.names)

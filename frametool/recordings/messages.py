@@ -1,0 +1,277 @@
+"""What messages of a recording say: transforms as edges, all else as a stream of JSON lines, one a message.
+
+Points, poses, fixes, twists, wrenches and the like are records; clouds are files of their own.  Transforms are read
+from every topic that holds some; what comes by a topic `tf_static` stands still.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import cache
+from io import BufferedReader
+from json import JSONEncoder
+from math import isfinite
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
+from frametool.frames.stamps import BILLION
+from frametool.geometry import quaternion
+from frametool.grammar.edges import Edge
+from frametool.recordings.read import opened_recording
+from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
+from frametool.ros.plain_messages import unit_components
+from frametool.text.lines import Pieces
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from frametool.documents.source import InputFile
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.edges import Options, Tally
+    from frametool.recordings.read import Channel, RecordingReader
+
+
+POSE_ARRAY = "geometry_msgs/msg/PoseArray"
+
+
+@dataclass
+class Posed:
+    """A pose of a list, with the fields of a PoseStamped."""
+
+    header: Any
+    pose: Any
+
+
+def posed_messages(message: Any, kind: str) -> Sequence[Any] | Iterator[Any]:
+    """Return the poses of a message that is a list of them, each with its header; else the message itself.
+
+    A pose of a Path has its own header; frame and stamp that it leaves open are those of the path.  The stamp 0 beside
+    a frame is one where other poses have stamps.
+    """
+    if kind == POSE_ARRAY:
+        return (Posed(message.header, pose) for pose in message.poses)
+    if kind == PATH:
+        has_stamps = any(each.header.stamp.sec or each.header.stamp.nanosec for each in message.poses)
+        return (Posed(_completed(each.header, message.header, has_stamps), each.pose) for each in message.poses)
+    return (message,)
+
+
+def _completed(own: Any, outer: Any, has_stamps: bool) -> Any:  # noqa: FBT001 - it reads so
+    """Return a header with the frame, and the stamp, of the one around it where it has none."""
+    says_when = own.stamp.sec or own.stamp.nanosec or (has_stamps and own.frame_id)
+    return replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)
+
+
+CLOUD = "sensor_msgs/msg/PointCloud2"
+MANY = 400  # lines
+FIX = "sensor_msgs/msg/NavSatFix"
+STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
+           "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
+RECORDS = frozenset((
+    FIX, PATH, POSE_ARRAY, "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField", "nav_msgs/msg/Odometry",
+    *(f"geometry_msgs/msg/{name}Stamped" for name in STAMPED),
+))  # fmt: skip
+
+
+def record_channels(reader: RecordingReader, chosen: Collection[str]) -> list[Channel]:
+    """Return the channels whose messages are wanted: those chosen, or those of the only topic that holds records.
+
+    chosen: topics with or without a leading `/`
+    Raises Unanswered where several hold records and none is chosen.
+    """
+    there = [each for each in reader.channels if each.type in RECORDS]
+    wanted = {topic.strip("/") for topic in chosen}
+    topics = sorted({each.topic for each in there})
+    if len(topics) > 1 and not wanted:
+        named = first_of(topics, 8, gap="|")
+        raise Unanswered(f"several topics hold records; give --topic {named}", source=reader.path)
+    return [each for each in there if not wanted or each.topic.strip("/") in wanted]
+
+
+def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedReader | None:
+    """Open the messages of a bag as JSON lines; None where the topics that are wanted hold clouds.
+
+    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds neither.
+    """
+    with ExitStack() as opened:
+        reader = opened.enter_context(opened_recording(path, tally))
+        reader.refuse_foreign(chosen)
+        if channels := record_channels(reader, chosen):
+            return BufferedReader(Pieces(_pieces(reader, channels), opened.pop_all()))
+        wanted = {topic.strip("/") for topic in chosen}
+        clouds = [each.topic.strip("/") for each in reader.channels if each.type == CLOUD]
+        if any(not wanted or topic in wanted for topic in clouds):
+            return None
+        held = {f"{each.topic} ({each.type})" for each in reader.channels}
+        known = listing(held, near=next(iter(chosen), "")) or "none"
+        has_frames = any(each.type in TYPES for each in reader.channels)
+    named = f" on {listing(chosen)}" if chosen else ""
+    remedy = f"; its frames: frametool lookup {path} TARGET SOURCE" if has_frames else ""
+    raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
+
+
+def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
+    """Yield each message, or each pose of a list, as a line, many together; an error comes behind the lines before."""
+    held: list[str] = []
+    number = 1
+    try:
+        for channel, _, data, *_ in reader.messages(channels):
+            held += map(_line, posed_messages(reader.types.read(channel, data), channel.type))
+            number += 1
+            if len(held) >= MANY:
+                yield "".join(held).encode()
+                held.clear()
+    except Exception as error:
+        yield "".join(held).encode()
+        if isinstance(error, FormatError):
+            raise
+        what = f"message {number}: cannot be read ({type(error).__name__})"
+        raise FormatError(what, source=reader.path) from None
+    yield "".join(held).encode()
+
+
+def _line(message: Any) -> str:
+    """Return a message as a line of JSON; a number that JSON has not by its name."""
+    try:
+        return f"{_encode(message)}\n"
+    except ValueError:
+        return f"{_encode(_named(message))}\n"
+
+
+def _named(value: Any) -> Any:
+    """Return a message, or a part of one, with the names of numbers that are not finite."""
+    if isinstance(value, float):
+        return value if isfinite(value) else str(value)
+    if isinstance(value, str | int):
+        return value
+    inner = _plain(value) if not isinstance(value, list) else value
+    return [*map(_named, inner)] if isinstance(inner, list) else {name: _named(each) for name, each in inner.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Return the fields of a message, or the numbers of an array."""
+    inner = getattr(value, "__dict__", None)
+    if inner is None:
+        return value.tolist()
+    kind: Any = type(value)
+    for name in _marks(kind):
+        inner.pop(name, None)
+    return inner
+
+
+@cache
+def _marks(kind: Any) -> list[str]:
+    """Return the fields of a type that are no data: the library's own, and constants."""
+    return [name for name in kind.__dataclass_fields__ if not name[0].islower()]
+
+
+_encode = JSONEncoder(default=_plain, allow_nan=False, ensure_ascii=False, check_circular=False).encode
+
+
+TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
+
+
+class RawTransform(NamedTuple):
+    """A transform as it was recorded, unchecked; numbers: tx, ty, tz, x, y, z, w; stamp: seconds and nanoseconds."""
+
+    parent: str
+    child: str
+    numbers: Rigid
+    stamp: tuple[int, int]
+
+    @classmethod
+    def of(cls, message: Any, body: str = "") -> RawTransform:
+        """Return what a TransformStamped says, or a pose over time, of a frame or of a body."""
+        if hasattr(message, "transform"):
+            body, moved, turned = message.child_frame_id, message.transform.translation, message.transform.rotation
+        else:
+            pose = getattr(message.pose, "pose", message.pose)
+            body = getattr(message, "child_frame_id", "") or body
+            moved, turned = pose.position, pose.orientation
+        numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
+        return cls(message.header.frame_id, body, numbers, (message.header.stamp.sec, message.header.stamp.nanosec))
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the transforms of a bag in the order they were recorded.
+
+    An edge's line is the number of its message among those with transforms.
+    Raises FileProblem when the extra is missing; FormatError for a bag that is broken or holds no transforms.
+    """
+    try:
+        with opened_recording(file.path, options.tally) as reader:
+            yield from recorded_edges(reader, _channels(reader, options), options)
+    except FormatError as error:
+        options.report(error)
+
+
+def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
+    """Return the channels with transforms, and those chosen that hold poses; raises FormatError without any."""
+    reader.refuse_foreign(options.topics.chosen)
+    found = [each for each in reader.channels if _is_read(each, options)]
+    options.topics.seen |= {each.topic for each in reader.channels}
+    for other in reader.channels:
+        if other not in found and other.topic.rpartition("/")[2] in ("tf", "tf_static"):
+            what = f"{other.topic} holds {other.type} and no transforms; is it damaged?"
+            raise FormatError(what, source=reader.path)
+    if not found:
+        poses = sorted({each.topic for each in reader.channels if each.type in POSES})
+        foreign = {f"{each.topic} ({each.encoding})" for each in reader.foreign}
+        known = ", ".join(sorted(options.topics.seen | foreign))
+        hint = f"; --topic {poses[0]} reads its poses" if poses else ""
+        what = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
+        raise FormatError(what, source=reader.path)
+    return found
+
+
+def _is_read(channel: Channel, options: Options) -> bool:
+    """Return True for a channel that holds transforms, or was chosen and holds poses."""
+    return channel.type in TYPES or (channel.type in POSES and options.topics.chooses(channel.topic))
+
+
+def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options: Options) -> Iterator[Edge]:
+    """Yield the edges of the messages on some channels; raises FormatError where there is none, or one is broken."""
+    number = 0
+    for number, (channel, received_ns, data, *_) in enumerate(reader.messages(channels), 1):
+        try:
+            message = reader.types.read(channel, data)
+        except ValueInvalid as error:
+            raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
+        body = body_of(channel.topic, options.answers)
+        for each in posed_messages(message, channel.type) if channel.type in POSES else message.transforms:
+            if edge := _edge(RawTransform.of(each, body), number, channel.topic, received_ns, reader.path, options):
+                yield edge
+    if not number:
+        raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
+
+
+def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: str, options: Options) -> Edge | None:
+    """Return the edge that a message on a topic says; None where the topic does not count.
+
+    number: of the message among those with transforms
+    Raises FormatError for one that is none.
+    """
+    if not options.topics.takes(topic):
+        return None
+    tally = options.tally
+    parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
+    components = unit_components(said.numbers, number, tally, options.normalize)
+    if components is None or not parent or not child:
+        problem = _complaint(parent, child, said.numbers, normalize=options.normalize)
+        edge = f"{shown(parent)} -> {shown(child)}"
+        raise FormatError(f"message {number}: {edge}: {problem}", source=path, rule=problem.rule)
+    if misfit := stamp_problem(*said.stamp, STAMPS[0]):
+        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {misfit}", source=path)
+    if clash := options.topics.conflict(topic, child):
+        options.report(FormatError(clash, source=path, rule="two-topics"))
+    stamp_ns = None if topic.endswith("tf_static") else said.stamp[0] * BILLION + said.stamp[1]
+    return Edge(parent, child, components, stamp_ns, number, received_ns, topic=topic)
+
+
+def _complaint(parent: str, child: str, numbers: tuple[float, ...], *, normalize: bool) -> ValueInvalid:
+    """Say what is wrong with a transform that was refused."""
+    if not parent or not child:
+        return ValueInvalid("an empty frame name")
+    problem = quaternion.complaint(*numbers[3:], normalize=normalize)
+    return problem or ValueInvalid("its position is not finite", rule="not-finite")

@@ -1,0 +1,316 @@
+"""Frames as files that other programs show: one HTML page, and glTF 2.0 in one binary file (.glb).
+
+The page looks at them from all sides, with everything inside and no request to anywhere.  Its script and style stand as
+plain files in the folder `page`, one after another in the order of SCRIPTS; the page lets nothing else run.  Poses go
+in as doubles, stamps as 64-bit integers of nanoseconds; joints of a robot with their limits.  A run of turtles is shown
+as its followers saw it in tf.
+
+A .glb has a node a frame, named and nested as they are, with coloured axes; moving frames are animated, from their
+first stamp on, in seconds.  glTF has y up, so one node above all turns z up.
+Source: Khronos glTF 2.0, sections 3.6 (buffers), 3.11 (animation), 4.4 (binary).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import struct
+import sys
+from array import array
+from base64 import b64encode
+from hashlib import sha256
+from html import escape
+from itertools import chain, islice
+from json import dumps
+from operator import mul
+from typing import TYPE_CHECKING, Any
+
+from frametool import __version__
+from frametool.formats.robots.model import JointValue
+from frametool.frames.buffer import TransformBuffer
+from frametool.frames.stamps import BILLION, format_stamp
+from frametool.sim.turtle import single
+from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from frametool.formats.robots.model import Robot, Value
+    from frametool.frames.track import MovingTrack
+    from frametool.geometry.types import Rigid
+    from frametool.sim.simulate import SimulationStep
+
+
+THICK = 0.02  # half the width of a bar, where its length is 1
+COLOURS = ((217, 45, 32, 255), (18, 135, 61, 255), (26, 95, 208, 255))
+SIDES = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6))  # of a box, outwards
+Z_UP = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
+FLOAT, USHORT, UBYTE = 5126, 5123, 5121
+VERTICES, INDICES = 34962, 34963
+MESH = {"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}]}
+MATERIAL = {"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": {"metallicFactor": 0}}
+
+
+class BinaryPart:
+    """The numbers of the file: one buffer, its views, and what is to be found in them."""
+
+    def __init__(self) -> None:
+        """Create an empty one."""
+        self.data = bytearray()
+        self.views: list[dict[str, int]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, data: bytes, kind: str, component: int, count: int, *, target: int = 0, **more: Any) -> int:
+        """Append numbers, and return the number of their accessor."""
+        self.data += bytes(-len(self.data) % 4)
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
+        self.views.append(view | ({"target": target} if target else {}))
+        self.accessors.append(
+            {"bufferView": len(self.views) - 1, "componentType": component, "count": count, "type": kind} | more
+        )
+        self.data += data
+        return len(self.accessors) - 1
+
+    def floats(self, rows: Sequence[Sequence[float]], kind: str, **more: Any) -> int:
+        """Append rows of float32."""
+        numbers = [number for row in rows for number in row]
+        return self.add(struct.pack(f"<{len(numbers)}f", *numbers), kind, FLOAT, len(rows), **more)
+
+
+def write_glb(scene: FrameScene) -> bytes:
+    """Return the scene as the bytes of a .glb."""
+    flat = Projection(scene, Size(1000.0, 700.0, 70.0, (14.0, 46.0)))
+    part = BinaryPart()
+    _add_axes(part)
+    nodes, index = _nodes(scene, flat.poses, flat.axis)
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": f"frametool {__version__}"},
+        "extensionsUsed": ["KHR_materials_unlit"],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": nodes,
+        "meshes": [MESH],
+        "materials": [MATERIAL],
+    }
+    if animation := _animation(scene, index, part):
+        document["animations"] = [animation]
+    part.data += bytes(-len(part.data) % 4)
+    document |= {"accessors": part.accessors, "bufferViews": part.views, "buffers": [{"byteLength": len(part.data)}]}
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(part.data), len(text), b"JSON")
+    return head + text + struct.pack("<I4s", len(part.data), b"BIN\0") + part.data
+
+
+def _add_axes(part: BinaryPart) -> None:
+    """Add three bars along x, y, z of length 1: places, colours, triangles."""
+    places: list[list[float]] = []
+    faces: list[int] = []
+    for axis in range(3):
+        first = len(places)
+        for corner in range(8):
+            place = [THICK if corner >> side & 1 else -THICK for side in range(3)]
+            place[axis] = 1.0 if corner >> axis & 1 else -THICK
+            places.append(place)
+        for a, b, c, d in SIDES:
+            faces += [first + corner for corner in (a, b, c, a, c, d)]
+    part.floats(places, "VEC3", target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
+    colours = b"".join(bytes(colour) * 8 for colour in COLOURS)
+    part.add(colours, "VEC4", UBYTE, len(places), target=VERTICES, normalized=True)
+    part.add(struct.pack(f"<{len(faces)}H", *faces), "SCALAR", USHORT, len(faces), target=INDICES)
+
+
+def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:
+    """Return the nodes, and the number of each frame's; what has no drawn parent stands where it is in `fixed`."""
+    nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
+    index: dict[str, int] = {}
+    for name, pose in poses.items():
+        parent, track = scene.parent(name), scene.tree.track(name)
+        edge = None if track is None else track.at(scene.at_ns or 0)
+        above, place = (index[parent], edge) if parent in index and edge is not None else (0, pose)
+        index[name] = len(nodes)
+        nodes[above]["children"].append(index[name])
+        nodes.append({"name": name, "translation": place[:3], "rotation": place[3:], "children": [len(nodes) + 1]})
+        nodes.append({"name": f"{name} axes", "mesh": 0, "scale": [axis] * 3})
+    return nodes, index
+
+
+def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> dict[str, Any] | None:
+    """Return the samples of the frames that move below one and the same drawn parent."""
+    channels: list[dict[str, Any]] = []
+    samplers: list[dict[str, Any]] = []
+    first_ns, _ = scene.span_ns
+    for name, track in scene.tracks.items():
+        drawn = name in index and track.parent in index and not track.varies
+        if not drawn or not all(can_be_drawn(sample[:3]) for _, _, sample in track.walk()):
+            continue
+        seconds, places, rotations = _keys(track, first_ns)
+        times = part.floats([*zip(seconds, strict=True)], "SCALAR", min=[seconds[0]], max=[seconds[-1]])
+        for path, rows, kind in (("translation", places, "VEC3"), ("rotation", rotations, "VEC4")):
+            channels.append({"sampler": len(samplers), "target": {"node": index[name], "path": path}})
+            samplers.append({"input": times, "output": part.floats(rows, kind), "interpolation": "LINEAR"})
+    return {"name": "samples", "channels": channels, "samplers": samplers} if channels else None
+
+
+def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence[float]], list[Sequence[float]]]:
+    """Return seconds that rise as float32, places, and rotations of which each is the nearer one of q and -q."""
+    seconds: list[float] = []
+    places: list[Sequence[float]] = []
+    rotations: list[Sequence[float]] = []
+    for stamp_ns, _, sample in track.walk():
+        second = single((stamp_ns - first_ns) / BILLION)
+        if seconds and second <= seconds[-1]:
+            continue
+        rotation = sample[3:]
+        if rotations and sum(map(mul, rotation, rotations[-1])) < 0.0:
+            rotation = tuple(-each for each in rotation)
+        seconds.append(second)
+        places.append(sample[:3])
+        rotations.append(rotation)
+    return seconds, places, rotations
+
+
+FOLDER = os.path.join(os.path.dirname(__file__), "page")
+SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
+WITH_JOINTS = (*SCRIPTS[:-1], "joints", "main")
+EACH = 8  # bytes of a number
+BLOCK = 1 << 13  # samples
+PACKED = 48_000  # bytes of numbers, from where on they are compressed
+NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def write_page(
+    scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
+    other: FrameScene | None = None, other_title: str = "", joints: Sequence[dict[str, Any]] = (),
+) -> str:  # fmt: skip
+    """Return the page.
+
+    title: its heading.  file: the tree's name in the command that the page offers to copy.
+    eye: azimuth and elevation of the first view, radians.
+    other: another tree seen in the same frame, laid over this one; other_title: what it is called.
+    joints: those with a slider, as `joint_sliders` makes them.
+    """
+    head = _head(scene) | {"title": title, "file": file or title, "made": f"frametool {__version__}"}
+    head["show"] = _shown(scene, eye)
+    if joints:
+        head["joints"] = list(joints)
+    if other is not None:
+        here = {name: number for number, name in enumerate(scene.names)}
+        poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
+        head["overlay"] = {"title": other_title, "poses": poses}
+    script, style = "".join(_file(f"{name}.js") for name in (WITH_JOINTS if joints else SCRIPTS)), _file("page.css")
+    parts = {
+        # the page lets its own script and style run, and nothing else
+        "POLICY": "default-src 'none'; "
+        f"script-src '{_digest(script)}'; style-src '{_digest(style)}'; base-uri 'none'; form-action 'none'",
+        "TITLE": escape(title),
+        "STYLE": style,
+        # JSON that no name in it can end
+        "HEAD": dumps(head, separators=(",", ":")).replace("<", "\\u003c").replace("&", "\\u0026"),
+        "BLOB": b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode(),
+        "SCRIPT": script,
+    }
+    return re.sub("@([A-Z]+)@", lambda mark: parts[mark[1]], _file("page.html"))
+
+
+def _file(name: str) -> str:
+    with open(os.path.join(FOLDER, name), encoding="utf-8") as stream:
+        return stream.read()
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
+
+
+def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
+    """Return what the page shows first."""
+    shown: dict[str, Any] = {"fixed": scene.fixed, "path": scene.path_only}
+    shown |= {key: name for key, name in (("target", scene.target), ("source", scene.source)) if name}
+    if scene.at_ns is not None:
+        shown["t"] = format_stamp(scene.at_ns)
+    if scene.chosen is not None and not scene.path_only:
+        shown["only"] = [name for name in scene.names if name in scene.chosen]
+    return shown | ({"view": eye} if eye else {})
+
+
+def _head(scene: FrameScene) -> dict[str, Any]:
+    """Return names, parents and where each track's numbers begin in the blob."""
+    index = {name: number for number, name in enumerate(scene.names)}
+    standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
+    parents = [-1 if track is None else index[track.parent] for track in standing]
+    tracks: list[dict[str, Any]] = []
+    at = EACH * len(NO_POSE) * len(parents)
+    for name, moving in scene.tracks.items():
+        parents_then = [index[parent] for _, parent, _ in moving.walk()] if moving.varies else index[moving.parent]
+        tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": parents_then})
+        at += EACH * (1 + len(NO_POSE)) * moving.count
+    first, last = map(str, scene.span_ns)
+    head = {"names": scene.names, "parents": parents, "tracks": tracks, "first": first, "last": last}
+    return head | {"packed": at > PACKED}
+
+
+def _blob(scene: FrameScene) -> Iterator[bytes]:
+    """Yield the poses of frames that stand still, then of each track its stamps and its samples."""
+    standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
+    yield _little(array("d", chain.from_iterable(track.components if track else NO_POSE for track in standing)))
+    for moving in scene.tracks.values():
+        yield _little(array("q", (stamp for stamp, _, _ in moving.walk())))
+        samples = moving.walk()
+        while some := array("d", chain.from_iterable(each for _, _, each in islice(samples, BLOCK))):
+            yield _little(some)
+
+
+def _little(numbers: array[Any]) -> bytes:
+    if sys.byteorder == "big":
+        numbers.byteswap()
+    return numbers.tobytes()
+
+
+def _packed(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    from zlib import compressobj
+
+    packer = compressobj(6)
+    yield from map(packer.compress, pieces)
+    yield packer.flush()
+
+
+def joint_sliders(robot: Robot, values: Mapping[str, Value], names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the joints that turn or slide and stand still, as the page has them.
+
+    values: of the joints, by name.  names: of the frames of the page, in its order.
+    """
+    index = {name: number for number, name in enumerate(names)}
+    links = {child: link for child, link in robot.links.items() if link.joints and child in index}
+    found: list[dict[str, Any]] = []
+    for child, link in links.items():
+        (joint,) = link.joints
+        value = values.get(joint.name)
+        if not joint.posed and isinstance(value, JointValue):
+            found.append({
+                "name": joint.name, "frame": index[child], "kind": joint.kind, "axis": joint.axis,
+                "origin": link.origin, "lower": joint.lower, "upper": joint.upper, "value": float(value.plain),
+            })  # fmt: skip
+    places = {str(each["name"]): number for number, each in enumerate(found)}
+    for name, each in zip(places, found, strict=True):
+        mimic = robot.joints[name].mimic
+        if mimic and mimic.joint in places:
+            each["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
+    return found
+
+
+class RunPage:
+    """Collect the transforms of a run, all of them, for a page."""
+
+    def __init__(self) -> None:
+        """Create the page of a run that has not begun."""
+        self.buffer = TransformBuffer(name="run")
+
+    def watch(self, step: SimulationStep) -> None:
+        """Add the transforms of a step."""
+        for stamp_ns, parent, child, transform in step.broadcasts:
+            self.buffer.insert(parent, child, transform, stamp_ns)
+
+    def content(self) -> str:
+        """Return the page, seen from above."""
+        return write_page(FrameScene(self.buffer), title="turtles", file="tf.yaml", eye=EYES["top"])
