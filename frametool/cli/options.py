@@ -388,6 +388,18 @@ def _stamp_ns(text: str) -> int:
     return whole_stamp(parse_stamp(text))
 
 
+class Offset(Time):
+    """A time that is added to others; `first` makes the first of them 0."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return nanoseconds, or what is added like them."""
+        if value != "first":
+            return super().convert(value, param, ctx)
+        from frametool.frames.stamps import FromFirst
+
+        return FromFirst()
+
+
 TIME = Time()
 
 
@@ -404,7 +416,8 @@ rules_options = together(
 )
 _TIMES = "many: T,T,.., START:STOP:STEP, or the stamps of FILE"
 times_option = _of_times("--times TIMES", _TIMES, excludes=("explain",))
-offset_option = _of_times("--time-offset SECONDS", "add this to all stamps read", LIMIT)
+_OFFSET = "add this to all stamps read; first: they begin at 0"
+offset_option = _of_times("--time-offset SECONDS|first", _OFFSET, Offset(latest=False))
 limit_options = together(
     _of_times("--start TIME", "leave out what is before", LIMIT),
     _of_times("--stop TIME", "leave out what is after", LIMIT),
@@ -453,7 +466,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
     if text == "-" and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in")
-    return read_stamps(text, report, say)
+    return read_stamps(text, report)
 
 
 def _listed(text: str) -> list[int]:

@@ -77,13 +77,16 @@ def folded(line: str) -> str:
 def say_warning(message: str, rule: str = "") -> None:
     """Write a warning.
 
-    With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.
+    With --quiet there is no word on names that lost their leading slash: their tree is as it was meant.  What stamps
+    are taken for by their size is said once.
     """
-    if rule == "slash":
+    if rule in ("slash", "by-size"):
         from frametool.cli.command import inputs
 
-        if inputs().quiet:
+        running = inputs()
+        if running.quiet or (rule == "by-size" and rule in running.said):
             return
+        running.said.add(rule)
     _tell_folded(f"frametool: {_place()}warning: {message}")
 
 

@@ -47,6 +47,7 @@ class Frames:
         self._queries: dict[tuple[str, str], Query] = {}
         self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
         self.covariances: dict[str, Components] = {}  # of edges, by their child; those that are not here are exact
+        self.at_ns: int | None = None  # the time that a tree was taken at, of one that moves
         self.drawn: dict[str, str] = {}  # edges without a pose, by their child: how often a drawing says they come
         self._varies = False  # whether any frame has ever changed its parent
         self._loops = False  # whether newest parents were found to form a circle
@@ -115,7 +116,7 @@ class Frames:
             elif not track.is_static:
                 warn(left_out(track, at_ns))
         tree.covariances = {child: each for child, each in self.covariances.items() if tree.track(child)}
-        tree.drawn = self.drawn
+        tree.drawn, tree.at_ns = self.drawn, at_ns
         return tree
 
     # --- one lookup ---

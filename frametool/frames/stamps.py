@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from operator import index
 
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import ValueInvalid, shown, warn
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -15,6 +15,10 @@ BILLION = 1_000_000_000
 _SECONDS = r"(?a)([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))? ?(s|ms|us)?"
 _BELOW = {None: 9, "s": 9, "ms": 6, "us": 3}  # decimals down to a nanosecond
 _NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
+# ISO 8601 with its zone, which datetime reads but for fractions of more than six digits
+_DATE = r"(?a)(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d{1,9})0*)? ?(Z|[-+]\d\d:?\d\d)"
+SUFFIXES = {BILLION: "s", 10**6: "ms", 10**3: "us", 1: "ns"}
+_OLDEST_NS, _NEWEST_NS = 946_684_800 * BILLION, 4_102_444_800 * BILLION  # the years 2000 and 2100
 
 
 FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
@@ -41,12 +45,16 @@ def whole_stamp(stamp_ns: Any) -> int:
 
 
 def parse_stamp(text: str) -> int:
-    """Read `12.5` (seconds), `500ms` or `12500000000ns` as nanoseconds; digits below a nanosecond must be 0.
+    """Read `12.5` (seconds), `500ms`, `12500000000ns` or `2024-05-01T12:00:00Z` as nanoseconds.
+
+    Digits below a nanosecond must be 0.
 
     Raises ValueInvalid.
     """
     if match := re.fullmatch(_NANOSECONDS, text):
         return int(match[1])
+    if match := re.fullmatch(_DATE, text):
+        return _date_ns(match)
     match = re.fullmatch(_SECONDS, text)
     if match is None or not (match[2] or match[3]) or len(text) > 60:
         raise NotATime(f"{shown(text)} is not a time; write decimal seconds (12.5) or nanoseconds (12500000000ns)")
@@ -60,6 +68,55 @@ def parse_stamp(text: str) -> int:
         shift = 0
     stamp_ns = digits * int(10**shift)
     return -stamp_ns if sign == "-" else stamp_ns
+
+
+def _date_ns(match: re.Match[str]) -> int:
+    """Return the nanoseconds since 1970 of a date and time with a zone."""
+    from datetime import datetime
+
+    zone = "+00:00" if match[3] == "Z" else match[3]
+    try:
+        seconds = datetime.fromisoformat(match[1] + zone).timestamp()  # whole: exact
+    except ValueError as error:
+        raise NotATime(f"{shown(match[0])} is not a time: {error}") from None
+    return int(seconds) * BILLION + int((match[2] or "").ljust(9, "0"))
+
+
+def nanoseconds_each(whole: Any) -> Any:
+    """Return how many nanoseconds a whole number, or each of an array, counts where nothing says its unit.
+
+    A billion, unless a smaller unit makes it a time between the years 2000 and 2100, which seconds then do not.
+    """
+    sizes = (size for size in SUFFIXES if size != BILLION)
+    return BILLION + sum(
+        (size - BILLION) * ((whole >= _OLDEST_NS // size) & (whole < _NEWEST_NS // size)) for size in sizes
+    )
+
+
+def tell_size(whole: int, each: int) -> None:
+    """Warn, once a command, that the unit of stamps is taken from their size."""
+    if each != BILLION:
+        unit = SUFFIXES[each]
+        message = f"stamps such as {whole} are taken for {unit}, by their size; a column stamp_{unit} says so"
+        warn(message, rule="by-size")
+
+
+class FromFirst:
+    """Is added to stamps, nanoseconds or arrays of them, so that the first of all becomes 0."""
+
+    __array_ufunc__ = None  # numpy leaves the sum to __radd__
+
+    def __init__(self) -> None:
+        """Wait for the first."""
+        self._first: int | None = None
+
+    def __radd__(self, stamps: Any) -> Any:
+        """Return stamps since the first."""
+        if self._first is None:
+            if getattr(stamps, "size", 1) == 0:
+                return stamps
+            self._first = int(stamps if isinstance(stamps, int) else stamps[0])
+        return stamps - self._first
 
 
 def format_stamp(stamp_ns: int) -> str:

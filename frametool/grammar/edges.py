@@ -244,7 +244,7 @@ class Answers(NamedTuple):
     joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
     joint_files: files with values of joints, over time or for good
     order: of quaternions in lists, `xyzw` or `wxyz`
-    time_offset: nanoseconds that are added to all stamps
+    time_offset: nanoseconds that are added to all stamps, or `FromFirst`
     """
 
     frames: tuple[str, ...] = ()

@@ -28,10 +28,10 @@ COLUMN_WORDS = {
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
 # compiled when first needed, not at start-up
-_STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_ns|_s)?\s*(?:[\[(].*)?"
+_STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_[nmuµ]?s)?\s*(?:[\[(].*)?"
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
-_SECONDS = ("s", "sec", "seconds", "")
+_UNITS = {"ns": 1, "us": 10**3, "µs": 10**3, "ms": 10**6} | dict.fromkeys(("s", "sec", "seconds", ""), 0)
 _EARTH = r"(?i)(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|lla$|ecef|utm|easting|north|mgrs|at$)"
 PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
@@ -44,18 +44,18 @@ FLAT = {key: row.names for key, row in representations.POSITIONS.items() if not 
 FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 
 
-def in_nanoseconds(name: str) -> bool:
-    """Tell whether the name of stamps says that they are integer nanoseconds: `stamp_ns`, `stamp [ns]`, `t(ns)`.
+def in_nanoseconds(name: str) -> int:
+    """Return how many nanoseconds a whole number is by its name: 1 in `stamp_ns`, `t [ns]`; 0 where it is seconds.
 
-    Raises ValueInvalid for another unit than seconds and nanoseconds.
+    Raises ValueInvalid for an unknown unit.
     """
     if name in NANOSECONDS:
-        return True
+        return 1
     found = re.search(_UNIT, name.lower())
     unit = (found[1] or found[2] or "") if found else ""
-    if unit in ("ns", *_SECONDS):
-        return unit == "ns"
-    raise ValueInvalid(f"{shown(name)}: unknown unit {shown(unit)} of a time; known are s, ns")
+    if unit in _UNITS:
+        return _UNITS[unit]
+    raise ValueInvalid(f"{shown(name)}: unknown unit {shown(unit)} of a time; known are s, ms, us, ns")
 
 
 def stamp_column(names: Iterable[str] | None) -> int | None:

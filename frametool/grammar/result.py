@@ -270,6 +270,12 @@ def sample_results(tree: Frames) -> Iterator[Result]:
             yield Result(Pose.of(components, track.child, parent), extras)
 
 
+def edge_results(tree: Frames) -> Iterator[Result]:
+    """Yield every edge as a result, with the time at which the tree stood so, if it was asked for."""
+    extras = {} if tree.at_ns is None else {"stamp_ns": tree.at_ns}
+    return (Result(Pose.of(transform.components, child, parent), extras) for parent, child, transform in tree.edges())
+
+
 def carries_position(notation: Notation) -> bool:
     """Tell whether a notation takes the position of a pose into itself."""
     return notation.representation.whole is not None

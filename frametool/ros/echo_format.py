@@ -17,15 +17,14 @@ from frametool.documents.yaml_writer import dump, quoted
 from frametool.errors import ValueInvalid
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result, rotation_numbers
+from frametool.grammar.result import edge_results, rotation_numbers
 from frametool.ros.messages import MESSAGE_KEYS, STAMPS, stamp_problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from frametool.frames.lookups import FrameTree
-    from frametool.grammar.result import Style
+    from frametool.grammar.result import Result, Style
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
@@ -40,8 +39,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 def write_tree(tree: FrameTree, style: Style) -> str:
     """Return one TFMessage with every edge, as a latched /tf_static holds it."""
-    edges = (Result(Pose.of(transform.components, child, parent)) for parent, child, transform in tree.edges())
-    return write_messages([{"transforms": [transform_stamped(edge, style) for edge in edges]}], style)
+    return write_messages([{"transforms": [transform_stamped(edge, style) for edge in edge_results(tree)]}], style)
 
 
 def write_messages(messages: Iterable[dict[str, Any]], style: Style) -> str:

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.json import dump
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result, rotation_numbers
+from frametool.grammar.result import edge_results, rotation_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frametool.frames.lookups import FrameTree
-    from frametool.grammar.result import Style
+    from frametool.grammar.result import Result, Style
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
@@ -30,8 +29,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 def write_tree(tree: FrameTree, style: Style) -> str:
     """Return one FrameTransforms with every edge."""
-    edges = (Result(Pose.of(transform.components, child, parent)) for parent, child, transform in tree.edges())
-    return f"{dump({'transforms': [_frame_transform(edge, style) for edge in edges]}, style.number)}\n"
+    return f"{dump({'transforms': [_frame_transform(edge, style) for edge in edge_results(tree)]}, style.number)}\n"
 
 
 def _frame_transform(result: Result, style: Style) -> dict[str, Any]:

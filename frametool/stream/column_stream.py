@@ -279,7 +279,7 @@ class ColumnRows:
         name = self.table.name(self.layout.time)
         times, reasons = batch.stamps(self.layout.time, in_ns=in_nanoseconds(name))
         if self.layout.below is not None:
-            below, more = batch.stamps(self.layout.below, in_ns=True)
+            below, more = batch.stamps(self.layout.below, in_ns=1)
             times, reasons = times + below, {**more, **reasons}
         return times, {row: (name, reason) for row, reason in reasons.items()}
 

@@ -27,7 +27,7 @@ class Gathered:
         """Begin with none; named: so that `places` says where each was read."""
         self.places: list[str] = []
         self._lines: list[int] | None = [] if named else None  # of the block that was read last
-        self.placed = self.turned = self.uncertain = False
+        self.placed = self.turned = self.uncertain = self.stamped = False
         self.frame: str | None = None  # that of the Earth, where what was gathered is placed there
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
@@ -62,6 +62,7 @@ class Gathered:
         self.turned |= any(pose.rotation is not None for pose in poses)
         self.frame = next((pose.parent for pose in poses if pose.parent in EARTH_FRAMES), self.frame)
         self.uncertain |= any(pose.covariance is not None for pose in poses)
+        self.stamped |= any(pose.stamp_ns is not None for pose in poses)
         self._poses.append(np.array([pose.components for pose in poses], np.float64).reshape(-1, 7))
 
     @property

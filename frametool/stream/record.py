@@ -18,6 +18,7 @@ from frametool.grammar.names import (
     EARTH_FRAMES,
     NAME_KEYS,
     PARENT_KEYS,
+    STAMP_KEYS,
     may_be_on_earth,
     may_be_uncertain,
 )
@@ -768,6 +769,8 @@ def _with_names(
             else:
                 parent = _named(header, ("frame_id",), (*above, *inside), parent, request)
             record = _with_stamp(record, header, (*inside, "stamp"), above)
+        if request.gathered is not None:
+            request.gathered.stamped |= record.stamp_ns is not None or any(key in value for key in STAMP_KEYS)
     if on_earth:
         parent = parent._replace(text=parent.text or record.parent.text)
     return record._replace(parent=parent, name=name) if parent.paths or name.paths or on_earth else record

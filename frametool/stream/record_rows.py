@@ -60,7 +60,7 @@ class Marked(NamedTuple):
 
     value: Value
     numbers: Mapping[str, int]
-    stamp: tuple[int, bool] | None = None
+    stamp: tuple[int, int] | None = None
 
 
 class Batch(NamedTuple):
@@ -282,7 +282,7 @@ def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, 
     if not places:
         return None, ()
     spans = (Spans(data, cut.starts[:, place] + MARGIN, cut.ends[:, place] + MARGIN) for place in places)
-    return read_stamps((*spans,), in_ns=each.stamp is not None and each.stamp[1])
+    return read_stamps((*spans,), in_ns=each.stamp[1] if each.stamp else 0)
 
 
 def plain_texts(batch: Batch, at: int) -> list[Any]:

@@ -329,7 +329,7 @@ class Request(NamedTuple):
     canonical: results are written anew rather than in the text of their records
     place: how positions on the Earth are written; given_place: what unnamed numbers are of one
     earth: what is said of all places: the origin, the axes of rotations, the zone
-    offset_ns: what is added to the stamps of rows and records; window: the first and the last that are left
+    offset_ns: added to the stamps of rows and records, also `FromFirst`; window: the first and the last that are left
     """
 
     operation: Operation = Operation()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.frames.stamps import BILLION
+from frametool.frames.stamps import BILLION, nanoseconds_each, tell_size
 from frametool.grammar.names import in_nanoseconds
 from frametool.stream.request import no_step
 from frametool.stream.row_layout import IDENTITY
@@ -33,13 +33,14 @@ if TYPE_CHECKING:
 
 _WORDS = 3
 _LONGEST = 8 * _WORDS
-_MOST_SECONDS = (1 << 63) // BILLION
+_MOST = (1 << 63) - 1
+_MOST_SECONDS = _MOST // BILLION
 _MOST_UPPER = (1 << 63) // 10**16
 _BELOW_NS = np.uint64(10**7)
 
 
-def parse_stamps(cells: Spans, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
-    """Read cells (n,) as nanoseconds: decimal seconds, or integers of nanoseconds if so told or followed by `ns`.
+def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
+    """Read cells (n,) as nanoseconds: decimal seconds, or whole numbers of so many nanoseconds, or followed by `ns`.
 
     Gives the stamps, and why a cell is none; what is not plainly written is left to `read_stamp`.
     """
@@ -56,8 +57,8 @@ def parse_stamps(cells: Spans, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
 
 def parse_header_stamps(seconds: Spans, nanoseconds: Spans) -> tuple[Ints, dict[int, str]]:
     """Read the two whole numbers of stamps (n,) as nanoseconds; otherwise as `parse_stamps`."""
-    whole, sure = _parse_plain(seconds.data, *trimmed(*seconds), in_ns=True)
-    below, fine = _parse_plain(nanoseconds.data, *trimmed(*nanoseconds), in_ns=True)
+    whole, sure = _parse_plain(seconds.data, *trimmed(*seconds), in_ns=1)
+    below, fine = _parse_plain(nanoseconds.data, *trimmed(*nanoseconds), in_ns=1)
     stamps = whole * BILLION + below
     reasons = {}
     for row in np.flatnonzero(~(sure & fine & (whole < _MOST_SECONDS))).tolist():
@@ -68,12 +69,12 @@ def parse_header_stamps(seconds: Spans, nanoseconds: Spans) -> tuple[Ints, dict[
     return stamps, reasons
 
 
-def read_stamps(cells: tuple[Spans, ...], *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
+def read_stamps(cells: tuple[Spans, ...], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
     """Read stamps of one column, or of whole seconds and nanoseconds."""
     return parse_header_stamps(*cells) if len(cells) == 2 else parse_stamps(*cells, in_ns=in_ns)
 
 
-def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: bool) -> tuple[Ints, Flags]:
+def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[Ints, Flags]:
     """Read digits with at most a point among them; give the nanoseconds and which of them are sure."""
     suffixed = (data.take(ends - 1) == ord("s")) & (data.take(ends - 2) == ord("n")) & (ends - starts > 2)
     ends = ends - 2 * suffixed
@@ -81,9 +82,13 @@ def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: bool) -> tuple
     whole, sure = _integer(data, points, points - starts)
     below, fine = _fraction(data, points + 1, ends - points - 1)
     sure &= fine & (ends - starts <= _LONGEST) & (ends - starts > (points < ends))
-    nanoseconds = suffixed | in_ns
-    sure &= np.where(nanoseconds, points == ends, whole < _MOST_SECONDS)
-    return np.where(nanoseconds, whole, whole * BILLION + below), sure
+    is_whole = points == ends
+    each = np.where(suffixed, 1, in_ns or np.where(is_whole, nanoseconds_each(whole), BILLION))
+    sure &= (is_whole | ~(suffixed | bool(in_ns))) & (whole < _MOST // each)
+    by_size = np.flatnonzero(sure & (each != BILLION) & ~suffixed) if not in_ns else ()
+    for row in by_size[:1]:
+        tell_size(int(whole[row]), int(each[row]))
+    return whole * each + below, sure
 
 
 def _point(data: Bytes, starts: Ints, ends: Ints) -> Ints:

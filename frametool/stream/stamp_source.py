@@ -44,8 +44,8 @@ class Timed(NamedTuple):
         return cls(name, _by_expression, _by_expression, lambda _: True)
 
     @property
-    def in_ns(self) -> bool:
-        """Tell whether the name says that stamps are integer nanoseconds."""
+    def in_ns(self) -> int:
+        """Return how many nanoseconds a whole number is, by the name of the stamps; 0 for seconds."""
         return in_nanoseconds(self.name)
 
     @property
@@ -72,15 +72,23 @@ def read_header_stamp(seconds: str, nanoseconds: str) -> int:
     return int(whole) * 1_000_000_000 + int(below)
 
 
-def read_stamp(text: str, *, in_ns: bool) -> int:
-    """Read a cell as nanoseconds, quotes and blanks around it left out; raises ValueInvalid."""
-    from frametool.frames.stamps import parse_stamp
+def read_stamp(text: str, *, in_ns: int) -> int:
+    """Read a cell as nanoseconds, quotes and blanks around it left out; raises ValueInvalid.
+
+    in_ns: how many a whole number is, by its name; 0 are seconds, or what its size says
+    """
+    from frametool.frames.stamps import SUFFIXES, nanoseconds_each, parse_stamp, tell_size
 
     bare = text.strip(" \t\"'")
     if in_ns and not bare.endswith("ns"):
-        if not bare.lstrip("+-").isdecimal():
-            raise ValueInvalid(f"{shown(bare)} is not a time in integer nanoseconds")
-        bare += "ns"
+        if not bare.lstrip("+-").replace(".", "", in_ns > 1).isdecimal():
+            unit = "integer nanoseconds" if in_ns == 1 else SUFFIXES[in_ns]
+            raise ValueInvalid(f"{shown(bare)} is not a time in {unit}")
+        bare += SUFFIXES[in_ns]
+    elif bare.isdecimal() and len(bare) < 20:
+        each = nanoseconds_each(int(bare))
+        tell_size(int(bare), each)
+        bare += SUFFIXES[each]
     stamp_ns = parse_stamp(bare)
     if abs(stamp_ns) > LARGEST:
         remedy = "; are these some? then write ns behind them, or call them stamp_ns"
@@ -88,15 +96,17 @@ def read_stamp(text: str, *, in_ns: bool) -> int:
     return stamp_ns
 
 
-def stamp_text(written: str, stamp_ns: int, *, in_ns: bool) -> str:
-    """Write another stamp as one was written: nanoseconds as such, seconds with no fewer decimals."""
+def stamp_text(written: str, stamp_ns: int, *, in_ns: int) -> str:
+    """Write another stamp as one was written: whole units as such, seconds with no fewer decimals."""
     from frametool.frames.stamps import format_stamp
 
     bare = written.strip()
     if bare.endswith("ns"):
         return f"{stamp_ns}ns"
     if in_ns and not bare.endswith("s"):
-        return str(stamp_ns)
+        whole, below = divmod(abs(stamp_ns), in_ns)
+        decimals = f"{below:0{len(str(in_ns)) - 1}d}".rstrip("0") if below else ""
+        return f"{'-' * (stamp_ns < 0)}{whole}" + f".{decimals}" * bool(below)
     seconds, _, decimals = format_stamp(stamp_ns).partition(".")
     wanted = 0 if bare.endswith("s") or "e" in bare.lower() else len(bare.partition(".")[2])
     decimals = decimals.rstrip("0").ljust(wanted, "0")

@@ -14,6 +14,7 @@ from frametool.grammar.names import (
     may_be_on_earth,
     may_be_uncertain,
     nanoseconds_beside,
+    stamp_places,
     without_mark,
 )
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -264,6 +265,8 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
 
 def _time_column(table: Table, request: Request, source: str) -> int | None:
     """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
+    if request.gathered is not None:
+        request.gathered.stamped |= stamp_places(table.names)[0] is not None
     name = request.timed.name if request.timed else request.extra_column
     if name is None:
         return None

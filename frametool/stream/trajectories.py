@@ -119,10 +119,9 @@ def split_name(text: str) -> tuple[str, list[str]]:
     return text[:end], names
 
 
-def read_stamps(path: str, report: Report, say: Callable[[str], None]) -> list[int]:
+def read_stamps(path: str, report: Report) -> list[int]:
     """Return the stamps of a file in its order: times one a line, a table's, a trajectory's, a recording's (sorted).
 
-    Nanoseconds are known by the name of their column, or by their size, which `say` tells.
     path: a file or a folder, or FILE:TOPIC; report: takes the errors of lines that are no time
     """
     if path != "-" and not os.path.isfile(path) and (os.path.isdir(path) or ":" in path):
@@ -151,15 +150,12 @@ def read_stamps(path: str, report: Report, say: Callable[[str], None]) -> list[i
         raise FormatError(f"no column of stamps (t, stamp, time, stamp_ns ..){columns}", source=file.name, line=1)
     cells = table.split(rest)
     lines = cells.rows + text.count(b"\n", 0, len(text) - len(rest)) + 1
-    in_ns = form == "euroc" or in_nanoseconds(named[at])
+    in_ns = 1 if form == "euroc" else in_nanoseconds(named[at])
     parts = tuple(without_quotes(cells.column(place)) for place in (at, below) if place is not None)
     stamps, reasons = stamp_columns.read_stamps(parts, in_ns=in_ns)
-    texts = [] if in_ns or below is not None else [parts[0].text(row).strip(b' \t"') for row in range(len(stamps))]
-    if by_size := {row: int(each) for row, each in enumerate(texts) if each.isdigit() and len(each) in (18, 19)}:
-        say(f"note: {file.name}: {next(iter(by_size.values()))} is taken for nanoseconds, by its size")
-    found, exact = [], {**dict(enumerate(stamps.tolist())), **by_size}
-    for row, stamp in exact.items():
-        reason = "" if row in by_size else reasons.get(row, "")
+    found = []
+    for row, stamp in enumerate(stamps.tolist()):
+        reason = reasons.get(row, "")
         if not reason and not -FURTHEST_NS < stamp < FURTHEST_NS:
             reason = f"stamp {stamp} ns is beyond the year 2116"
         if reason:

@@ -232,7 +232,7 @@ def test_wrong_rows_are_left_out_and_told_with_their_places(run: Run, name: str,
     assert json.loads(found.out) == {**plain, "count": 12, "used": 10}
     lines = [FIRST_LINES[name] + at * LINES_EACH.get(name, 1) for at in WRONG]
     where = "stdin" if piped else name
-    told = [line for line in found.err.splitlines() if "left out" in line]
+    told = [line for line in found.err.splitlines() if ": left out, " in line]
     assert [line.partition(": left out, ")[0] for line in told] == [f"frametool: warning: {where}:{line}" for line in lines]
     assert " mm 0.00 deg off (u " in told[0]
 
@@ -283,3 +283,13 @@ def test_relative_of_two_trajectories_says_what_it_takes_and_what_compares_them(
     done = run("relative", "a.tum", "b.tum", files={"a.tum": row, "b.tum": row})
     assert (done.status, done.out) == (2, "")
     assert "only one argument may hold rows, a.tum and b.tum do; frametool compare takes two trajectories" in done.err
+
+
+@pytest.mark.parametrize("stdin", [
+    "stamp,x,y,z\n1,2,3,4\n", '{"stamp": 1, "xyz": [1, 2, 3]}\n', "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n",
+    '{"header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "a"}, "point": {"x": 1, "y": 2, "z": 3}}\n',
+])  # fmt: skip
+def test_stamps_that_a_mean_does_not_have_are_told_once(run: Run, stdin: str) -> None:
+    assert run("mean", stdin=stdin).err.count("stamps left out: a mean is of no one time") == 1
+    assert "stamps" not in run("mean", stdin="x,y,z\n1,2,3\n").err
+    assert "stamps left out" in run("mean", "{stamp: 1, xyz: [1, 2, 3]}").err

@@ -305,7 +305,7 @@ def test_times_are_the_stamps_of_any_file_that_has_some(run: Run, name: str) -> 
 def test_what_is_nanoseconds_by_its_size_alone_is_told(run: Run) -> None:
     files = FILES | {"ns.txt": BY_SIZE}
     outcome = run("lookup", "drive.yaml", "map", "base", "--times", "ns.txt", files=files)
-    assert "note: ns.txt: 1700000000500000000 is taken for nanoseconds, by its size" in outcome.err
+    assert "warning: stamps such as 1700000000500000000 are taken for ns, by their size" in outcome.err
     assert "no data for map -> base at 1700000000.500000000" in outcome.err
 
 
@@ -340,3 +340,58 @@ def test_fractions_are_a_range_as_times_are(run: Run) -> None:
     assert run(*poses, "0:1:0.1", "-f", "csv") == run(*poses, *[str(at / 10) for at in range(11)], "-f", "csv")
     assert "'0:1' is no range; a range is START:STOP:STEP, as 0:1:0.25" in run(*poses, "0:1").err
     assert "STEP must be positive" in run(*poses, "0:1:-1").err
+
+
+# --- units of stamps -----------------------------------------------------------------------------------------------
+
+BY_NAME = [("timestamp_ms", 10**6), ("timestamp_us", 10**3), ("t [ms]", 10**6), ("stamp_ns", 1)]
+
+
+@pytest.mark.parametrize(("name", "each"), [*BY_NAME, ("timestamp", 10**6), ("t", 10**3), ("stamp", 1)])
+@pytest.mark.parametrize("into", ["tum", "json"])
+def test_stamps_are_read_by_the_unit_in_their_name_or_else_by_their_size(run: Run, name: str, each: int, into: str) -> None:
+    first = 1_700_000_000_123_000_000
+    rows = "".join(f"{(first + step) // each},1,2,3,0,0,0,1\n" for step in (0, 10**8))
+    done = run("convert", "-i", "a.csv", "-f", into, files={"a.csv": f"{name},x,y,z,qx,qy,qz,qw\n{rows}"})
+    assert done.status == 0
+    stamps = [str(first), str(first + 10**8)] if into == "json" else ["1700000000.123000000", "1700000000.223000000"]
+    assert all(stamp in line for stamp, line in zip(stamps, done.out.splitlines(), strict=True)), done.out
+    assert done.err.count("by their size") == ((name, each) not in BY_NAME)
+
+
+@pytest.mark.parametrize(("text", "stamp"), [
+    ("2024-05-01T12:00:00+02:00", "1714557600.000000000"), ("2024-05-01 10:00:00.123456789Z", "1714557600.123456789"),
+    ("1969-12-31T23:59:59.5Z", "-0.500000000"),
+])  # fmt: skip
+def test_dates_of_iso_8601_are_stamps_where_they_say_their_zone(run: Run, text: str, stamp: str) -> None:
+    done = run("convert", "-f", "tum", stdin=f"timestamp,x,y,z,qx,qy,qz,qw\n{text},1,2,3,0,0,0,1\n")
+    assert (done.status, done.out.split(" ")[0]) == (0, stamp)
+    done = run("convert", "-f", "tum", stdin=f"timestamp,x,y,z,qx,qy,qz,qw\n{text[:19]},1,2,3,0,0,0,1\n")
+    assert (done.status, "is not a time" in done.err) == (1, True)
+    assert run("convert", "-f", "tum", stdin="t,x,y,z,qx,qy,qz,qw\n2024-02-30T00:00:00Z,1,2,3,0,0,0,1\n").status == 1
+
+
+@pytest.mark.parametrize(("name", "text"), [
+    ("a.tum", "5.5 1 2 3 0 0 0 1\n7 1 2 3 0 0 0 1\n"),
+    ("a.csv", "stamp_ms,x,y,z,qx,qy,qz,qw\n1700000000500,1,2,3,0,0,0,1\n1700000002000,1,2,3,0,0,0,1\n"),
+    ("a.jsonl", '{"stamp": 4, "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n{"stamp": 5.5, "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]}\n'),
+])  # fmt: skip
+def test_time_offset_first_begins_at_zero(run: Run, name: str, text: str) -> None:
+    done = run("convert", "-i", name, "--time-offset", "first", "-f", "tum", files={name: text})
+    assert [float(line.split(" ")[0]) for line in done.out.splitlines()] == [0.0, 1.5], done.err
+    if name != "a.jsonl":
+        done = run("resample", name, "--every", "1m", "--time-offset", "first", "-f", "tum", files={name: text})
+        assert done.out.startswith("0.000000000 "), done.err
+
+
+def test_time_offset_first_counts_for_trees(run: Run) -> None:
+    moving = "{name: base, parent: map, samples: [{stamp: 7, xyz: [0, 0, 0]}, {stamp: 9, xyz: [4, 0, 0]}]}"
+    done = run("lookup", "m.yaml", "map", "base", "--at", "1", "--time-offset", "first", files={"m.yaml": moving})
+    assert "xyz: [2.0, 0.0, 0.0]" in done.out
+
+
+@pytest.mark.parametrize("form", ["ros1", "ros2", "foxglove"])
+def test_a_tree_at_a_time_is_written_with_that_stamp(run: Run, form: str) -> None:
+    out = run("tree", "drive.yaml", "--at", "1.5", "-f", form, files=FILES).out
+    assert out.count("500000000") == out.count("child_frame_id") == 2
+    assert "500000000" not in run("tree", "still.yaml", "-f", form, files=FILES).out

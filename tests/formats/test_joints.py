@@ -343,7 +343,7 @@ def test_columns_are_found_by_name_and_unit() -> None:
 
 @pytest.mark.parametrize(
     ("name", "found"),
-    [("t", (0, False)), ("stamp_ns", (0, True)), ("header.stamp", (0, False)), ("time [ns]", (0, True)), ("tt", None)],
+    [("t", (0, "")), ("stamp_ns", (0, "ns")), ("header.stamp", (0, "")), ("time [ms]", (0, "ms")), ("tt", None)],
 )
 def test_the_column_of_stamps_is_found(name: str, found: Any) -> None:
     assert stamp_column([name, "pan"], {"pan": TURN}) == found

@@ -66,6 +66,8 @@ def command(inputs: Inputs) -> int:
             raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
     if gathered.uncertain:
         warn("covariances left out: mean's is that of the rows")
+    if gathered.stamped:
+        warn("stamps left out: a mean is of no one time")
     result, left_out = _mean(gathered, given, robust=robust)
     task.output.poses([result])
     most = MOST + (len(left_out) == MOST + 1)

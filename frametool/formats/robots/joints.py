@@ -35,7 +35,7 @@ from frametool.formats.detect import detect
 from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
 from frametool.formats.table import FORMATS, readers
 from frametool.formats.trees.tree_reader import read_time
-from frametool.frames.stamps import format_stamp, parse_stamp
+from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.readers import Misfit, as_mapping, kind
@@ -328,12 +328,12 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
     return (name[: match.start()], match[1]) if match else (name, "")
 
 
-def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, bool] | None:
-    """Find the column of stamps: its place, and whether they are nanoseconds; None if there is none."""
+def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, str] | None:
+    """Find the column of stamps: its place, and the unit that its name says, if any; None if there is none."""
     from frametool.grammar import names as known
 
     place = known.stamp_column("" if name.strip() in joints else name.strip() for name in names)
-    return None if place is None else (place, known.in_nanoseconds(names[place].strip()))
+    return None if place is None else (place, SUFFIXES.get(known.in_nanoseconds(names[place].strip()), ""))
 
 
 def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
@@ -496,7 +496,7 @@ class JointFile:
             try:
                 if stamp:
                     at = names[stamp[0]]
-                    stamp_ns = parse_stamp(f"{cells[stamp[0]]}ns" if stamp[1] else cells[stamp[0]])
+                    stamp_ns = parse_stamp(cells[stamp[0]] + stamp[1])
                 for place, joint, degrees, per_metre in columns:
                     at = names[place]
                     value = JointValue(parse_number(cells[place]) / per_metre, degrees)

@@ -15,9 +15,9 @@ import numpy as np
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import FileProblem, ValueInvalid, shown
-from frametool.formats.rows.column_file import FLOATS, WHOLE, Batch, ColumnNumbers, plain_value
-from frametool.frames.stamps import BILLION
-from frametool.text.parse import FURTHEST, nanoseconds_of
+from frametool.formats.rows.column_file import FLOATS, WHOLE, Batch, ColumnNumbers, plain_value, whole_stamps
+from frametool.frames.stamps import SUFFIXES
+from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
     from frametool.formats.rows.column_file import Kind
@@ -106,20 +106,19 @@ class ArrowBatch(Batch):
         column = self.rows.column(place)
         return ColumnNumbers(column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column))
 
-    def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
+    def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none: timestamps, integers by their name, float seconds."""
         column, name = self.rows.column(place), self.rows.schema.names[place]
         if in_ns and is_floating(column.type):
-            raise ValueInvalid(f"column {shown(name)} is {column.type}; nanoseconds are integers or timestamps")
+            raise ValueInvalid(f"column {shown(name)} is {column.type}; {SUFFIXES[in_ns]} are integers or timestamps")
         stamps, nulls, bad = stamps_of(column, name)
         kind = kind_of(column.type)
-        if kind is not None and kind.kind in WHOLE and not in_ns:
-            beyond = (stamps > FURTHEST) | (stamps < -FURTHEST)
+        if kind is not None and kind.kind in WHOLE:
+            numbers, (stamps, beyond) = stamps, whole_stamps(stamps, in_ns)
             if beyond.any():
                 remedy = "are these some? then call the column stamp_ns, or let it be a timestamp"
-                seconds = stamps[int(np.argmax(beyond))]
+                seconds = numbers[int(np.argmax(beyond))]
                 raise ValueInvalid(f"column {shown(name)}: {seconds} s is beyond 64 bits of nanoseconds; {remedy}")
-            stamps = stamps * BILLION
         reasons = {row: f"{column[row].as_py()} is no time in seconds" for row in bad.tolist()}
         return stamps, reasons | dict.fromkeys([] if nulls is None else np.flatnonzero(nulls).tolist(), NO_TIME)
 

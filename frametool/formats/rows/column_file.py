@@ -22,8 +22,8 @@ import numpy as np
 
 from frametool.documents.source import Verbatim
 from frametool.errors import FormatError, ValueInvalid, shown
-from frametool.frames.stamps import BILLION
-from frametool.text.parse import FURTHEST, nanoseconds_of
+from frametool.frames.stamps import SUFFIXES, nanoseconds_each, tell_size
+from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -96,19 +96,16 @@ class Batch(Protocol):
         """Return a column as floats; a null may be any number."""
         return ColumnNumbers(self.column(place).astype(np.float64))
 
-    def stamps(self, place: int, *, in_ns: bool) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why rows have none; numbers are seconds unless their name says ns.
+    def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
+        """Return a column as nanoseconds, and why rows have none; in_ns: as `whole_stamps` has it.
 
         A float of seconds counts as the decimal that it prints as, as it does in a table of text.
         """
         numbers = self.column(place)
-        is_whole = numbers.dtype.kind in WHOLE
-        if in_ns and is_whole:
-            return numbers.astype(np.int64), {}
-        if in_ns:
-            raise ValueInvalid(f"nanoseconds are integers, found {numbers.dtype}")
-        if is_whole:
-            stamps, bad = numbers.astype(np.int64) * BILLION, abs(numbers) > FURTHEST
+        if numbers.dtype.kind in WHOLE:
+            stamps, bad = whole_stamps(numbers, in_ns)
+        elif in_ns:
+            raise ValueInvalid(f"{SUFFIXES[in_ns]} are integers, found {numbers.dtype}")
         else:
             stamps, bad = nanoseconds_of(numbers.astype(np.float64))
         return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), "not a time in seconds")
@@ -116,6 +113,18 @@ class Batch(Protocol):
     def texts(self, place: int) -> Sequence[str]:
         """Return a column as texts, "" for none."""
         return [str(plain_value(value)) for value in self.column(place).tolist()]
+
+
+def whole_stamps(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags]:
+    """Return whole numbers as nanoseconds, and which are beyond 64 bits of them.
+
+    in_ns: how many nanoseconds each counts; 0 are seconds, or what the size of the first says
+    """
+    first = int(next(iter(numbers[numbers != 0]), 0))
+    each = in_ns or nanoseconds_each(first)
+    if not in_ns:
+        tell_size(first, each)
+    return numbers.astype(np.int64) * each, abs(numbers) > np.iinfo(np.int64).max // each
 
 
 class ColumnWriter(Protocol):
