@@ -40,7 +40,6 @@ class Inputs:
     forms_read: the forms of what was read, each with the options that say what it leaves open
     reads_trees: whether files of frames are opened: --in is then about these too
     earth: what the options say of places on the Earth, made when first needed
-    said: the rules of warnings that are written once
     """
 
     def __init__(self, values: Mapping[str, Any], idle: dict[str, str] | None = None) -> None:
@@ -49,7 +48,6 @@ class Inputs:
         self._idle = {} if idle is None else idle
         self.forms_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
         self.reads_trees = False
-        self.said: set[str] = set()
         self.earth: Earth | None = None
 
     @classmethod

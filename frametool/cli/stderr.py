@@ -81,12 +81,14 @@ def say_warning(message: str, rule: str = "") -> None:
     are taken for by their size is said once.
     """
     if rule in ("slash", "by-size"):
+        import click
+
         from frametool.cli.command import inputs
 
-        running = inputs()
-        if running.quiet or (rule == "by-size" and rule in running.said):
+        said = click.get_current_context().meta if not inputs().quiet else {"by-size": True, "slash": True}
+        if said.get(rule):
             return
-        running.said.add(rule)
+        said[rule] = rule == "by-size"
     _tell_folded(f"frametool: {_place()}warning: {message}")
 
 

@@ -39,6 +39,8 @@ class Frames:
     Times are integer nanoseconds; None is the latest.  Frames that stand still answer all times alike.
     """
 
+    at_ns: int | None = None  # the time that a tree was taken at, of one that moves
+
     def __init__(self, name: str) -> None:
         """Create an empty set of frames; `name` says in error messages where they come from."""
         self.name = name
@@ -47,7 +49,6 @@ class Frames:
         self._queries: dict[tuple[str, str], Query] = {}
         self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
         self.covariances: dict[str, Components] = {}  # of edges, by their child; those that are not here are exact
-        self.at_ns: int | None = None  # the time that a tree was taken at, of one that moves
         self.drawn: dict[str, str] = {}  # edges without a pose, by their child: how often a drawing says they come
         self._varies = False  # whether any frame has ever changed its parent
         self._loops = False  # whether newest parents were found to form a circle

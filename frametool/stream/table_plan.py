@@ -14,7 +14,6 @@ from frametool.grammar.names import (
     may_be_on_earth,
     may_be_uncertain,
     nanoseconds_beside,
-    stamp_places,
     without_mark,
 )
 from frametool.grammar.rotation_spelling import AXES_KEY
@@ -104,7 +103,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     return Plan(
         shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
         edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
-        timed=request.timed, beside=request.extra_column or "", gathered=request.gathered,
+        timed=request.timed, beside=request.extra_column or "",
+        gathered=request.gathered and request.gathered.of_columns(table.names or ()),
         source=EARTH_FRAMES[0] if on_earth else "",
         frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
         window=request.window, words=words, marked=marked,
@@ -265,8 +265,6 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
 
 def _time_column(table: Table, request: Request, source: str) -> int | None:
     """Find the column of the stamps, by its name or, where there are none, by its number from 1."""
-    if request.gathered is not None:
-        request.gathered.stamped |= stamp_places(table.names)[0] is not None
     name = request.timed.name if request.timed else request.extra_column
     if name is None:
         return None
