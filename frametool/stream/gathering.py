@@ -32,7 +32,7 @@ class Gathered:
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
 
-    def of_columns(self, names: Sequence[str]) -> Gathered:
+    def of_columns(self, names: Sequence[str] | None) -> Gathered:
         """Look whether a table that is gathered from has stamps."""
         self.stamped |= stamp_places(names)[0] is not None
         return self
