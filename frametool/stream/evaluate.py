@@ -467,8 +467,6 @@ class Run:
         if end is not None:
             self._keep(self.block.places[self.rows] < end)
             odd = [(place, text) for place, text in odd if place < end]
-        if self.plan.on_error == NULL:
-            odd += [(each.place, each.null_row) for each in self.block.broken]
         groups = [*self._written(), *self._null_rows()]
         return [*groups, texts_as_rows(odd)] if odd else groups
 
@@ -496,7 +494,7 @@ class Run:
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""
         found = [Fault.of(self.block.line_of(row), column, reason) for row, (column, reason) in self.reasons.items()]
-        return sorted(found + [Fault(each.line, each.column, each.reason) for each in self.block.broken])
+        return sorted(found + [Fault(each.line, each.column, each.reason, skipped=True) for each in self.block.broken])
 
 
 def _checked(shape: Shape, own: Components) -> Components:

@@ -24,6 +24,7 @@ class Fault(NamedTuple):
     final: nothing behind it can be read
     kind: the name of the failure in machine output
     short: the reason without the list of what there is, where it has one
+    skipped: the row is left out whatever the rule
     """
 
     line: int
@@ -32,6 +33,7 @@ class Fault(NamedTuple):
     final: bool = False
     kind: str = "bad_row"
     short: str = ""
+    skipped: bool = False
 
     @classmethod
     def of(cls, line: int, column: str, reason: str | FrametoolError) -> Fault:
@@ -137,7 +139,6 @@ class BadRows:
         self.counted = counted
         self.count = 0
         self._has_listed = False  # the list of what there is stands in the first message only
-        self._fate = "row skipped" if on_error == SKIP else "no result"
 
     def take(self, faults: Iterable[Fault]) -> None:
         """Report the faults of a block; raise BadRow at the first if that is the rule."""
@@ -146,9 +147,8 @@ class BadRows:
             if self.on_error == STOP or fault.final:
                 raise BadRow(fault, self._reason(fault), source=self.source, counted=self.counted)
             if self.count <= self.most:
-                self.tell(
-                    BadRow(fault, self._reason(fault), source=self.source, fate=self._fate, counted=self.counted)
-                )
+                fate = "row skipped" if self.on_error == SKIP or fault.skipped else "no result"
+                self.tell(BadRow(fault, self._reason(fault), source=self.source, fate=fate, counted=self.counted))
 
     def place(self, number: int, column: str = "") -> str:
         """Name a line or a row, and a column in it."""

@@ -86,13 +86,6 @@ class Layout(NamedTuple):
             for column in self.columns
         ]
 
-    def null_row(self, cells: Sequence[bytes]) -> bytes:
-        """Return a row without a result, as far as its cells go."""
-        most = max((column.place for column in self.columns if not isinstance(column, ADDED)), default=-1)
-        padded = [*cells, *[self.null] * (most + 1)]
-        given = [self.null if isinstance(column, ADDED) else padded[column.place] for column in self.columns]
-        return (self.delimiter or b" ").join([*given, *cells[max(most + 1, max(self.places, default=-1) + 1) :]])
-
 
 def quoted(name: str, delimiter: bytes) -> bytes:
     """Write a cell, in quotes where a reader would split it."""

@@ -78,7 +78,7 @@ class RecordBlocks:
 
     def _learned(self, text: bytes, part: Part, line: int, found: Found) -> tuple[Template | None, Places]:
         """Return a template that is learned from a record; else take what it becomes, or why it becomes nothing."""
-        learned = Fault(line, "", part.problem) if part.problem else self.cutter.learn(text, part, line)
+        learned = self.cutter.learn(text, part, line)
         made: Template | bytes | Fault | Rendered = learned
         if isinstance(made, Template) and made.is_long and not self.request.in_order:
             made = rendered(made, self.request, line, column_in(text, part.start))
@@ -90,7 +90,7 @@ class RecordBlocks:
             row = made.text
         elif isinstance(made, Fault):
             found.faults += [(part.begin, made)] if made.kind != Outside.kind else []
-            if made.kind == Outside.kind or self.request.on_error != NULL or part.outside:
+            if made.kind == Outside.kind or self.request.on_error != NULL or made.final:
                 return None, ()
             row = null_of(row, json=self.form == "json")
         found.odd.append((part.begin, text[part.begin : part.start] + row + text[part.end : part.after]))

@@ -150,7 +150,7 @@ class RecordCutter:
         parts, self.closed = self.splitter.parts(chunk, match)
         for own in parts:
             begin, first, last, after = (place + start for place in own[:4])
-            part = Part(begin, first, last, after, own.problem, own.outside)
+            part = Part(begin, first, last, after, own.problem, own.final)
             if not part.problem and (hit := matches.get(own.start)) is not None:
                 yield part, (hit[0], [(a + start, b + start) for a, b in hit[1]])
             else:

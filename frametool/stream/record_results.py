@@ -74,7 +74,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
             line, at = line + block.count(b"\n", at, part.start), part.start
             before = bad.count
             if part.problem:
-                bad.take([Fault(line, "", part.problem)])
+                bad.take([Fault(line, "", part.problem, final=part.final)])
             source = Source(bad.source, "", line)
             try:
                 if not part.problem:
@@ -88,7 +88,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
                 bad.take([Fault(below, str(column) if error.column else "", error.message)])
             except FrametoolError as error:
                 bad.take([Fault.of(line, "", error)])
-            if bad.count > before and bad.on_error == NULL and not part.outside:
+            if bad.count > before and bad.on_error == NULL:
                 values.append((part.start, _no_result(block[part.start : part.end], form, style)))
         teller.counts[ROUNDED] += mended
         yield Rows(batches, values)

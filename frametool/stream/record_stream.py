@@ -106,7 +106,9 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
         text = held + outcome.text
         if outcome.is_open is not None and not any_kept and outcome.kept:
             text = _LEADING_COMMA.sub(rb"\1", text)
-        any_kept = any_kept or bool(outcome.kept)
+        if ends := outcome.is_open and on_error != STOP and any(fault.final for fault in outcome.faults):
+            text += b"]\n"
+        any_kept = any_kept or bool(outcome.kept or ends)
         ended = text.endswith(b"\n") if text else ended
         held = b"" if any_kept or outcome.is_open is None else text
         yield outcome._replace(text=text[len(held) :])
@@ -142,7 +144,7 @@ def _singly(text: bytes, parts: list[Part], form: str, request: Request, source:
             if request.on_error == STOP:
                 at = len(text)
                 break
-            if request.on_error == SKIP or part.outside:
+            if request.on_error == SKIP or made.final:
                 continue
             made = null_of(text[part.start : part.end], json=form == "json")
         kept += 1

@@ -84,7 +84,7 @@ def attempt(text: bytes, part: Part, form: str, request: Request, source: str, l
     line: where the record begins, counted from 0
     """
     if part.problem:
-        return Fault(line, "", part.problem)
+        return Fault(line, "", part.problem, final=part.final)
     record = text[part.start : part.end]
     try:
         decoded = _decoded(record, source, line)

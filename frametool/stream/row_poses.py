@@ -22,12 +22,12 @@ from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault
 from frametool.stream.header import listed
-from frametool.stream.layout import NAMED, Kept
+from frametool.stream.layout import NAMED
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
-from frametool.stream.table import UNCLOSED, Naming, at_other_times, cells_of, coded, table_block, unnamed
+from frametool.stream.table import UNCLOSED, Naming, at_other_times, coded, table_block, unnamed
 from frametool.stream.table_plan import plan_table
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from frametool.stream.faults import RowNote
     from frametool.stream.layout import Layout
     from frametool.stream.request import Request
-    from frametool.stream.rows import Block
     from frametool.stream.table_stream import Begun
     from frametool.text.spans import Floats, Ints
     Cells: TypeAlias = Spans | NDArray[Any]
@@ -129,8 +128,7 @@ class TablePoses:
         """Ask for the stamps, the columns that are not ours, one by one, and the names of the results."""
         stretches = [(place, place, "cell", "cell") for place in self.kept]
         stretches += [(role, role, NAMED, NAMED) for role in self.roles]
-        columns = tuple(map(Kept, self.kept))  # of a row that has too few cells
-        return layout._replace(stretches=tuple(stretches), pieces=(), columns=columns)
+        return layout._replace(stretches=tuple(stretches), pieces=())
 
     @property
     def columns(self) -> str:
@@ -148,9 +146,8 @@ class TablePoses:
         """Return the poses of a block, and leave what is wrong with other rows in `faults`."""
         torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
         body = text if torn is None else text[:torn]
-        nulls = self.plan.on_error == NULL
         body = at_other_times(self.table, self.layout, body, self.plan.offset_ns)
-        block = table_block(self.table, self.layout, body, self.naming, nulls=nulls)
+        block = table_block(self.table, self.layout, body, self.naming)
         stamps, late = self._stamps(block.stamps)
         run = Run(self.plan, block._replace(bad={**late, **block.bad}), self.state)
         self.faults = run.faults()
@@ -159,42 +156,23 @@ class TablePoses:
         self.mended += len(run.mended)
         self.off = max(self.off, run.off)
         self.notes = notes_of(run, block)
-        self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, run.rows]
         self.rows += len(block.places) + len(block.broken)
-        rows, results, lines = run.rows, run.results, block.places
-        if nulls and self.faults:
-            block, rows, results, stamps = self._with_nulls(block, run, stamps)
-            lines = block.places
+        rows, results = run.rows, run.results
+        if self.plan.on_error == NULL and run.reasons:
+            rows, results = _with_nulls(run)
+        self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         same = rows is run.rows and len(rows) == run.count
         parts = block.parts if same else [chosen(part, rows) for part in block.parts]
         texts = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
         names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
         for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
             names[role] = _texts(part)
-        lines = lines[rows]
-        if b'"' in body and not nulls:
+        lines = block.places[rows]
+        if b'"' in body:
             lines = np.array([block.line_of(row) for row in rows.tolist()], np.int64)
         return RowPoses(
             results, None if stamps is None else stamps[rows], lines, names[0], names[1], texts, block.frames
         )
-
-    def _with_nulls(self, block: Block, run: Run, stamps: Ints | None) -> tuple[Block, Ints, Floats, Ints | None]:
-        """Return the rows with the bad ones among them, without results; what has too few cells comes at its place."""
-        more = len(block.broken)
-        results = np.full((run.count + more, run.results.shape[1]), np.nan)
-        results[run.rows] = run.results
-        places = np.concatenate([block.places, np.array([each.place for each in block.broken], np.int64)])
-        cells = [cells_of(each.null_row, self.table.delimiter) for each in block.broken]
-        parts = []
-        for at, part in enumerate(block.parts):
-            added = spans_of([row[at] if at < min(len(row), len(self.kept)) else b"" for row in cells])
-            starts, ends = (np.concatenate([part[side], added[side] + len(part.data)]) for side in (1, 2))
-            parts.append(Spans(np.concatenate([part.data, added.data]), starts, ends))
-        if stamps is not None:
-            stamps = np.concatenate([stamps, np.full(more, NO_STAMP)])
-        there = {*run.rows.tolist(), *run.reasons, *range(run.count, run.count + more)}  # not the first of velocities
-        rows = np.array(sorted(there, key=places.__getitem__), np.int64)
-        return block._replace(places=places, parts=parts), rows, results[rows], stamps
 
     def _stamps(self, cells: Sequence[tuple[Spans, ...]]) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
         """Read the stamps of a block; return them, and which rows have none that can be read."""
@@ -204,6 +182,14 @@ class TablePoses:
         times, reasons = read_stamps(cells[0], in_ns=in_nanoseconds(name))
         times[list(reasons)] = NO_STAMP
         return times, {row: (name, reason) for row, reason in reasons.items()}
+
+
+def _with_nulls(run: Run) -> tuple[Ints, Floats]:
+    """Return the rows with the bad ones among them, which have no numbers."""
+    rows = np.array(sorted({*run.rows.tolist(), *run.reasons}), np.int64)
+    results = np.full((len(rows), run.results.shape[1]), np.nan)
+    results[np.searchsorted(rows, run.rows)] = run.results
+    return rows, results
 
 
 def _texts(part: Spans) -> Sequence[str | None]:

@@ -24,13 +24,12 @@ if TYPE_CHECKING:
 
 
 class Broken(NamedTuple):
-    """A row that no number can be read from: its place, its line, the column and the reason, and its null row."""
+    """A row that no number can be read from: its place, its line, the column and the reason."""
 
     place: int
     line: int
     column: str
     reason: str
-    null_row: bytes
 
 
 class Block(NamedTuple):

@@ -398,11 +398,8 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nulls: bool) -> Block:
-    """Find the rows of a block, their numbers, their names, and the stretches of text that pass.
-
-    nulls: rows without numbers are written too.
-    """
+def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Block:
+    """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
     cells = table.split(text)
     columns = _as_slice(layout.places)
     numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
@@ -423,8 +420,7 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming, *, nu
             if cells.counts[line] == 0 or (cells.counts[line] == 1 and not raw.strip()):
                 odd.append((line, raw))
             else:
-                null_row = _null_row(table, layout, raw) if nulls else b""
-                broken.append(Broken(line, lines_before(line), "", _ragged(table, int(cells.counts[line])), null_row))
+                broken.append(Broken(line, lines_before(line), "", _ragged(table, int(cells.counts[line]))))
     return Block(
         numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), odd, broken, names.frames,
         stamps, names.bad, names.lost,
@@ -480,9 +476,3 @@ def _ragged(table: Table, count: int) -> str:
     """Say that a row has too few or too many cells."""
     named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
     return f"expected {table.width} cells{named}, found {count}"
-
-
-def _null_row(table: Table, layout: Layout, raw: bytes) -> bytes:
-    body = raw.rstrip(b"\r\n")
-    cells = cells_of(raw, table.delimiter) if b'"' in raw or not table.delimiter else body.split(table.delimiter)
-    return layout.null_row(cells) + raw[len(body) :]

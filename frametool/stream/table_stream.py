@@ -11,7 +11,7 @@ from frametool.errors import FormatError, FrametoolError, listing
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, Fault, Misused, RowNote
+from frametool.stream.faults import Fault, Misused, RowNote
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import (
@@ -144,7 +144,7 @@ class TableWork:
     def _done(self, text: bytes) -> Outcome:
         size = len(text)
         text = at_other_times(self.table, self.layout, text, self.plan.offset_ns)
-        block = table_block(self.table, self.layout, text, self.naming, nulls=self.plan.on_error == NULL)
+        block = table_block(self.table, self.layout, text, self.naming)
         run = Run(self.plan, block, self.state)
         faults = run.faults()
         notes = notes_of(run, block)

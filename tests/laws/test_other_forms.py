@@ -169,12 +169,13 @@ def _is_nothing(value: Any) -> bool:
     return value in (None, "") if inner is None else all(map(_is_nothing, inner))
 
 
-def test_a_row_with_too_few_cells_keeps_its_place_and_what_it_has(run: Run) -> None:
+def test_a_row_with_too_few_cells_is_left_out_and_counted(run: Run) -> None:
     text = "id,x,y,z\n1,1,2,3\n2\n3,1,2,3\n"
     done = run("apply", "--transform", "{xyz: [1, 0, 0]}", "-f", "json", "--on-error", "null", stdin=text)
     assert [json.loads(line) for line in done.out.splitlines()] == [
-        {"point": [2.0, 2.0, 3.0], "id": 1}, {"point": None, "id": 2}, {"point": [2.0, 2.0, 3.0], "id": 3},
+        {"point": [2.0, 2.0, 3.0], "id": 1}, {"point": [2.0, 2.0, 3.0], "id": 3},
     ]  # fmt: skip
+    assert "stdin: 1 of 3 rows without result" in done.err
 
 
 @pytest.mark.parametrize("into", ["tum", "ros2", "kitti"])

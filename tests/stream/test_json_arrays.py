@@ -65,7 +65,7 @@ def test_arrays_with_a_broken_end_give_what_is_good(count: int, between: str, en
     assert (stopped.status, stopped.text.count(b"}")) == (1, count)
     for on_error in ("skip", "null"):
         result = flow(text, MOVE._replace(on_error=on_error), "json")
-        assert result.status == 3
+        assert result.status == (3 if end in ("\n", ",\n", "") else 1)
         assert len([each for each in json.loads(result.text) if each]) == count
 
 

@@ -109,9 +109,9 @@ def test_results_that_overflow_are_refused() -> None:
 
 def test_ragged_rows_are_told_with_their_counts() -> None:
     result = flow(b"id,x,y,z\na,1,2\nb,1,2,3,4\nc,1,2,3\n\n", MOVE._replace(on_error="null"))
-    assert result.told[0] == "in:2: expected 4 cells (id x y z), found 3 (no result)"
-    assert result.told[1] == "in:3: expected 4 cells (id x y z), found 5 (no result)"
-    assert result.text == b"id,x,y,z\na,,,\nb,,,,4\nc,-1.0,3.0,6.0\n\n"
+    assert result.told[0] == "in:2: expected 4 cells (id x y z), found 3 (row skipped)"
+    assert result.told[1] == "in:3: expected 4 cells (id x y z), found 5 (row skipped)"
+    assert result.text == b"id,x,y,z\nc,-1.0,3.0,6.0\n\n"
 
 
 def test_a_fault_after_a_quoted_line_end_has_the_right_line() -> None:
