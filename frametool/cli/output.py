@@ -18,7 +18,7 @@ from click import UsageError
 from frametool.cli.options import FULL
 from frametool.cli.sink import is_special, writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
+from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats.table import (
     FORMATS,
     by_name,
@@ -60,6 +60,7 @@ class Output:
         otherwise: the form that stands in the place of these two
         """
         self._inputs = inputs
+        self._fault: FrametoolError | None = None  # ends a stream behind its good rows
         self.path: str | None = inputs.output
         self.force: bool = self.path is not None and inputs.force
         told: str | None = inputs.format_name
@@ -214,13 +215,37 @@ class Output:
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
 
     def rows(self, blocks: Iterator[Rows]) -> None:
-        """Write the results of a stream of records, block by block where the form has rows."""
+        """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
+        good = self._before_a_fault(blocks)
         if self.style.form == "csv":
             from frametool.stream.csv_table import CsvTable
 
-            self.pieces(CsvTable(self.style).pieces(blocks))
+            self.pieces(CsvTable(self.style).pieces(good))
             return
-        self.values(chain.from_iterable(block.in_order() for block in blocks))
+        values = chain.from_iterable(block.in_order() for block in good)
+        first = list(islice(values, 1))
+        if self._fault is not None and not first:
+            raise self._fault
+        if self.style.form in ("yaml", "json"):
+            self.pieces(self._documents(chain(first, values)))
+        else:
+            self.values(chain(first, values))
+
+    def _before_a_fault(self, blocks: Iterator[Rows]) -> Iterator[Rows]:
+        """Yield blocks up to an error, which is raised when they are written."""
+        try:
+            yield from blocks
+        except FrametoolError as error:
+            self._fault = error
+
+    def _documents(self, values: Iterator[Result | dict[str, Any]]) -> Iterator[str]:
+        """Yield results as documents of YAML, or lines of JSON, some at a time."""
+        between = ""
+        write, parting = self._module("").write_points, "---\n" if self.style.form == "yaml" else ""
+        while batch := list(islice(values, BATCH)):
+            found = [each.mapping(self.style) if isinstance(each, Result) else each for each in batch]
+            yield between + write(found, self.style)
+            between = parting
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
@@ -299,6 +324,8 @@ class Output:
                 text = "\n".join(map(printable, str(piece).split("\n"))) if for_people else piece
                 marked = self.marks and for_people and self.path is None and sys.stdout.isatty()
                 write(in_colour(str(text), self.marks) if marked else text)
+            if self._fault is not None:
+                raise self._fault
         self._tell_of_suffix()
 
     def opened(self) -> AbstractContextManager[Write]:

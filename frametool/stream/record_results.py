@@ -12,7 +12,7 @@ from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import NoResult
-from frametool.stream.faults import NULL, Fault
+from frametool.stream.faults import NULL, STOP, Fault
 from frametool.stream.record_text import column_in, without_noise
 from frametool.stream.record_values import ROUNDED, Teller, plain, results
 from frametool.stream.request import Memory
@@ -73,11 +73,12 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
             rows += 1
             line, at = line + block.count(b"\n", at, part.start), part.start
             before = bad.count
-            if part.problem:
-                bad.take([Fault(line, "", part.problem, final=part.final)])
+            fault: Fault | None = None
             source = Source(bad.source, "", line)
             try:
-                if not part.problem:
+                if part.problem:
+                    fault = Fault(line, "", part.problem, final=part.final)
+                else:
                     text = decode(block[part.start : part.end], bad.source)
                     plain_text = without_noise(text) if form == "yaml" else text
                     source = Source(bad.source, plain_text, line, column_in(block, part.start))
@@ -85,9 +86,12 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
                     values += zip(count(part.start), found, strict=False)
             except FormatError as error:
                 below, column = source.place(max(error.line, 1), error.column)
-                bad.take([Fault(below, str(column) if error.column else "", error.message)])
+                fault = Fault(below, str(column) if error.column else "", error.message)
             except FrametoolError as error:
-                bad.take([Fault.of(line, "", error)])
+                fault = Fault.of(line, "", error)
+            if fault is not None and (fault.final or bad.on_error == STOP):
+                yield Rows([each.take((each.places < part.start).nonzero()[0]) for each in batches], values)
+            bad.take([fault] if fault else [])
             if bad.count > before and bad.on_error == NULL:
                 values.append((part.start, _no_result(block[part.start : part.end], form, style)))
         teller.counts[ROUNDED] += mended

@@ -24,7 +24,16 @@ from frametool.stream.answers import Answer
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import DEGREES
 from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
-from frametool.stream.record_values import MESSAGES, ROUNDED, plain, plain_scalar, stamp_key, unit_of, values_of_unit
+from frametool.stream.record_values import (
+    MESSAGES,
+    ROUNDED,
+    SPELLED,
+    plain,
+    plain_scalar,
+    stamp_key,
+    unit_of,
+    values_of_unit,
+)
 from frametool.stream.row_layout import POSE, ROTATION, Target
 from frametool.stream.splitter import Part
 from frametool.stream.stamp_columns import read_stamps
@@ -229,16 +238,15 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     stamp = None if record.stamp_ns is None else STAMP_NS
     shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
     probe = Answer(shown, parts, mended=False)
-    if style.form in MESSAGES:
-        return None
+    own_style = style if style.form in MESSAGES else style.in_form("csv")
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)
-        (value,) = values_of_unit(root.at(unit), unit, [probe], request, style.in_form("csv"), _Unmarked())
+        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style, _Unmarked())
     except (FrametoolError, ValueError):
         return None
     numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
-    found = _stamped(value, numbers, is_spelled=style.form == "csv")
+    found = _stamped(value, numbers, is_spelled=style.form in SPELLED)
     if found is None or style.form != "csv":
         return found
     from frametool.formats.rows.csv import cells_of

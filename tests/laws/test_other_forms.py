@@ -11,6 +11,8 @@ import pytest
 from ways import readings, values
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ways import Run
 
 STAMP_NS = 1_000_000_002
@@ -316,3 +318,15 @@ def test_a_point_with_other_axes_stays_a_point(
     done = run("convert", *argument, *axes, "-f", into, stdin=stdin)
     (found,) = readings(done.out, into)
     assert (found.kind, list(map(float, found.numbers))) == ("point", wanted)
+
+
+@pytest.mark.parametrize("into", ["yaml", "csv", "tum", "ros2", "text"])
+@pytest.mark.parametrize("bad", ['{"xyz": [1, 2, "x"], "rpy": [0, 0, 0]}', '{"xyz": [1, 2'])
+@pytest.mark.parametrize("count", [1, 200])
+def test_good_rows_before_one_that_ends_the_run_are_written(run: Run, tmp_path: Path, into: str, bad: str, count: int) -> None:
+    good = '{"xyz": [1, 2, 3], "rpy": [0, 0, 0]}\n'
+    alone = run("convert", "-f", into, stdin=good * count)
+    done = run("convert", "-f", into, stdin=f"{good * count}{bad}\n{good * count}")
+    assert (done.status, done.out) == (1, alone.out)
+    kept = run("convert", "-f", into, "-o", "new", stdin=f"{good * count}{bad}\n")
+    assert (kept.status, (tmp_path / "new").exists()) == (1, False)
