@@ -21,7 +21,7 @@ from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import LONGEST, CalcError, frame_text
 from frametool.calc.rules import wanted
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
-from frametool.cli.command import Text
+from frametool.cli.command import Text, refuse
 from frametool.cli.commands.help import topic
 from frametool.cli.poses import source_of
 from frametool.cli.sink import writing
@@ -320,8 +320,7 @@ ENDS = ("exit", "quit")
 
 def talk(scope: Scope, output: Output) -> int:
     """Answer lines until Ctrl-D; errors go on, Ctrl-C forgets the line."""
-    if output.path is not None:
-        raise click.UsageError("-o FILE is for expressions that are given or piped, not for the prompt")
+    refuse(output.path is not None, "-o FILE is for expressions that are given or piped, not for the prompt")
     prompt = PROMPT if sys.stdout.isatty() else ""
     with _readline(scope):
         while True:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import inputs
+from frametool.cli.command import inputs, refuse
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say, say_warning
 from frametool.errors import FormatError, FrametoolError, FrametoolWarning, heard_by, shown
@@ -136,8 +136,7 @@ class SeveralClouds:
         self.output = output
         self.stream = stream
         self.paths: Sequence[str] = stream.inputs.input_path
-        if "-" in self.paths:
-            raise click.UsageError("-i - among several: standard input holds one cloud; name files")
+        refuse("-" in self.paths, "-i - among several: standard input holds one cloud; name files")
         if bags := [path for path in self.paths if is_bag(path)]:
             raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
         forms = inputs().input_forms
@@ -152,8 +151,7 @@ class SeveralClouds:
 
     def refuse_beside(self, *, is_more: bool) -> None:
         """Raise a usage error where the command line has more to move, or to do, than the clouds."""
-        if is_more:
-            raise click.UsageError("several clouds are moved whole; no records, --covariance or --explain beside them")
+        refuse(is_more, "several clouds are moved whole; no records, --covariance or --explain beside them")
 
     def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None, *, has_source: bool) -> int:
         """Move all and write them as one; return the exit status.

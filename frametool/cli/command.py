@@ -7,6 +7,7 @@ usage error, and nothing is written.
 from __future__ import annotations
 
 import re
+from contextlib import contextmanager
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.geometry.place import Earth
 
@@ -127,6 +128,25 @@ def check_together(context: click.Context) -> None:
         if needed and told.keys().isdisjoint(needed):
             choices = " or ".join(known[each].opts[-1] for each in needed if each in known)
             raise click.UsageError(f"{called} needs {choices}", context)
+
+
+def refuse(holds: object, message: str) -> None:
+    """Raise a usage error where something holds of what was asked for."""
+    if holds:
+        raise click.UsageError(message)
+
+
+@contextmanager
+def misuse(where: str = "") -> Iterator[None]:
+    """Turn values that cannot be into usage errors, but for what is no rotation; where: what begins their sentence."""
+    try:
+        yield
+    except ValueInvalid as error:
+        from frametool.grammar.readers import NotARotation
+
+        if isinstance(error, NotARotation):
+            raise
+        raise click.UsageError(f"{where}{error}") from None
 
 
 def inputs() -> Inputs:

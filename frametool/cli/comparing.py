@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, option, together
+from frametool.cli.command import Inputs, option, refuse, together
 from frametool.cli.command import inputs as running
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
@@ -167,8 +167,7 @@ def trajectory(
 def forms_of(files: int) -> list[str]:
     """Return the form of each of several files as --in says, the last for the rest; "" where it says none."""
     forms = list(running().input_forms)
-    if len(forms) > files:
-        raise click.UsageError(f"--in is given {len(forms)} times for {files} files")
+    refuse(len(forms) > files, f"--in is given {len(forms)} times for {files} files")
     return forms + (forms[-1:] * (files - len(forms)) or [""] * files)
 
 
@@ -176,8 +175,7 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     """Compare estimates with a reference as the options say; tell what is worth it. Also: whether rows were skipped."""
     from frametool.fit.comparison import compare
 
-    if [ref, *ests].count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one trajectory may be -")
+    refuse([ref, *ests].count("-") > 1, "standard input can be read once; only one trajectory may be -")
     on_error, forms, chosen = inputs.on_error, forms_of(1 + len(ests)), _settings(inputs)
     reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
     found = []
@@ -226,8 +224,7 @@ def _mount(text: str) -> Any:
     from frametool.stream.trajectories import split_name
 
     file, names = split_name(text)
-    if len(names) != 2:
-        raise click.UsageError(f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")
+    refuse(len(names) != 2, f"--mount {shown(text)}: a pose, auto, or FILE:BODY:POINT")
     return load_tree(file).lookup(names[0], names[1])
 
 

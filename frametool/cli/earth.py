@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import inputs
+from frametool.cli.command import inputs, refuse
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid
@@ -73,8 +73,7 @@ def _origin(text: str) -> Origin:
     reading = Reading(source)
     try:
         documents = parse_documents(text, source.name) if text.startswith("{") else []
-        if len(documents) != 1:
-            raise click.UsageError(f"--origin takes a place like '{{lat: 48.1, lon: 11.5, alt: 520}}', or {FIRST}")
+        refuse(len(documents) != 1, f"--origin takes a place like '{{lat: 48.1, lon: 11.5, alt: 520}}', or {FIRST}")
         spot = read_at(documents[0].value, reading)
     except Misfit as misfit:
         raise click.UsageError(f"--origin: {misfit}") from None

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, option, together
+from frametool.cli.command import Inputs, option, refuse, together
 from frametool.cli.options import FULL, pose_reading_options
 from frametool.cli.output import Output
-from frametool.cli.poses import is_pasted, pose_source, usage_if_inline, values_of, without_inverse
+from frametool.cli.poses import inline_misuse, is_pasted, pose_source, values_of, without_inverse
 from frametool.cli.streaming import Stream, stream_options
-from frametool.errors import FormatError, heard_by, warn
+from frametool.errors import heard_by, warn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,6 +41,7 @@ class PoseTask:
     """What the options of a command on poses say.
 
     derives: whether the derivation is wanted instead of the result
+    plan: how then
     """
 
     def __init__(self, inputs: Inputs, *what: str) -> None:
@@ -51,25 +52,22 @@ class PoseTask:
         self.normalize: bool = inputs.normalize
         self.stream = Stream(inputs)
         self.output = Output(inputs, *what or ("poses",))
+        self.plan = self._plan() if self.derives else None
 
     def request(self, **rest: Any) -> Request:
         """Return what is done with rows and records: they are read as the options say."""
         from frametool.stream.request import Request
 
-        degrees = self.output.style.degrees
         offset_ns = 0 if self.inputs.reads_trees else self.inputs.time_offset or 0
         if rest.get("window"):
             self.inputs.ask("start", "stop")
-        if rest.get("window") and rest.get("extra_column") is None:
-            rest["extra_column"] = ""
+            rest["extra_column"] = rest.get("extra_column") or ""
         said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
         texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
         if rest.get("poses") != 0 and not (texts and all(map(_says_all, texts))):
             self.inputs.ask("given")
-        made = Request(
-            given=self.stream.given, degrees=degrees, normalize=self.normalize, offset_ns=offset_ns, **rest
-        )
-        made = self.at_places(made)
+        own = {"given": self.stream.given, "degrees": self.output.style.degrees, "normalize": self.normalize}
+        made = self.at_places(Request(offset_ns=offset_ns, **own, **rest))
         self.output.take_axes("", made.operation)
         return made
 
@@ -89,8 +87,7 @@ class PoseTask:
 
     def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
         """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
-        if self.stream.path is not None:
-            raise click.UsageError("-i FILE and arguments are two inputs; give one")
+        refuse(self.stream.path is not None, "-i FILE and arguments are two inputs; give one")
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
             self.inputs.ask("input_forms")
 
@@ -112,13 +109,13 @@ class PoseTask:
         self.output.values(values)
         return 0
 
-    def plan(self) -> DerivationStyle:
+    def _plan(self) -> DerivationStyle:
         """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
         from frametool.explain.derive import DerivationStyle
 
         if self.output.told not in (None, "text"):
-            instead = f"{', '.join(FORMS)}, not {self.output.told}"
-            raise click.UsageError(f"--explain writes {instead}; leave one of them out")
+            told = f"{', '.join(FORMS)}, not {self.output.told}"
+            raise click.UsageError(f"--explain writes {told}; leave one of them out")
         return DerivationStyle(self.output.style, significant(self.inputs.precision))
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
@@ -133,17 +130,19 @@ class PoseTask:
         from frametool.stream.written import written_poses
 
         request = self.request()
-        try:
+        with inline_misuse(), heard_by(lambda *_: None) if warned else nullcontext():
             source = pose_source(one_argument(argument), request)
-            with heard_by(lambda *_: None) if warned else nullcontext():
-                found = written_poses(source, degrees=request.degrees, normalize=request.normalize)
-        except FormatError as error:
-            raise usage_if_inline(error) from None
-        if len(found) != 1:
-            raise click.UsageError(f"--explain derives one pose, {source.name} holds {len(found)}")
+            found = written_poses(source, degrees=request.degrees, normalize=request.normalize)
+        refuse(len(found) != 1, f"--explain derives one pose, {source.name} holds {len(found)}")
         if found[0].pose.covariance is not None:
             warn(f"{source.name}: --explain derives the pose alone; its covariance is left out")
         return found[0]
+
+    def derive(self, operation: str, *parts: Any, **more: Any) -> int:
+        """Write the derivation of an operation where the result would go."""
+        from frametool.explain import derive
+
+        return self.write(getattr(derive, operation)(self.plan, *parts, **more))
 
     def write(self, explanation: Explanation) -> int:
         """Write a derivation where the result would go."""
@@ -161,13 +160,11 @@ def significant(precision: int | None) -> int | None:
     """Return how many significant digits --precision asks for; None for all."""
     from frametool.explain.run import DIGITS
 
-    if precision == 0:
-        raise click.UsageError("--precision counts significant digits with --explain; give 1 or more, or full")
+    refuse(precision == 0, "--precision counts significant digits with --explain; give 1 or more, or full")
     return DIGITS if precision is None else None if precision == FULL else precision
 
 
 def one_argument(argument: str | Source | None) -> str | Source:
     """Return an argument that holds a record; standard input is a stream."""
-    if argument in (None, "-"):
-        raise click.UsageError(f"standard input is a stream; {ONE_RECORD}")
+    refuse(argument in (None, "-"), f"standard input is a stream; {ONE_RECORD}")
     return argument or ""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, Text, inputs, option, together
+from frametool.cli.command import Inputs, Text, inputs, option, refuse, together
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -434,8 +434,7 @@ color_option = _of_results("--color", _COLOR, ("auto", "always", "never"), defau
 def window_of(given: Inputs) -> tuple[int, int] | None:
     """Return the first and the last nanosecond that --start and --stop leave, None without either; nobody asks yet."""
     start, stop = given.peek("start"), given.peek("stop")
-    if start is not None and stop is not None and start > stop:
-        raise click.UsageError("--start is after --stop")
+    refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     if start is stop is None:
         return None
     from frametool.frames.stamps import FURTHEST_NS
@@ -446,8 +445,7 @@ def window_of(given: Inputs) -> tuple[int, int] | None:
 def rules(given: Inputs) -> Rules:
     """Collect what the options say about how frames are taken."""
     keep_ns = given.cache
-    if keep_ns is not None and keep_ns < 0:
-        raise click.UsageError("--cache takes seconds, not less than 0")
+    refuse(keep_ns is not None and keep_ns < 0, "--cache takes seconds, not less than 0")
     from frametool.formats.load import Rules
 
     return Rules(moving=bool(given.moving), keep_ns=keep_ns, normalize=bool(given.normalize))
@@ -484,8 +482,6 @@ def _range(text: str) -> range:
         start, stop, step = map(_stamp_ns, text.split(":"))
     except ValueInvalid as error:
         raise click.UsageError(f"--times {text}: {error}; a range is START:STOP:STEP in seconds") from None
-    if step <= 0 or stop < start:
-        raise click.UsageError(f"--times {text}: STEP must be positive and STOP not before START")
-    if (stop - start) // step >= MOST_TIMES:
-        raise click.UsageError(f"--times {text} has more than {MOST_TIMES} times")
+    refuse(step <= 0 or stop < start, f"--times {text}: STEP must be positive and STOP not before START")
+    refuse((stop - start) // step >= MOST_TIMES, f"--times {text} has more than {MOST_TIMES} times")
     return range(start, stop + 1, step)

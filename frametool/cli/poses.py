@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli.command import misuse, refuse
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose
@@ -77,12 +78,8 @@ def _rewritten(source: Source, given: Notation | None, *, normalize: bool, point
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
-    try:
+    with inline_misuse():
         return in_grammar(source, given, normalize=normalize, points=points)
-    except FormatError as error:
-        if source.name == INLINE and not isinstance(error.__cause__, NotARotation):
-            error.exit_code = 2  # misuse, where numbers in a file are bad data
-        raise
 
 
 _rewritten_argument = lru_cache(8)(_rewritten)  # an argument is looked at before it is read
@@ -191,8 +188,7 @@ def without_inverse(argument: str) -> tuple[str, bool]:
     bare, is_inverse = argument, False
     while (found := _inverted(bare)) and not os.path.exists(bare):
         bare, is_inverse = (found[1] or found[2] or "").strip(), not is_inverse
-        if not bare:
-            raise click.UsageError(f"{shown(argument)}: there is no pose whose inverse is meant")
+        refuse(not bare, f"{shown(argument)}: there is no pose whose inverse is meant")
     return bare, is_inverse
 
 
@@ -282,23 +278,27 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
 
 def _read(argument: str | Source, request: Request, read: Callable[[Source], Iterable[Any]]) -> Iterator[Any]:
     """Yield what is read of an argument; the error for a file of frames points to lookup."""
-    source = None
-    try:
+    with inline_misuse():
         source = pose_source(argument, request)
-        yield from read(source)
-    except FormatError as error:
-        if source is not None and source.name != INLINE:
+        try:
+            yield from read(source)
+        except FormatError as error:
+            if source.name == INLINE:
+                raise
             from frametool.formats.detect import with_hint
 
-            error = with_hint(error, source.text.encode(), source.name)
-        raise usage_if_inline(error) from None
+            raise with_hint(error, source.text.encode(), source.name) from None
 
 
-def usage_if_inline(error: FormatError) -> FormatError:
+@contextmanager
+def inline_misuse() -> Iterator[None]:
     """Count an inline argument that cannot be parsed as misuse (2); what parses but is no rotation is bad data (1)."""
-    if error.source == INLINE and not isinstance(error.__cause__, NotARotation):
-        error.exit_code = 2
-    return error
+    try:
+        yield
+    except FormatError as error:
+        if error.source == INLINE and not isinstance(error.__cause__, NotARotation):
+            error.exit_code = 2
+        raise
 
 
 class ArgumentPoses(NamedTuple):
@@ -361,8 +361,7 @@ class Rows(NamedTuple):
 def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[str], bool]) -> Rows:
     """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
     bare = [without_inverse(each)[0] for each in arguments]
-    if bare.count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one argument may be -")
+    refuse(bare.count("-") > 1, "standard input can be read once; only one argument may be -")
     streams = [at for at, each in enumerate(bare) if each == "-" or has_table(each)]
     if len(streams) > 1:
         files = " and ".join(bare[at] for at in streams)
@@ -419,12 +418,8 @@ def _only(poses: list[Pose], argument: str | Source) -> Pose:
 @contextmanager
 def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
     """Turn what cannot be read of arguments into misuse, but not what is no rotation; then warn of what was noted."""
-    try:
+    with misuse():
         yield
-    except NotARotation:
-        raise
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
     for note in reading.notes:
         warn(note.message)
 
@@ -445,8 +440,7 @@ def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
             return read_pose(matrix_pose([list(texts)], form, told=request.given is not None) or {}, reading)
         if whole and len(texts) == len(whole.columns):
             return Pose(*read_spelled(form, texts, INDICES, reading))
-        if len(texts) not in form.counts:
-            raise click.UsageError(f"{form.counted}; found {len(texts)}")
+        refuse(len(texts) not in form.counts, f"{form.counted}; found {len(texts)}")
         x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
         rotation = rotation_of(form, texts[-size:], INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from click import UsageError
 
+from frametool.cli.command import refuse
 from frametool.errors import FileProblem, printable, shown
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
 from frametool.grammar.result import Recorded
@@ -24,15 +25,14 @@ def recorded(chosen: Inputs, form: str, output: str | None) -> Recorded:
     frames = tuple(name.strip() for name in told.split(",")) if told else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
-    if len({*frames}) < len(frames):
-        raise UsageError(f"--frames {told}: no frame is its own parent; give two names")
+    refuse(len({*frames}) < len(frames), f"--frames {told}: no frame is its own parent; give two names")
     chosen.forms_read = (*chosen.forms_read, *[("", ("frames",))] * bool(chosen.named_frames))
     return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 
 def _place(form: str, output: str | None) -> str:
     """Return where a recording is written; raises UsageError where it cannot be."""
-    if output in (None, "-"):
+    if output is None or output == "-":
         raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
     if is_folder(form) and output.endswith(FORMATS[form].suffixes):
         raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.command import Inputs, option, together
+from frametool.cli.command import Inputs, option, refuse, together
 from frametool.cli.options import FULL, Digits
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.signals import clean_up
@@ -119,12 +119,10 @@ class SimOutput(NamedTuple):
         said = {name: getattr(inputs, name) for name in ("emit", "reach", "realtime", "live", "plot", "view", "force")}
         path = None if inputs.output == "-" else inputs.output
         made = cls(style_of(inputs), path, **said, leaders=leaders)
-        if made.reach < 0.0:
-            raise click.UsageError(f"--reach must be 0 or more, found {made.reach:g}")
+        refuse(made.reach < 0.0, f"--reach must be 0 or more, found {made.reach:g}")
         if made.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        if made.view and suffix_of(made.view) != ".html":
-            raise click.UsageError(f"--view takes a file .html; found {shown(made.view)}")
+        refuse(made.view and suffix_of(made.view) != ".html", f"--view takes a file .html; found {made.view}")
         check_files(made.plot, made.output, made.view, force=made.force)
         return made
 
@@ -232,8 +230,7 @@ def check_files(plot: str | None, output: str | None, view: str | None, *, force
 
     Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
     """
-    if plot and suffix_of(plot) not in PICTURES:
-        raise click.UsageError(f"--plot takes {', '.join(PICTURES)}; found {shown(plot)}")
+    refuse(plot and suffix_of(plot) not in PICTURES, f"--plot takes {', '.join(PICTURES)}; found {plot}")
     files = {name: path for name, path in (("--output", output), ("--plot", plot), ("--view", view)) if path}
     for (name, path), (other, same) in combinations(files.items(), 2):
         if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
@@ -248,11 +245,12 @@ def check_files(plot: str | None, output: str | None, view: str | None, *, force
         require_matplotlib()
 
 
-def leader_of(argument: str, seed: int, *, paced: bool) -> MakeLeader:
-    """Return the leader of an argument; `paced`: what comes from standard input acts when it arrives.
+def leader_of(inputs: Inputs) -> MakeLeader:
+    """Return the leader that the options name; in real time what comes from standard input acts when it arrives.
 
     Raises FormatError; FileProblem; click.UsageError for a name that is neither a leader nor a file.
     """
+    argument, seed, paced = inputs.leader, inputs.seed, inputs.realtime or inputs.live
     if argument in LEADERS:
         return built_in(argument, seed)
     if argument == "-":
@@ -266,8 +264,7 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
     """Read commands as they come: by their times, or in real time whenever they arrive."""
     if sys.stdin is None:
         raise FileProblem("standard input is closed")
-    if sys.stdin.isatty():
-        raise click.UsageError("standard input is a terminal; pipe commands in, or see frametool sim teleop")
+    refuse(sys.stdin.isatty(), "standard input is a terminal; pipe commands in, or see frametool sim teleop")
     if not paced:
         return scripted(read_commands(stdin_lines(), "stdin"))
     mailbox = Mailbox()

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from frametool.cli.command import inputs
+from frametool.cli.command import inputs, refuse
 from frametool.cli.stderr import say, say_error
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
@@ -193,8 +191,7 @@ def _paired(files: Sequence[str], max_gap_ns: int | None, *, normalize: bool) ->
     (gripper, first), (target, second) = read
     if max_gap_ns is not None:
         for each, name in read:
-            if each.stamps_ns is None:
-                raise click.UsageError(f"--max-gap is not used: {name} has no stamps")
+            refuse(each.stamps_ns is None, f"--max-gap is not used: {name} has no stamps")
     return paired_samples(gripper, target, (first, second), max_gap_ns)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, option, together
+from frametool.cli.command import Inputs, option, refuse, together
 from frametool.cli.options import (
     STREAMED,
     UTF8,
@@ -190,8 +190,7 @@ class Stream:
             self.inputs.ask("camera_axes", *FORMATS[form].required_options)
         if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
-        if tables_only and form in RECORDS:
-            raise click.UsageError(f"frames are looked up for the rows of a table, not of {form}")
+        refuse(tables_only and form in RECORDS, f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
         if request.offset_ns and form in RECORDS:
             from frametool.stream.record_stream import at_other_times
@@ -430,6 +429,5 @@ def _form_of(path: str) -> str:
 
 def one_notation(given: Any) -> Any:
     """Take the one representation of --from."""
-    if given and len(given) > 1:
-        raise click.UsageError("--from takes one representation")
+    refuse(given and len(given) > 1, "--from takes one representation")
     return given[0] if given else None

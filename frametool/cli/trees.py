@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from frametool.cli.command import Text, inputs
+from frametool.cli.command import Text, inputs, refuse
 from frametool.cli.options import input_forms
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
@@ -22,6 +22,7 @@ from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
 from frametool.grammar.names import EARTH_FRAMES
+from frametool.grammar.pose_algebra import looked_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -152,24 +153,41 @@ def _loaded(
     return tree
 
 
-def tell_unused_sigmas(tree: Frames) -> None:
-    """Say once that edges have covariances, where a command that could carry them was not asked to."""
-    if tree.covariances and not inputs().quiet:
-        say(f"sigmas of {bare(tree.name)} not used (--covariance)")
+class Lookups:
+    """Look-ups of a tree as a command has them, with the covariances of its edges if wanted; what is told of these.
 
+    Edges with covariances that are not wanted are told at once, what was taken for granted of carried ones at the end.
+    """
 
-class CarriedSigmas:
-    """What a command that carries covariances along a tree tells once, at its end."""
-
-    def __init__(self, tree: Frames) -> None:
+    def __init__(self, tree: Frames, *, carried: bool) -> None:
         """Begin before the first result."""
-        self.tree = tree
+        self.tree, self.carried = tree, carried
         self.edges: set[str] = set()  # by their children
         self.widest: Sequence[float] = ()
         self.width = 0.0
+        if tree.covariances and not carried and not inputs().quiet:
+            say(f"sigmas of {bare(tree.name)} not used (--covariance)")
+
+    def result(self, target: str, source: str, at_ns: int | None) -> Result:
+        """Return the pose of a frame in another, as a result."""
+        return self.noted(looked_up(self.tree, target, source, at_ns, covariance=self.carried))
+
+    def one(self, target: str, source: str, at_ns: int | None) -> Components:
+        """Return the components of a pose, with those of its covariance."""
+        if not self.carried:
+            return self.tree.lookup(target, source, at_ns).components
+        found = self.result(target, source, at_ns)
+        return *found.pose.components, *found.extras["covariance"]
+
+    def many(self, target: str, source: str, times_ns: Any) -> Components:
+        """Return the same at times, as columns; nan where there are no data."""
+        found = self.tree.lookup_many(target, source, times_ns, missing="nan").components
+        return self._beside(found, target, source, times_ns) if self.carried else found
 
     def noted(self, result: Result) -> Result:
         """Take a result of a lookup in."""
+        if not self.carried:
+            return result
         from frametool.geometry.uncertainty import widest_turn
 
         target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
@@ -180,8 +198,8 @@ class CarriedSigmas:
                 self.widest, self.width = each, width
         return result
 
-    def beside(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
-        """Return columns of poses at times, nan where there are no data, with those of their covariance."""
+    def _beside(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
+        """Return columns of poses with those of their covariance."""
         import numpy as np
 
         from frametool.frames.lookup_many import carried_many
@@ -196,6 +214,8 @@ class CarriedSigmas:
 
     def tell(self) -> None:
         """Say what was taken for granted, and warn of turns too wide for the first order."""
+        if not self.carried:
+            return
         from frametool.geometry.uncertainty import warn_if_wide
 
         warn_if_wide([self.widest])
@@ -306,8 +326,7 @@ def opened(
 
 def refuse_two_readers(arguments: Sequence[str]) -> None:
     """Raise a usage error where two arguments stand for standard input."""
-    if list(arguments).count("-") > 1:
-        raise click.UsageError("standard input can be read once; only one argument may be -")
+    refuse(list(arguments).count("-") > 1, "standard input can be read once; only one argument may be -")
 
 
 def answers() -> Answers:
@@ -335,8 +354,7 @@ def _joints(texts: Sequence[str]) -> dict[str, str]:
     values: dict[str, str] = {}
     for text in texts:
         name, _, value = text.partition("=")
-        if not (name and value):
-            raise click.UsageError(f"--joint takes NAME=VALUE, found {shown(text)}")
+        refuse(not (name and value), f"--joint takes NAME=VALUE, found {shown(text)}")
         if name in values:
             raise click.UsageError(f"--joint {shown(name)} is given twice, {values[name]} and {value}; leave one out")
         values[name] = value
@@ -346,8 +364,7 @@ def _joints(texts: Sequence[str]) -> dict[str, str]:
 def _frame_names(text: str) -> tuple[str, ...]:
     """Take WORLD,BODY apart."""
     names = tuple(name.strip() for name in text.split(",")) if text else ()
-    if not all(names):
-        raise click.UsageError(f"--frames takes names with commas between them, found {shown(text)}")
+    refuse(not all(names), f"--frames takes names with commas between them, found {shown(text)}")
     return names
 
 
@@ -380,7 +397,7 @@ class Frame(Text):
 FRAME = Frame()
 
 
-def frame_name(name: str, tree: FrameTree | TransformBuffer | Robot) -> str:
+def frame_name(name: str, tree: Frames | Robot) -> str:
     """Return what a tree calls a frame: without the leading `/` that tf2 has given up; the Earth's by either name."""
     if name in EARTH_FRAMES and name not in tree.frames:
         return next((other for other in EARTH_FRAMES if other in tree.frames), name)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import comparisons, pairing_options, trajectory_options, write_trajectory
 from frametool.cli.options import reading_options, result_options, rotation_options
 from frametool.cli.output import Output
@@ -54,6 +52,5 @@ def _names(text: str | None) -> tuple[str, str] | None:
     if text is None:
         return None
     names = [name.strip() for name in text.split(",")]
-    if len(names) != 2 or not all(names):
-        raise click.UsageError("--names takes two names: REF,EST")
+    refuse(len(names) != 2 or not all(names), "--names takes two names: REF,EST")
     return names[0], names[1]

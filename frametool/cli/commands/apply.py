@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
 from frametool.cli.options import (
     TIME,
@@ -22,15 +22,14 @@ from frametool.cli.options import (
     rules_options,
     scale_option,
 )
-from frametool.cli.poses import is_inline, is_pasted, one_pose, pose_source, usage_if_inline, values_of
+from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
 from frametool.cli.streaming import SEVERAL, stream_options
-from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
+from frametool.cli.trees import FRAME, Lookups, frame_name, load_tree
 from frametool.documents.source import Source
-from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.geometry.uncertainty import warn_if_wide
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.grammar.pose_algebra import looked_up
 from frametool.text.numbers import NotFinite, parse_length
 
 if TYPE_CHECKING:
@@ -73,8 +72,7 @@ def command(inputs: Inputs) -> int:
     frame. -i FILE or stdin holds many: rows, JSON lines, clouds, what `ros2 topic echo` prints.
     """
     task = PoseTask(inputs, "points", "trajectory")
-    stream, output = task.stream, task.output
-    plan = task.plan() if task.derives else None
+    stream, output, plan = task.stream, task.output, task.plan
     several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
     clouds = clouds_of(stream, output) if stream.path and several is None else None
     if inputs.pose is None:
@@ -83,8 +81,7 @@ def command(inputs: Inputs) -> int:
         way, rest = _way_by_pose(inputs, task), inputs.arguments
     is_stream = rest in ((), ("-",))
     if clouds is not None:
-        if way.uncertain:
-            raise click.UsageError("--covariance: clouds have no place for one")
+        refuse(way.uncertain, "--covariance: clouds have no place for one")
         if not is_stream or plan is not None:
             raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
         return clouds.run(way.from_frame, way.target)
@@ -94,9 +91,8 @@ def command(inputs: Inputs) -> int:
     kind = _kind(inputs)
     if plan is not None:
         records = list(_sources(rest, kind))
-        if is_stream or len(records) != 1:
-            raise click.UsageError(f"a stream, or several records; {ONE_RECORD}")
-        return _derived(task, plan, way, records[0], kind or "", timeless=inputs.at is not None)
+        refuse(is_stream or len(records) != 1, f"a stream, or several records; {ONE_RECORD}")
+        return _derived(task, plan, way, records[0], kind or "")
     request = way.request(*((inputs.frame_column, inputs.time_column) if is_stream else (None, None)))
     request = request._replace(kind=kind or "", degrees=output.style.degrees, normalize=task.normalize)
     request = task.at_places(request)
@@ -115,20 +111,15 @@ def command(inputs: Inputs) -> int:
     return status
 
 
-def _derived(
-    task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str, *, timeless: bool
-) -> int:
-    """Write the derivation of one record; timeless: a time was chosen for all."""
+def _derived(task: PoseTask, plan: DerivationStyle, way: Way, record: str | Source, kind: str) -> int:
+    """Write the derivation of one record."""
     from frametool.stream.request import Operation
     from frametool.stream.written import derive_record
 
-    asked = task.request(operation=Operation(moves=True))
-    try:
-        source = pose_source(record, asked)
-        made = derive_record(plan, way.explained(), source, kind=kind, degrees=asked.degrees,
+    asked, timeless = task.request(operation=Operation(moves=True)), task.inputs.at is not None
+    with inline_misuse():
+        made = derive_record(plan, way.explained(), pose_source(record, asked), kind=kind, degrees=asked.degrees,
                              normalize=task.normalize, counters=way.counters, timeless=timeless)  # fmt: skip
-    except FormatError as error:
-        raise usage_if_inline(error) from None
     return task.write(made)
 
 
@@ -169,27 +160,19 @@ class Way(NamedTuple):
         from frametool.stream.request import Operation, Request
         from frametool.stream.stamp_source import Timed
 
-        has_source = self.has_source and frame_column is None
-        timed = self.at_times and Timed(
-            time_column or "", self.at_times, self.from_frame, self.moves, UNCERTAIN if self.uncertain else EXACT
-        )
+        has_source, width = self.has_source and frame_column is None, UNCERTAIN if self.uncertain else EXACT
+        timed = self.at_times and Timed(time_column or "", self.at_times, self.from_frame, self.moves, width)
         frames = () if has_source else (frame_column or "",)
 
         def edge_of(own: str | None) -> Components:
             return self.from_frame(own, None)
 
+        left = edge_of(None) if has_source and not time_column else None
         return Request(
-            Operation(
-                left=edge_of(None) if has_source and not time_column else None, moves=True, uncertain=self.uncertain
-            ),
-            frames=frames,
-            pose_of_row_frame=edge_of if frames else None,
-            pose_from_frame=edge_of,
-            timed=timed,
-            result_frame=self.target,
-            frame_is_counter=self.counters,
-            rename=lambda _parent, name: (self.target, name),
-        )
+            Operation(left=left, moves=True, uncertain=self.uncertain), frames=frames,
+            pose_of_row_frame=edge_of if frames else None, pose_from_frame=edge_of, timed=timed,
+            result_frame=self.target, frame_is_counter=self.counters, rename=lambda _parent, name: (self.target, name),
+        )  # fmt: skip
 
 
 def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]:
@@ -198,15 +181,12 @@ def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]
     numbers: what looks like one is no frame's name
     """
     arguments, chosen, uncertain = inputs.arguments, inputs.at, inputs.covariance
-    if len(arguments) < 2:
-        raise click.UsageError("name TREE and TARGET, or give --transform")
+    refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
     is_named = len(arguments) > 2 and not _is_record(arguments[2]) and not (numbers and _begins_number(arguments[2]))
     named = arguments[2:3] if is_named else ()
     rest = arguments[2 + len(named) :]
     tree = load_tree(arguments[0], inputs.more, rules(inputs), streams=rest in ((), ("-",)))
-    sigmas = CarriedSigmas(tree) if uncertain else None
-    if sigmas is None:
-        tell_unused_sigmas(tree)
+    lookups = Lookups(tree, carried=uncertain)
     target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
     source = next(iter(sources), None)
 
@@ -223,16 +203,10 @@ def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]
         return settled
 
     def from_frame(own: str | None, own_ns: int | None) -> Components:
-        begin, at = start(own), own_ns if chosen is None else at_ns(chosen)
-        if sigmas is None:
-            return tree.lookup(target, begin, at).components
-        found = sigmas.noted(looked_up(tree, target, begin, at, covariance=True))
-        return *found.pose.components, *found.extras["covariance"]
+        return lookups.one(target, start(own), own_ns if chosen is None else at_ns(chosen))
 
     def at_times(own: str | None, times_ns: Any) -> Components:
-        begin = start(own)
-        found = tree.lookup_many(target, begin, times_ns, missing="nan").components
-        return found if sigmas is None else sigmas.beside(found, target, begin, times_ns)
+        return lookups.many(target, start(own), times_ns)
 
     def moves(own: str | None) -> bool:
         return tree.latest(target, start(own)) is not None
@@ -245,7 +219,7 @@ def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]
 
         return ByTree(tree, target, source, at_ns(chosen))
 
-    has_source, tell = source is not None, sigmas.tell if sigmas else lambda: None
+    has_source, tell = source is not None, lookups.tell
     return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell), rest
 
 
@@ -258,8 +232,7 @@ def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
     source = pose_source(inputs.pose, asked)
     pose = one_pose(source, asked)
 
-    if uncertain and pose.covariance is None:
-        raise click.UsageError("--covariance: POSE has neither sigma nor covariance")
+    refuse(uncertain and pose.covariance is None, "--covariance: POSE has neither sigma nor covariance")
     moved_by = (pose if uncertain else pose._replace(covariance=None)).placed
     if pose.covariance is not None and not uncertain:
         warn(f"{source.name}: its covariance is not used (--covariance)")
@@ -268,20 +241,16 @@ def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
         _settled(own, pose.name)
         return moved_by
 
-    explained = partial(task.written, source, warned=True)
     tell = partial(warn_if_wide, [pose.covariance or ()] * uncertain)
-    return Way(
-        pose.parent, from_frame, None, lambda _own: False, explained, has_source=True, uncertain=uncertain, tell=tell
-    )
+    explained = partial(task.written, source, warned=True)
+    return Way(pose.parent, from_frame, None, bool, explained, has_source=True, uncertain=uncertain, tell=tell)
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
     """Decide which frame a record is given in: where both it and the command say, they must agree."""
     if own and source is not None and own != source and not {own, source} <= {*EARTH_FRAMES}:
-        raise ValueInvalid(
-            f"a record is given in {shown(own)}, not in {shown(source)}; "
-            "leave SOURCE out to use each record's own frame"
-        )
+        remedy = "leave SOURCE out to use each record's own frame"
+        raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}; {remedy}")
     return source or own
 
 
@@ -322,7 +291,6 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Source]:
         raise
     except ValueInvalid as error:
         raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
-    if len(numbers) % 3:
-        raise click.UsageError(f"points are three numbers each, found {len(numbers)}")
+    refuse(len(numbers) % 3, f"points are three numbers each, found {len(numbers)}")
     for at in range(0, len(numbers), 3):
         yield Source("argument", f'{{"{kind or "point"}": {numbers[at : at + 3]}}}')

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named
+from frametool.cli.command import Inputs, argument, command_named, refuse
 from frametool.cli.options import result_options, rotation_options
 from frametool.cli.output import Output
-from frametool.cli.poses import pose_source, usage_if_inline
+from frametool.cli.poses import inline_misuse, pose_source
 from frametool.cli.stderr import say
-from frametool.errors import FormatError
 from frametool.grammar.pose_algebra import turn_between
 
 if TYPE_CHECKING:
@@ -50,8 +47,7 @@ def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:
     if len(texts) == 6:
         texts = ",".join(texts[:3]), ",".join(texts[3:])
     found = [vector for text in texts for vector in _vectors(text)]
-    if len(found) != 2:
-        raise click.UsageError(f"two vectors are wanted, V1 and V2, of three numbers each; found {len(found)}")
+    refuse(len(found) != 2, f"two vectors are wanted, V1 and V2, of three numbers each; found {len(found)}")
     return found[0], found[1]
 
 
@@ -62,8 +58,6 @@ def _vectors(text: str) -> list[Vector]:
     from frametool.stream.row_layout import VECTOR
 
     request = Request(Operation(moves=True), kind=VECTOR)
-    try:
+    with inline_misuse():
         read = documents(pose_source(text, request), request)
         return [record.shape.position(record.values) for _, records in read for record in records]
-    except FormatError as error:
-        raise usage_if_inline(error) from None

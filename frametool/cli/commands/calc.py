@@ -12,7 +12,7 @@ from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import Line, mentions_row, walk
 from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
-from frametool.cli.command import Command, Inputs, argument, command_named, option
+from frametool.cli.command import Command, Inputs, argument, command_named, option, refuse
 from frametool.cli.options import (
     ColumnNames,
     reading_options,
@@ -122,8 +122,7 @@ def _results(lines: Sequence[Line], scope: Scope) -> Iterator[Term]:
 
 def _without_expression(stream: Stream, output: Output, scope: Scope) -> int:
     """Read expressions from a pipe, one a line, or talk at a terminal."""
-    if stream.path is not None:
-        raise click.UsageError("-i FILE needs an expression over row")
+    refuse(stream.path is not None, "-i FILE needs an expression over row")
     if sys.stdin is not None and sys.stdin.isatty():
         return talk(scope, output)
     return calculate_lines(stream, output, scope)
@@ -136,8 +135,7 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
     marked = [line for line, is_option in zip(lines, flags, strict=True) if is_option or not line.name]
     results = marked or [lines[-1]]
     names = [line.name for line in results]
-    if len(names) > 1 and not all(names):
-        raise click.UsageError("rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
+    refuse(len(names) > 1 and not all(names), "rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
     if twice := next((name for name in names if name and names.count(name) > 1), ""):
         raise click.UsageError(f"-e {twice}= is given twice")
     bindings = [line for line in lines if line not in results]

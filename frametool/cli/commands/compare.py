@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import OPTIONAL, Inputs, argument, command_named, option
+from frametool.cli.command import OPTIONAL, Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
 from frametool.cli.options import list_options, reading_options
 from frametool.cli.output import Output
@@ -74,8 +74,7 @@ def command(inputs: Inputs) -> int:
     instead = path if path and told is None and _form_of(path) else None
     for name in filter(None, (report, instead)):
         refuse_existing(name, force=inputs.force)
-    if instead and rows:
-        raise click.UsageError("--rows are CSV or JSON, no picture; write them with -f, or leave them out")
+    refuse(instead and rows, "--rows are CSV or JSON, no picture; write them with -f, or leave them out")
     if len(est) > 1 and "svg" in (_form_of(report or ""), _form_of(instead or "")):
         raise click.UsageError("an SVG shows one comparison; write .html for several")
     if explain and (rows or instead or told not in (None, "text")):

@@ -35,10 +35,7 @@ def command(inputs: Inputs) -> int:
     """
     task, poses = PoseTask(inputs), inputs.poses
     if task.derives:
-        plan = task.plan()
-        from frametool.explain import derive
-
-        return task.write(derive.compose(plan, *map(task.written, poses)))
+        return task.derive("compose", *map(task.written, poses))
     if task.stream.path and not any(without_inverse(each)[0] == "-" for each in poses):
         raise click.UsageError("-i FILE is read where - stands among the poses")
     from frametool.stream.request import Operation

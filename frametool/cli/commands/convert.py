@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Command, Inputs, argument, command_named, option
+from frametool.cli.command import Command, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
 from frametool.cli.options import (
     AxesName,
@@ -84,9 +84,11 @@ def command(inputs: Inputs) -> int:
     stream, output = task.stream, task.output
     axes, world = inputs.axes, inputs.world
     if inputs.all_axes is not None:
-        world, axes = _both_sides_of(inputs.all_axes)
+        from frametool.geometry.conventions import sides_of
+
+        with misuse("--all-axes: "):
+            world, axes = sides_of(inputs.all_axes)
     if task.derives:
-        task.plan()
         one_argument(values[0] if values else axes or world)
     from frametool.stream.request import Operation
 
@@ -103,8 +105,7 @@ def command(inputs: Inputs) -> int:
         values, is_numbers = (mapping_of(values, request.given_place),), False
     bare, is_inverse = without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
     if bare == "-" or (bare and not stream.path and task.has_table(bare)):
-        if task.derives:
-            raise click.UsageError(f"{values[0]} is a stream; {ONE_RECORD}")
+        refuse(task.derives, f"{values[0]} is a stream; {ONE_RECORD}")
         values, request = ("-",), request.of_inverses() if is_inverse else request
     is_alone = operation.turns and not values and (task.derives or not stream.has_input())
     if values == ("-",) or not (values or is_alone):
@@ -125,23 +126,15 @@ def command(inputs: Inputs) -> int:
     if inputs.find is not None:
         output.style = _found(poses, inputs.find, inputs.tolerance, output.style)
     if task.derives:
-        if len(poses) != 1:
-            raise click.UsageError(f"--explain derives one pose, found {len(results)}")
+        refuse(len(poses) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
             own = (values, request.given) if values else (list(map(repr, poses[0].components[3:])), notation("xyzw"))
             sources = [source_from_numbers(*own)]
-        return _derived(task, sources[0], poses[0], _named_change(axes, world, operation) if values else None)
+        change = _named_change(axes, world, operation) if values else None
+        return task.derive("convert", task.written(sources[0], warned=True), own=poses[0], change=change)
     output.values(results)
     output.tell_of_lock(poses)
     return 0
-
-
-def _derived(task: PoseTask, source: str | Source, pose: Pose, change: OtherAxes | None) -> int:
-    """Write the derivation of one pose."""
-    from frametool.explain import derive
-
-    written = task.written(source, warned=True)
-    return task.write(derive.convert(task.plan(), written, own=pose, change=change))
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
@@ -164,12 +157,9 @@ def _found(poses: Sequence[Pose], find: str, tolerance: float, style: Style) -> 
 
     if len(poses) != 1 or poses[0].rotation is None:
         raise click.UsageError("--find is about one rotation")
-    try:
+    with misuse("--find: "):
         read = [parse_angle(text) for text in find.split(",")]
-    except ValueInvalid as error:
-        raise click.UsageError(f"--find: {error}") from None
-    if len(read) != 3:
-        raise click.UsageError(f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
+    refuse(len(read) != 3, f"--find takes three angles like 0.1,0,pi/2; found {len(read)}")
     degrees = style.degrees
     angles = [radians(angle) if unit == "deg" or (degrees and unit is None) else angle for angle, unit in read]
     axes = find_euler(Rotation.of(*poses[0].rotation), angles, tolerance=tolerance)
@@ -183,25 +173,13 @@ def _changed(pose: Pose, operation: Operation) -> Pose:
     return Pose(position, components[3:7], pose.name, pose.parent)
 
 
-def _both_sides_of(text: str) -> tuple[str, str]:
-    """Return --world-axes and --axes that --all-axes means."""
-    from frametool.geometry.conventions import sides_of
-
-    try:
-        return sides_of(text)
-    except ValueInvalid as error:
-        raise click.UsageError(f"--all-axes: {error}") from None
-
-
 def _change_of_axes(axes: str | None, world: str | None) -> Operation:
     """Return the operation that --axes and --world-axes name."""
     from frametool.geometry.conventions import both_sides
     from frametool.stream.request import Operation
 
-    try:
+    with misuse():
         left, mirrors, right = both_sides(world, axes)
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
     before = (0.0, 0.0, 0.0, *left.components) if left is not None else None
     behind = ((0.0, 0.0, 0.0, *right.components),) if right is not None else ()
     return Operation(before, behind, turns=True, mirrors=mirrors)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.options import LIMIT, Skipped, result_options, rules, tree_options
 from frametool.cli.output import Output
 from frametool.cli.trees import FRAME, frame_name, load_tree
@@ -51,8 +51,7 @@ def command(inputs: Inputs) -> int:
     `ros2 topic echo /tf` printed (help recordings).
     """
     target, source, start, stop, limit = inputs.target, inputs.source, inputs.start, inputs.stop, inputs.limit
-    if start is not None and stop is not None and start > stop:
-        raise click.UsageError("--start is after --stop")
+    refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
     out.check_target(target)
     if out.style.place is not None and out.style.form == "text":

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from os.path import splitext
+from typing import TYPE_CHECKING
 
-import click
-
-from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option
+from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.sink import refuse_existing, writing
 from frametool.errors import FileProblem, nearest, printable, shown
+
+if TYPE_CHECKING:
+    import click
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
 
@@ -76,8 +78,7 @@ def command(inputs: Inputs) -> None:
         with writing(None) as write:
             write(example(name) if name else "".join(f"{each}\n" for each in names()))
         return
-    if name is None and output == "-":
-        raise click.UsageError("--output - prints one example; name it, or a folder for all")
+    refuse(name is None and output == "-", "--output - prints one example; name it, or a folder for all")
     if name is None or os.path.isdir(output):
         targets = {each: os.path.join(output, each) for each in ([name] if name else names())}
         try:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
-from frametool.cli.command import FILE, Inputs, argument, command_named
+from frametool.cli.command import FILE, Inputs, argument, command_named, refuse
 from frametool.cli.options import (
     STREAMED,
     reading_options,
@@ -62,8 +60,7 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     inputs, name = stream.inputs, stream.path or "stdin"
     begin = stream.opened().peek()
     form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
-    if holds_arrays(form):
-        raise click.UsageError(f"rows of joints are a table of text, records or messages, not {form}")
+    refuse(holds_arrays(form), f"rows of joints are a table of text, records or messages, not {form}")
     names = names_in(begin, form, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
     file.tally.about = f"{len(rows.columns)} of {len(rows.joints)} joints from the rows"

@@ -21,6 +21,7 @@ from frametool.cli.command import (
     option,
     option_groups,
     option_row,
+    refuse,
     show_help,
     write_options,
 )
@@ -98,8 +99,7 @@ def cookbook(words: tuple[str, ...]) -> str:
     inside = [each for each in known if each not in asked and holds(f"{each} {known[each]}")]
     if not asked:
         asked, inside = inside[:3], inside[3:]
-    if not asked:
-        raise click.UsageError(f"no question has {shown(' '.join(words))}; `frametool help cookbook` lists all")
+    refuse(not asked, f"no question has {shown(' '.join(words))}; `frametool help cookbook` lists all")
     answers = "".join(f"{each}\n\n{known[each]}\n\n" for each in asked)
     files = "The files: `frametool examples -o examples` copies them into a folder `examples`.\n"
     return answers + _joined({_titles("Also in", inside): inside, files: True})

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named
+from frametool.cli.command import Inputs, argument, command_named, refuse
 from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.options import pose_result_options
 from frametool.cli.poses import combinations
@@ -54,12 +52,8 @@ def command(inputs: Inputs) -> int:
     """
     task, asked = PoseTask(inputs), [each for some in inputs.fractions for each in some]
     if task.derives:
-        plan = task.plan()
-        if len(asked) != 1:
-            raise click.UsageError(f"--explain derives one fraction, found {len(asked)}")
-        from frametool.explain import derive
-
-        return task.write(derive.interpolate(plan, task.written(inputs.a), task.written(inputs.b), asked[0]))
+        refuse(len(asked) != 1, f"--explain derives one fraction, found {len(asked)}")
+        return task.derive("interpolate", task.written(inputs.a), task.written(inputs.b), asked[0])
     pairs = combinations((inputs.a, inputs.b), task.request())
     if any(pose.covariance for pair in pairs for pose in pair):
         warn(LEFT_OUT.format("interpolate"))

@@ -25,9 +25,7 @@ def command(inputs: Inputs) -> int:
     """
     task = PoseTask(inputs)
     if task.derives:
-        from frametool.explain import derive
-
-        return task.write(derive.invert(task.plan(), task.written(inputs.pose)))
+        return task.derive("invert", task.written(inputs.pose))
     from frametool.stream.request import Operation
 
     operation = Operation(inverse=True, similar=True, multiples=inputs.scale)

@@ -1,16 +1,16 @@
-"""`frametool lookup`: where one frame is seen from another, and when."""
+"""`frametool lookup`: where one frame is seen from another, and when; also for every row of a table."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
 from frametool.cli.explaining import EXPLAIN, PoseTask
-from frametool.cli.lookup_rows import RowFrames, column_options
 from frametool.cli.options import (
     TIME,
+    ColumnNames,
     Skipped,
     at_ns,
     limit_options,
@@ -24,20 +24,28 @@ from frametool.cli.options import (
     window_of,
 )
 from frametool.cli.streaming import stream_options
-from frametool.cli.trees import FRAME, CarriedSigmas, frame_name, load_tree, tell_unused_sigmas
-from frametool.errors import NoDataAt
+from frametool.cli.trees import FRAME, Lookups, frame_name, load_tree
+from frametool.errors import NoDataAt, UnknownFrame
 from frametool.formats.table import holds_arrays
+from frametool.geometry.representations import notation
+from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar.edges import stop
-from frametool.grammar.pose_algebra import looked_up, looked_up_across, looked_up_many, sample_stamps, why_missing
+from frametool.grammar.pose_algebra import looked_up_across, looked_up_many, sample_stamps, why_missing
 from frametool.stream.faults import NULL, SKIP
 
 if TYPE_CHECKING:
-
+    from frametool.cli.command import Adds
     from frametool.cli.output import Output
-    from frametool.frames.lookups import Frames
-
+    from frametool.geometry.types import Components
 
 WITH_COVARIANCE = ("json", "yaml", "csv")
+MANY = ("times", "start", "stop")
+
+
+def _column_option(end: str, *excludes: str) -> Adds:
+    about, under = f"column of a table with each row's {end}", "Time" if end == "time" else "Rows"
+    excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
+    return option(f"--{end.lower()}-column NAME", about, ColumnNames(), excludes=excluded, under=under)
 
 
 @command_named("lookup", own=("times", "notations"))
@@ -45,11 +53,10 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @argument("target", FRAME, required=False, metavar="TARGET")
 @argument("source", FRAME, required=False, metavar="SOURCE")
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
-@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", TIME, excludes=("times", "start", "stop"))
-@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", TIME,
-    excludes=("times", "start", "stop"), requires=("fixed",))  # fmt: skip
-@option("--fixed FRAME", "what stands still between the two times: map", FRAME, excludes=("times", "start", "stop"),
-    requires=("source_at",))  # fmt: skip
+@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", TIME, excludes=MANY)
+@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", TIME, requires=("fixed",),
+        excludes=MANY)  # fmt: skip
+@option("--fixed FRAME", "what stands still between the two times: map", FRAME, excludes=MANY, requires=("source_at",))
 @option("--covariance", "how sure it is, by the edges' sigmas (help covariance)", excludes=("explain", "fixed"))
 @times_option
 @limit_options
@@ -59,7 +66,7 @@ WITH_COVARIANCE = ("json", "yaml", "csv")
 @whole_pose_options
 @result_options("poses")
 @EXPLAIN
-@column_options
+@together(_column_option("TARGET"), _column_option("SOURCE"), _column_option("time", "at"))
 def command(inputs: Inputs) -> int:
     """Print the pose of SOURCE in TARGET, which maps points in SOURCE to TARGET.
 
@@ -71,44 +78,39 @@ def command(inputs: Inputs) -> int:
     TREE is a file, -, or . for FRAMETOOL_TREE's (help time).
     Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
-    window = window_of(inputs)
-    by_row, task = RowFrames(inputs), PoseTask(inputs)
+    window, task = window_of(inputs), PoseTask(inputs)
+    columns = inputs.target_column, inputs.source_column
     output, target, source = task.output, inputs.target, inputs.source
-    plan = task.plan() if task.derives else None
-    if not by_row and (target is None or source is None):
+    by_row = {*columns, inputs.time_column} != {None}
+    if not by_row and source is None:
         raise click.UsageError(f"missing argument '{'TARGET' if target is None else 'SOURCE'}'")
-    if target is not None and not (by_row and by_row.target is not None):
+    if target is not None and columns[0] is None:
         output.check_target(target)
-    covariance = plan is None and inputs.covariance
+    covariance = not task.derives and inputs.covariance
     if covariance:
-        _check_covariance(output, by_row=bool(by_row))
-    frames = load_tree(inputs.tree, inputs.more, rules(inputs), streams=bool(by_row))
-    sigmas = CarriedSigmas(frames) if covariance else None
-    if sigmas is None:
-        tell_unused_sigmas(frames)
-    if by_row or target is None or source is None:
-        at = None if by_row.time else at_ns(inputs.at)
-        return by_row.run(task, frames, target, source, at, sigmas, window)
-    target, source = frame_name(target, frames), frame_name(source, frames)
-    at, source_at, fixed = at_ns(inputs.at), at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, frames)
-    if plan is not None:
-        from frametool.explain import derive
-
-        return task.write(derive.lookup(plan, frames, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed))
-    output.take_axes_in(frames, source)
+        _check_covariance(output, by_row=by_row)
+    tree = load_tree(inputs.tree, inputs.more, rules(inputs), streams=by_row)
+    lookups, at = Lookups(tree, carried=covariance), at_ns(inputs.at)
+    if by_row:
+        status = _by_row(task, lookups, target, source, window)
+        lookups.tell()
+        return status
+    target, source = frame_name(target, tree), frame_name(source, tree)
+    source_at, fixed = at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
+    if task.derives:
+        return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
+    output.take_axes_in(tree, source)
     output.mark_frames(target, source)
-    every = output.holds_all or window is not None
-    every = every and inputs.at is None and fixed is None and frames.latest(target, source) is not None
+    status, every = 0, output.holds_all or window is not None
+    every = every and inputs.at is None and fixed is None and tree.latest(target, source) is not None
     if inputs.times is not None or every:
-        return _many(output, frames, target, source, inputs, sigmas, window)
-    if fixed is not None:
-        output.poses([looked_up_across(frames, target, at, source, source_at, fixed)])
+        status = _many(task, lookups, target, source, window)
+    elif fixed is not None:
+        output.poses([looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
-        result = looked_up(frames, target, source, at, covariance=covariance)
-        output.poses([result if sigmas is None else sigmas.noted(result)])
-    if sigmas is not None:
-        sigmas.tell()
-    return 0
+        output.poses([lookups.result(target, source, at)])
+    lookups.tell()
+    return status
 
 
 def _check_covariance(output: Output, *, by_row: bool) -> None:
@@ -121,16 +123,14 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 
 
-def _many(
-    output: Output, frames: Frames, target: str, source: str, inputs: Inputs, sigmas: CarriedSigmas | None,
-    window: tuple[int, int] | None,
-) -> int:  # fmt: skip
+def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tuple[int, int] | None) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip others are left out, and told."""
-    times, skipped = inputs.times, Skipped(in_json=output.told == "json")
+    inputs, tree = task.inputs, lookups.tree
+    times, skipped = inputs.times, Skipped(in_json=task.output.told == "json")
     skip = times is not None and inputs.on_error == SKIP
     if times is not None and inputs.on_error == NULL:
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    asked = sample_stamps(frames, target, source) if times is None else read_times(times, skipped.add if skip else stop)
+    asked = sample_stamps(tree, target, source) if times is None else read_times(times, skipped.add if skip else stop)
     if window is not None:
         inputs.ask("start", "stop")
         asked = [stamp for stamp in asked if window[0] <= stamp <= window[1]]
@@ -138,11 +138,50 @@ def _many(
             raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")
 
     def miss(at_ns: int) -> None:
-        skipped.add(None if skipped.is_full else why_missing(frames, target, source, at_ns))
+        skipped.add(None if skipped.is_full else why_missing(tree, target, source, at_ns))
 
-    carried = sigmas is not None
-    results = looked_up_many(frames, target, source, asked, miss=miss if skip else None, covariance=carried)
-    output.poses_as_they_come(skipped.counted(results if sigmas is None else map(sigmas.noted, results)))
-    if sigmas is not None:
-        sigmas.tell()
+    found = looked_up_many(tree, target, source, asked, miss=miss if skip else None, covariance=lookups.carried)
+    task.output.poses_as_they_come(skipped.counted(map(lookups.noted, found)))
     return skipped.finish()
+
+
+def _by_row(
+    task: PoseTask, lookups: Lookups, target: str | None, source: str | None, window: tuple[int, int] | None
+) -> int:
+    """Add the pose of SOURCE in TARGET to every row; a frame named on the command line is every row's."""
+    from frametool.stream.request import Operation
+    from frametool.stream.stamp_source import Timed
+
+    inputs, tree, place = task.inputs, lookups.tree, task.output.style.place
+    columns = inputs.target_column, inputs.source_column
+    if columns[0] is not None and source is None:
+        target, source = None, target
+    for name, column, called in ((target, columns[0], "TARGET"), (source, columns[1], "SOURCE")):
+        refuse((name is None) == (column is None), f"name {called} or its column, one of the two")
+    fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
+    frames, at = tuple(each for each in columns if each is not None), None if inputs.time_column else at_ns(inputs.at)
+
+    def ends_of(names: str | None) -> tuple[str, str]:
+        cells = (names or "").split("\0") if len(frames) == 2 else [names or ""]
+        if len(cells) > max(len(frames), 1):
+            raise UnknownFrame(names or "", known=tree.frames)  # a NUL in a cell is no end of a name
+        return fixed_target or cells[0], fixed_source or cells[-1]
+
+    def edge_of(names: str | None, own: int | None = at) -> Components:
+        ends = ends_of(names)
+        if place is not None:
+            from frametool.grammar.place import check_in_ecef
+
+            check_in_ecef(ends[0], place)
+        return lookups.one(*ends, own)
+
+    def many(names: str | None, times_ns: Any) -> Components:
+        return lookups.many(*ends_of(names), times_ns)
+
+    width = UNCERTAIN if lookups.carried else EXACT
+    timed = None if inputs.time_column is None else Timed(inputs.time_column, many, edge_of, width=width)
+    request = task.request(
+        poses=0, frames=frames, pose_of_row_frame=edge_of, notations=task.output.notations or (notation("quaternion"),),
+        operation=Operation(uncertain=lookups.carried), timed=timed, window=window,
+    )  # fmt: skip
+    return task.stream.run(request, task.output, tables_only=True)

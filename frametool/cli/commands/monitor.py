@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.options import file_options, offset_option, result_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say, say_error
@@ -45,8 +43,7 @@ def command(inputs: Inputs) -> int:
     than 0.1 m or 0.2 rad.
     """
     frames = inputs.frames
-    if len(frames) not in (0, 2):
-        raise click.UsageError(f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
+    refuse(len(frames) not in (0, 2), f"name TARGET and SOURCE, or neither; found {len(frames)} frames")
     output = Output(inputs, "report")
     files = opened((inputs.recording, *inputs.more))
     clashes: list[FormatError] = []

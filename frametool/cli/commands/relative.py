@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import EXPLAIN, PoseTask, one_argument, pose_stream_options
 from frametool.cli.options import ColumnNames, limit_options, pose_result_options, window_of
 from frametool.cli.poses import rows_among, without_inverse
@@ -43,18 +41,13 @@ def command(inputs: Inputs) -> int:
     """
     window, task, a, b = window_of(inputs), PoseTask(inputs), inputs.a, inputs.b
     if task.derives:
-        plan = task.plan()
-        from frametool.explain import derive
-
-        arguments = [one_argument(each) for each in (a, b)]
-        return task.write(derive.relative(plan, *map(task.written, arguments)))
+        return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
     from frametool.stream.request import PREVIOUS, START, Operation
 
     given = [each for each in (a, b) if each is not None]
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
-        if len(given) > 1:
-            raise click.UsageError("rows are compared with one of themselves; leave A and B out")
+        refuse(len(given) > 1, "rows are compared with one of themselves; leave A and B out")
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if inputs.consecutive else START, velocity=velocity)
         beside = (inputs.time_column or "") if velocity or window else None
@@ -66,14 +59,11 @@ def command(inputs: Inputs) -> int:
             say("note: the first pose has none before it, so no velocity: it is left out, results begin at the second")
         return status
     if b is None:
-        if a not in (None, "-"):
-            raise click.UsageError("name A and B; one of them may be - for standard input")
+        refuse(a not in (None, "-"), "name A and B; one of them may be - for standard input")
         return task.answer("-", task.request(operation=Operation(of="pair"), poses=2, window=window))
     bare = [without_inverse(each)[0] for each in given]
-    if bare == ["-", "-"]:
-        raise click.UsageError("standard input can be read once; leave A and B out to compare two poses of each row")
-    if task.stream.path and "-" not in bare:
-        raise click.UsageError("-i FILE is read where - stands for A or B")
+    refuse(bare == ["-", "-"], "standard input can be read once; leave A and B out to compare two poses of each row")
+    refuse(task.stream.path and "-" not in bare, "-i FILE is read where - stands for A or B")
     request = task.request(window=window)
     rows = rows_among(given, request, task.has_table)
     fixed = [*rows.before, *rows.behind][0]

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import forms_of, parse_every, read_span, trajectory, trajectory_options, write_trajectory
 from frametool.cli.options import offset_option, read_times, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
@@ -45,10 +43,8 @@ def command(inputs: Inputs) -> int:
     --max-gap apart; how many moments have none is told.
     """
     path, rate, times, every = inputs.path, inputs.rate, inputs.times, inputs.every
-    if sum(each is not None for each in (rate, times, every)) != 1:
-        raise click.UsageError("give one of --rate, --at and --every")
-    if rate is not None and rate <= 0:
-        raise click.UsageError("--rate is more than 0")
+    refuse(sum(each is not None for each in (rate, times, every)) != 1, "give one of --rate, --at and --every")
+    refuse(rate is not None and rate <= 0, "--rate is more than 0")
     output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
     found, name, skipped = trajectory(path, inputs.on_error, forms_of(1)[0])
     from frametool.fit.pairs import resampled, stamps_at_rate, stamps_every
@@ -56,8 +52,7 @@ def command(inputs: Inputs) -> int:
     found = _in_order(found, name)
     counted = found.stamps_ns is None
     if counted:
-        if every is None:
-            raise click.UsageError(f"{name} has no stamps; give them with --stamps FILE")
+        refuse(every is None, f"{name} has no stamps; give them with --stamps FILE")
         found = found.numbered()
     stamps = stamps_at_rate(found, rate) if rate else stamps_every(found, every) if every else _stamps(times or "")
     made = resampled(found, stamps, inputs.max_gap_ns)
@@ -77,8 +72,7 @@ def _stamps(text: str) -> Any:
         found, name, _ = trajectory(text, "stop")
     except (FormatError, FileProblem):
         return np.array(read_times(text, stop), np.int64)
-    if found.stamps_ns is None:
-        raise click.UsageError(f"--at {text}: the poses there have no stamps")
+    refuse(found.stamps_ns is None, f"--at {text}: the poses there have no stamps")
     return _in_order(found, name).stamps_ns
 
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, option
+from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse
 from frametool.cli.commands import Group
 from frametool.cli.explaining import explain_option, significant
-from frametool.cli.poses import source_of, usage_if_inline
+from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import clean_up
 from frametool.cli.sim_output import (
     LEADER,
@@ -25,7 +25,6 @@ from frametool.cli.sim_output import (
 )
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
-from frametool.errors import FormatError, ValueInvalid
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.sim.drivers import HEADINGS, KEYS, FollowController, Heading, Mailbox
@@ -97,16 +96,15 @@ def follow(inputs: Inputs) -> None:
     if inputs.explain_step is not None:
         _explain(inputs)
         return
-    output, scene = output_and_scene(inputs, leader_in(inputs))
-    output.run(scene)
+    leader = leader_of(inputs)
+    SimOutput.of(inputs).run(scene_of(inputs, leader))
 
 
 def _explain(inputs: Inputs) -> None:
     """Write the derivation of one control step of the followers."""
-    scene = scene_of(inputs, leader_in(inputs))
+    scene = scene_of(inputs, leader_of(inputs))
     form = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
-    if form not in (None, "text"):
-        raise click.UsageError(f"--explain-step derives one step in words; leave the format {form} out")
+    refuse(form not in (None, "text"), f"--explain-step derives one step in words; leave the format {form} out")
     from frametool.explain.derive import DerivationStyle, derive_follow
     from frametool.sim.followed import follow_steps
 
@@ -114,17 +112,6 @@ def _explain(inputs: Inputs) -> None:
     text = derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text")
     with writing(inputs.output, force=bool(inputs.force)) as write:
         write(text)
-
-
-def leader_in(inputs: Inputs) -> MakeLeader:
-    """Return the leader that the options name."""
-    with misuse():
-        return leader_of(inputs.leader, inputs.seed, paced=inputs.realtime or inputs.live)
-
-
-def output_and_scene(inputs: Inputs, leader: MakeLeader, *, leaders: bool = False) -> tuple[SimOutput, Scene]:
-    """Return the output and the scene that the options describe."""
-    return SimOutput.of(inputs, leaders=leaders), scene_of(inputs, leader)
 
 
 def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
@@ -135,15 +122,6 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
     with misuse():
         law = FollowController(inputs.law, **{name: getattr(inputs, name) for name in LAW_OPTIONS})
         return tutorial(leader=leader, law=law, **chosen)
-
-
-@contextmanager
-def misuse() -> Iterator[None]:
-    """Turn values that cannot be into usage errors."""
-    try:
-        yield
-    except ValueInvalid as error:
-        raise click.UsageError(str(error)) from None
 
 
 @command.command("run", cls=Command)
@@ -171,10 +149,8 @@ def run(inputs: Inputs) -> None:
     spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
     """
     output, duration = SimOutput.of(inputs), inputs.duration
-    try:
+    with inline_misuse():
         read = read_scene(source_of(inputs.scene), seed=inputs.seed)
-    except FormatError as error:
-        raise usage_if_inline(error) from None
     chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
     if late := chosen.late_calls():
         end = f"{(chosen.duration_ns or 0) / BILLION:g} s"
@@ -202,10 +178,9 @@ def teleop(inputs: Inputs) -> None:
     Each key moves for a second: 2 m/s ahead or back, 2 rad/s to the left or right. With --turtlesim ros2 the keys
     g t r e d c v b around f turn to a heading. When stdout is no terminal, every command goes there.
     """
-    if sys.stdin is None or not sys.stdin.isatty():
-        raise click.UsageError(f"standard input is no terminal; {INSTEAD}")
+    refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {INSTEAD}")
     mailbox = Mailbox()
-    output, scene = output_and_scene(inputs.but(live=True), lambda: mailbox, leaders=True)
+    output, scene = SimOutput.of(inputs.but(live=True), leaders=True), scene_of(inputs, lambda: mailbox)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
 

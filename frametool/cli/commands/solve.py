@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import read_span
 from frametool.cli.options import reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
@@ -78,8 +78,7 @@ def command(inputs: Inputs) -> int:
     hand_eye, points, files = inputs.hand_eye, inputs.points, inputs.files
     _refuse_misuse(files, "--hand-eye" if hand_eye else "--points" if points else "", inputs.peek("names"))
     report, path, force = inputs.report, inputs.output, inputs.force
-    if report and path and realpath(report) == realpath(path):
-        raise click.UsageError("--report and -o name one file")
+    refuse(report and path and realpath(report) == realpath(path), "--report and -o name one file")
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
     output = Output(inputs, "tree", "trajectory")
@@ -121,8 +120,7 @@ def _refuse_misuse(files: Sequence[str], shape: str, names: Sequence[str] | None
     refuse_two_readers(files)
     if shape == "--hand-eye" and len(files) > 2:
         raise click.UsageError(f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {len(files)} files")
-    if shape == "--points" and len(files) != 2:
-        raise click.UsageError(f"--points takes two files, A B, found {len(files)}")
+    refuse(shape == "--points" and len(files) != 2, f"--points takes two files, A B, found {len(files)}")
     if names and len(names) != (wanted := 4 if shape == "--hand-eye" else 2):
         said = "four names, BASE,GRIPPER,CAMERA,TARGET" if wanted == 4 else "two names, A,B"
         raise click.UsageError(f"--names takes {said}")

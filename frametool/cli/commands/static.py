@@ -6,9 +6,7 @@ import os
 import re
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from frametool.cli.command import Inputs, argument, command_named, option, together
+from frametool.cli.command import Inputs, argument, command_named, option, refuse, together
 from frametool.cli.options import pose_result_options, reading_options
 from frametool.cli.output import Output
 from frametool.cli.poses import misuse_unless_rotations
@@ -68,7 +66,6 @@ def command(inputs: Inputs) -> None:
 
 def _pose(arguments: Sequence[str], flags: dict[str, str], reading: Reading) -> Pose:
     """Read the arguments of one call."""
-    if flags and arguments:
-        raise click.UsageError(f"extra arguments {shown(' '.join(arguments))} beside the flags")
+    refuse(flags and arguments, f"extra arguments {shown(' '.join(arguments))} beside the flags")
     with misuse_unless_rotations(reading):
         return read_flags(flags, reading) if flags else read_positional(arguments, reading)

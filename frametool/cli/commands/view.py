@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
 from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
@@ -79,10 +79,8 @@ def command(inputs: Inputs) -> None:
     overlay, sliders, eye = inputs.overlay, inputs.sliders, inputs.peek("eye")
     if chosen != "glb":  # which is seen from all sides
         inputs.ask("eye")
-    if overlay and (source or not target):
-        raise click.UsageError("--overlay takes two trees: frametool view AFTER BEFORE --overlay")
-    if inputs.path_only and not (target and source):
-        raise click.UsageError("--path draws the way between TARGET and SOURCE; name both")
+    refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
+    refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
     if sliders and (chosen != "html" or tree == "-"):
         raise click.UsageError("--sliders move the joints of a robot on a page: give a file, and -o FILE.html")
     frames = load_tree(tree, inputs.more, rules(inputs))
@@ -124,8 +122,7 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
     chosen = form or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
         raise click.UsageError(f"no form has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
-    if opens and (chosen != "html" or output == "-"):
-        raise click.UsageError("--open shows a page: give -o FILE.html, or no -o")
+    refuse(opens and (chosen != "html" or output == "-"), "--open shows a page: give -o FILE.html, or no -o")
     return chosen or "text"
 
 
