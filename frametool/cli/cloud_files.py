@@ -36,6 +36,8 @@ PLACES: dict[str, Callable[[PointCloud], str]] = {
     "frame": lambda cloud: cloud.frame,
 }  # {NAME} in -o -> what stands there
 _HEAD = 64
+BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
+_MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 
 
 class BagOfClouds:
@@ -218,12 +220,8 @@ def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:
 
 def is_bag(path: str) -> bool:
     """Tell a bag by its first bytes, or as a folder."""
-    bags = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
     if not os.path.isfile(path):
-        return of_folder(path) in bags
+        return of_folder(path) in BAGS
     with open(path, "rb") as file:
         head = file.read(_HEAD)
-    if not head:
-        return by_suffix(path, bags) is not None
-    magics: list[Any] = [what for name in bags for kind, what in FORMATS[name].magic if kind == "magic"]
-    return any(re.match(magic, head, re.DOTALL) for magic in magics)
+    return re.match(b"|".join(_MAGICS), head, re.DOTALL) is not None if head else by_suffix(path, BAGS) is not None
