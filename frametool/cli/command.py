@@ -15,7 +15,7 @@ import click
 
 from frametool.cli.sink import checked_by, writing
 from frametool.cli.stderr import say
-from frametool.errors import ValueInvalid
+from frametool.errors import FormatError, ValueInvalid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -412,8 +412,12 @@ class Command(WithHelp):
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
         given = ctx.meta[INPUTS] = Inputs.of(ctx)
-        with checked_by(given.refuse_idle):
-            result = ctx.invoke(self.callback or (lambda _: 0), given)
+        try:
+            with checked_by(given.refuse_idle):
+                result = ctx.invoke(self.callback or (lambda _: 0), given)
+        except FormatError as error:
+            error.message = _without_others(error.message, self)
+            raise
         given.refuse_idle()
         _say_not_needed(given)
         return result
@@ -422,6 +426,13 @@ class Command(WithHelp):
         """End every help with the exit codes, those of most commands unless its epilog says others."""
         formatter.write_paragraph()
         formatter.write_text(self.epilog or EXIT_CODES)
+
+
+def _without_others(message: str, command: click.Command) -> str:
+    """Leave out the advice at the end of a message to give an option that the command does not have."""
+    found = re.search(r"; (?:give|name them with) (--[\w-]+)$", message)
+    has = {name for each in command.params for name in each.opts}
+    return message if found is None or found[1] in has else message[: found.start()]
 
 
 # options that may stand bare, and their values: the first is what they mean then

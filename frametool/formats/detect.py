@@ -110,7 +110,7 @@ class Beginning:
     @cached_property
     def yaml_inner_keys(self) -> set[str]:
         """Return the words behind the blanks or dashes of a line, and a brace, that a colon follows."""
-        return {found[2] for found in re.finditer(rf"(?m)^(?:[ -]+|[\w./-]+: *(?=\{{))\{{? *{_YAML_KEY}", self.text)}
+        return {found[2] for found in re.finditer(rf"(?m)^(?:[ -]++|[\w./-]+: *(?=\{{))\{{?+ *+{_YAML_KEY}", self.text)}
 
     @cached_property
     def leaves(self) -> set[str]:
@@ -346,7 +346,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         return empty, "nothing else"
     if not begin.text.strip():
         raise FormatError("nothing in it", source=name or "stdin")
-    if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^\s*[-?&!{[]", begin.text):
+    if "records" in reads or not begin.has_data or not re.search(r"(?m):(?:\s|$)|^[^\S\n]*+[-?&!{[]", begin.text):
         raise _unknown(begin, *reads, name=name)
     return "yaml", "nothing else"
 
@@ -376,9 +376,9 @@ _KEYS = (
 _OURS = r"(?:\w*[._])?(?:q?[xyz]|qw|roll|pitch|yaw|frame|frame_id|name|parent)"
 # a number that is a cell or a value, one at the beginning of a line, a key of ours, a list or map, a header
 _DATA = "(?im)" + "|".join((
-    rf"[,;\t:{{][ \t]*{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
-    rf"^[ \t]*(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
-    rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*(?:\{{|\[(?![a-z ]+\]))""",
+    rf"[,;\t:{{][ \t]*+{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
+    rf"^[ \t]*+(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
+    rf"""(?:^|[\s{{,-])["']?(?:{_KEYS})["']?:(?:\s|$)|^[-\s]*+(?:\{{|\[(?![a-z ]+\]))""",
     rf"""\A[# ]*x +y\b|\A[#%" ]*(?:[^\n]*[,;\t] *)?["']?{_OURS}["']?\s*(?:[,;\t(\[]|$)""",
 ))  # fmt: skip
 _MOST_NAMED = 8

@@ -102,7 +102,7 @@ def _undecorated(text: str) -> str:
 
 def unsupported_tool(text: str) -> str:
     """Name the tool that printed a text, where its prints are recognised and not read; else return ""."""
-    found = (tool for begin, tool in _UNSUPPORTED if re.match(rf"\s*(?:{LABEL})?\s*(?:{begin})", text))
+    found = (tool for begin, tool in _UNSUPPORTED if re.match(rf"\s*+(?:{LABEL})?(?:{begin})", text))
     return next(found, "")
 
 

@@ -108,19 +108,20 @@ def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[State
     except FormatError as error:
         find(error.finding)
         return
-    notes: list[Finding] = []
+    notes: dict[bool, list[Finding]] = {False: [], True: []}
     edges = []
     for document in documents:
         edges += _read_document(document, Reading(source, normalize=normalize), notes)
-    places = locate_many(source.text, [*(note.path for note in notes), *(edge.path for edge, _ in edges)])
-    for note, (line, column) in zip(notes, places, strict=False):
-        find(note._replace(source=source.name, line=line, column=column))
-    for (edge, w_first), place in zip(edges, places[len(notes) :], strict=True):
+    for key, found in notes.items():
+        places = locate_many(source.text, [each.path for each in found], key=key)
+        for note, (line, column) in zip(found, places, strict=True):
+            find(note._replace(source=source.name, line=line, column=column))
+    for (edge, w_first), place in zip(edges, locate_many(source.text, [edge.path for edge, _ in edges]), strict=True):
         yield Statement(edge.parent or "", *edge[1:4], source.name, *place, w_first)
 
 
-def _read_document(document: Document, reading: Reading, notes: list[Finding]) -> list[tuple[Edge, bool]]:
-    """Return the edges of a document, each with whether it looks written w first; collect its notes."""
+def _read_document(document: Document, reading: Reading, notes: dict[bool, list[Finding]]) -> list[tuple[Edge, bool]]:
+    """Return the edges of a document, each with whether it looks written w first; collect its notes by `Misfit.key`."""
     reading.faults = []
     edges = []
     try:
@@ -131,8 +132,10 @@ def _read_document(document: Document, reading: Reading, notes: list[Finding]) -
                 edges.append((edge._replace(path=(document.index, *edge.path)), w_first))
     except Misfit as misfit:
         reading.faults.append(misfit)
-    faults = (Finding(misfit.rule or "syntax", str(misfit), path=misfit.path) for misfit in reading.faults)
-    notes += [note._replace(path=(document.index, *note.path)) for note in (*faults, *reading.notes)]
+    for fault in reading.faults:
+        finding = Finding(fault.rule or "syntax", str(fault), path=(document.index, *fault.path))
+        notes[fault.key].append(finding)
+    notes[False] += [note._replace(path=(document.index, *note.path)) for note in reading.notes]
     return edges
 
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from frametool.text.spans import Ints
 
 POSITION = 3  # numbers
-TREE = rb"""(?m)^\s*(?:---\s*)?\{?\s*["']?(?:frames|transforms|angles)["']?\s*:"""  # keys of a tree, not of a record
+TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # of a tree
 
 
 def load_trajectory(

@@ -78,6 +78,7 @@ def test_help_of_a_command_is_its_own(run: Callable[..., Any]) -> None:
         ("extrinsics", "solve"), ("extrinsic calibration", "formats"), ("align", "trajectories"), ("hand-eye", "solve"), ("Hand Eye", "solve"),
         ("GPS", "trajectories"), ("quaternion order", "rotations"), ("umeyama", "trajectories"), ("ATE", "trajectories"), ("uncertainty", "covariance"),
         ("bags", "recordings"), ("URDF", "rotations"), ("unity", "axes"), ("gimbal", "euler"), ("wxyz", "rotations"), ("tf2_echo", "recordings"),
+        ("plot", "trajectories"), ("drift", "trajectories"),
     ],
 )  # fmt: skip
 def test_a_word_people_search_for_finds_its_topic(words: str, found: str, run: Callable[..., Any]) -> None:
@@ -86,7 +87,7 @@ def test_a_word_people_search_for_finds_its_topic(words: str, found: str, run: C
     assert f"  {found} " in done.out or f"help {found}" in " ".join(done.out.split())
 
 
-@pytest.mark.parametrize(("word", "found"), [("rotation", "rotations"), ("trajectory", "trajectories"), ("poses", "pose"), ("Covariances", "covariance"), ("error", "errors")])
+@pytest.mark.parametrize(("word", "found"), [("rotation", "rotations"), ("trajectory", "trajectories"), ("poses", "pose"), ("Covariances", "covariance"), ("error", "errors"), ("frame", "frames")])
 def test_a_subject_is_found_in_any_number_and_case(word: str, found: str, run: Callable[..., Any]) -> None:
     assert run("help", word).out == topic(found)
 

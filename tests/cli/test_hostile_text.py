@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,3 +88,13 @@ def test_what_the_system_runs_out_of_is_one_line(arguments: list[str], limit: st
     )  # fmt: skip
     assert done.returncode in (0, 5)
     assert (done.returncode, done.stderr.count(b"\n")) in ((0, 0), (5, 1)), done.stderr
+
+
+@pytest.mark.parametrize("blank", [" ", "\t", "\n", "\r\n", " \n", "- "])
+@pytest.mark.parametrize("broken", ["", '{"xyz": [1, 2, x]}', "1 2 x"])
+def test_blanks_before_something_broken_take_no_time(run: Callable[..., Outcome], blank: str, broken: str) -> None:
+    began = time.process_time()
+    for command in (["invert", "-i", "-"], ["tree", "-"]):
+        done = run(*command, stdin=broken[:5] + blank * 20_000 + broken)
+        assert (done.status, done.err.count("Traceback")) == (1, 0)
+    assert time.process_time() - began < 4

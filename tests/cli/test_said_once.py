@@ -86,3 +86,16 @@ def test_the_first_pose_has_no_velocity_which_is_told(run: Run) -> None:
     assert done.out.count("\n") == 2
     assert done.err == "frametool: note: the first pose has none before it, so no velocity: it is left out, results begin at the second\n"
     assert run("relative", "--consecutive", "--velocity", "--quiet", stdin=rows).err == ""
+
+
+@pytest.mark.parametrize(("entry", "column"), [("{xyz: [1, 2, 3], ropy: [0, 0, 0]}", 29), ('{"xyz": [1, 2, 3], "rpy": {"ro": 0}}', 39)])
+def test_tree_and_check_name_one_place_for_a_misspelt_key(run: Run, entry: str, column: int) -> None:
+    files = {"t.yaml": f"frames:\n  base:\n    lidar: {entry}\n"}
+    raised, found = run("tree", "t.yaml", files=files).err, run("check", "t.yaml").out
+    assert raised.split()[1] == found.split()[0] == f"t.yaml:3:{column}:"
+
+
+@pytest.mark.parametrize("command", [["solve"], ["tree"], ["compare", "m.csv"], ["invert", "--in", "csv", "-i"]])
+def test_no_option_is_advised_that_the_command_lacks(run: Run, command: list[str]) -> None:
+    said = run(*command, "m.csv", files={"m.csv": "1,2,3\n4,5,6\n"}).err
+    assert said == "frametool: m.csv:1: the first line holds numbers and no names" + "; give --no-header" * (command[0] == "invert") + "\n"

@@ -54,7 +54,7 @@ def _read_limits(text: str) -> list[Limit]:
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result")
 @option("--fail LIMIT,..", "end with 1 where a number passes one: ate>5cm", _read_limits,
     name="limits")  # fmt: skip
-@option("--report FILE.html|svg", "also a picture of it, in one file; -o: instead", _read_report)
+@option("--report FILE.html|svg", "also a plot of it, in one file; -o: instead", _read_report)
 @trajectory_options
 @reading_options()
 @list_options("markdown", "latex")

@@ -43,7 +43,7 @@ MANY = ("times", "start", "stop")
 
 
 def _column_option(end: str, *excludes: str) -> Adds:
-    about, under = f"column of a table with each row's {end}", "Time" if end == "time" else "Rows"
+    about, under = f"column of each row's {end} in the table of -i or stdin", "Time" if end == "time" else "Rows"
     excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
     return option(f"--{end.lower()}-column NAME", about, ColumnNames(), excludes=excluded, under=under)
 

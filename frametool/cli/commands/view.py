@@ -56,7 +56,7 @@ def _eye(text: str) -> Eye:
 @option("--open", "show the page in the browser", name="opens")
 @color_option
 def command(inputs: Inputs) -> None:
-    """Show the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
+    """Plot the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
 
     \b
       frametool view robot.yaml
