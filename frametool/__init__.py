@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from frametool.fit.api import solve_hand_eye as solve_hand_eye
     from frametool.fit.api import solve_mean as solve_mean
     from frametool.fit.api import solve_points as solve_points
+    from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
     from frametool.formats.table import FORMATS as FORMATS
@@ -79,6 +80,7 @@ _HOMES = {
     "lla_from_ecef": "frametool.earth",
     "lla_from_utm": "frametool.earth",
     "load": "frametool.formats.load",
+    "load_camera": "frametool.formats.cameras",
     "load_robot": "frametool.formats.robots.urdf",
     "load_trajectory": "frametool.stream.trajectories",
     "resample": "frametool.fit.api",

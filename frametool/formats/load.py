@@ -7,6 +7,7 @@ TransformBuffer once something moves.  The forms themselves are not known here.
 from __future__ import annotations
 
 import os
+import re
 from array import array
 from bisect import bisect_left
 from importlib import import_module
@@ -42,9 +43,10 @@ from frametool.grammar.readers import alike, more_like_it
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.frames.buffer import TransformBuffer
+    from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.edges import Report
 
@@ -543,11 +545,33 @@ def load_sources(
                 _add(builder, file)
             refuse_unknown_joints(files)
             tree = builder.finish()
+            _bring_cameras(tree, files)
     finally:
         close_all(sources)
     if places is not None:
         places |= builder.places
     return tree
+
+
+CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "nerf")  # and recordings
+
+
+def _bring_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> None:
+    """Give a tree the cameras of its files: those in trees of ours at once, others when one is asked for."""
+    ours = [file for file in files if file.form in ("yaml", "json") and re.search(r"""camera["']?:""", file.text)]
+    others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
+    if ours:
+        from frametool.formats.cameras import cameras_of
+
+        tree.cameras = {name: make() for file in ours for name, make in cameras_of(file).items()}
+
+    def read_cameras() -> dict[str, Callable[[], Camera]]:
+        from frametool.formats.cameras import cameras_of_tree
+
+        return cameras_of_tree(tree, others)
+
+    if others:
+        tree.read_cameras = read_cameras
 
 
 def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:

@@ -11,7 +11,7 @@ from itertools import chain, repeat
 from math import ceil, floor
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, warn
+from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, listing, warn
 from frametool.frames import topology
 from frametool.frames.path import Query
 from frametool.frames.refusals import left_out, no_data
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from frametool.errors import LookupFailed
     from frametool.frames.track import Track
+    from frametool.geometry.camera import Camera
     from frametool.geometry.types import Components, Rigid
 
 MOST_KEPT = 1 << 14  # queries
@@ -50,6 +51,8 @@ class Frames:
         self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
         self.covariances: dict[str, Components] = {}  # of edges, by their child; those that are not here are exact
         self.drawn: dict[str, str] = {}  # edges without a pose, by their child: how often a drawing says they come
+        self.cameras: dict[str, Camera] = {}  # of frames, as a tree of ours says
+        self.read_cameras: Callable[[], dict[str, Callable[[], Camera]]] = dict  # of frames, in files of other forms
         self._varies = False  # whether any frame has ever changed its parent
         self._loops = False  # whether newest parents were found to form a circle
 
@@ -118,7 +121,32 @@ class Frames:
                 warn(left_out(track, at_ns))
         tree.covariances = {child: each for child, each in self.covariances.items() if tree.track(child)}
         tree.drawn, tree.at_ns = self.drawn, at_ns
+        tree.camera_axes, tree.cameras, tree.read_cameras = self.camera_axes, self.cameras, self.read_cameras
         return tree
+
+    # --- cameras ---
+
+    @property
+    def camera_names(self) -> list[str]:
+        """List the frames whose intrinsics are known."""
+        return [*dict.fromkeys((*self.cameras, *self.read_cameras()))]
+
+    def camera(self, frame: str) -> Camera:
+        """Return the camera that a frame is: its intrinsics as the tree's files say, points seen in its own axes.
+
+        Raises UnknownFrame, ValueInvalid where there are none, FormatError where they cannot be read.
+        """
+        self.require(frame)
+        frame = self.resolve_name(frame)
+        found = self.cameras.get(frame)
+        if found is None:
+            known = self.read_cameras()
+            if frame not in known:
+                what = f"{self.name}: {bare(frame)} has no intrinsics; --camera FILE[:NAME]"
+                raise ValueInvalid(f"{what}; cameras: {listing(self.camera_names) or 'none'}")
+            found = known[frame]()
+        axes = self.camera_axes.get(frame, found.axes)
+        return found if axes == found.axes else found.changed(axes=axes)
 
     # --- one lookup ---
 

@@ -397,7 +397,7 @@ def _endless(_d: Sequence[float]) -> float:
 _BROWN = _to_brown, _from_brown, brown_end, _brown_angle
 CAMERA_MODELS = {
     "pinhole": CameraModel(("none",), (), (), _to_pinhole, _from_brown, _endless, _brown_angle),
-    "plumb_bob": CameraModel(("radtan",), (4, 5), (), *_BROWN),
+    "plumb_bob": CameraModel(("radtan", "radial-tangential"), (4, 5), (), *_BROWN),
     "rational_polynomial": CameraModel((), (8,), (), *_BROWN),
     "thin_prism": CameraModel((), (12,), (), *_BROWN),
     "equidistant": CameraModel(
@@ -544,12 +544,12 @@ class Camera:
         if abs(height - self.size[1] * across) >= 1.0 and abs(width - self.size[0] * down) >= 1.0:
             known = f"{self.size[0]} x {self.size[1]}"
             raise ValueInvalid(f"size {width} x {height} is another shape than {known}")
-        return self.resampled(across, down, (width, height))
+        return self.resampled((across, down), (0.5 * across - 0.5, 0.5 * down - 0.5), (width, height))
 
-    def resampled(self, across: float, down: float, size: Sequence[int] | None) -> Camera:
-        """Return the camera of a picture with so many pixels for one; the corner of the first one stays where it is."""
+    def resampled(self, scale: Two[float], shift: Two[float], size: Sequence[int] | None) -> Camera:
+        """Return the camera of a picture whose pixels are scaled and then shifted."""
         fx, fy, cx, cy, skew = self.numbers
-        shift = 0.5 * across - 0.5, 0.5 * down - 0.5
+        across, down = scale
         four = fx * across, fy * down, cx * across + shift[0], cy * down + shift[1]
         made: dict[str, Any] = {"K": four, "skew": skew * across}
         if p := self.fields.get("P"):

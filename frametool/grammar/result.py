@@ -213,16 +213,18 @@ def _add(entry: dict[str, Any], key: str, value: Any) -> None:
 
 def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
     """Yield a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
-    yield from ({"name": root} for root in tree.roots)
+    cameras = {name: {"camera": camera.mapping()} for name, camera in tree.cameras.items()}
+    yield from ({"name": root, **cameras.get(root, {})} for root in tree.roots)
     for track in tree.tracks():
+        camera = cameras.get(track.child, {})
         covariance = tree.covariances.get(track.child)
         if track.is_static:
-            yield _edge(Pose.of((*track.components, *(covariance or ())), track.child, track.parent), style)
+            yield _edge(Pose.of((*track.components, *(covariance or ())), track.child, track.parent), style) | camera
             continue
         if covariance and style.place is not None and track.parent in EARTH_FRAMES:
             warn(f"frame {shown(track.child)} is written by xyz: its one covariance is along the axes of ecef")
         samples = {"samples": list(_samples(track, _by_xyz(style) if covariance else style))}
-        yield {"name": track.child, "parent": track.parent} | uncertain(covariance) | samples
+        yield {"name": track.child, "parent": track.parent} | uncertain(covariance) | samples | camera
 
 
 def _by_xyz(style: Style) -> Style:

@@ -6,7 +6,7 @@
     R: 9    T: 3                                              raw: cam0<-velo of calib_velo_to_cam, velo<-imu
     R_01: 9    T_01: 3    R_rect_01: 9                        raw calib_cam_to_cam: cam1<-cam0, cam1_rect<-cam1
 
-Metres, row-major; cameras have optical axes.  A projection says where its camera stands: the baseline, x = -P[3]/f.
+Metres, row-major; cameras have optical axes.  A projection K [I t] says where its camera stands: at -t.
 """
 
 from __future__ import annotations
@@ -188,23 +188,15 @@ class Calibration:
                 yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *self._turn(name, field.texts)), field.line
 
     def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield where projections have their cameras, on the x axis of the rectified first one."""
+        """Yield where projections have their cameras, with the axes of the rectified first one: the centre -K^-1 p."""
         rect = "_rect" if any(name in self.fields for name in RECTIFICATIONS) else ""
         for index, camera in enumerate(CAMERAS):
             field = self.fields.get(f"P{index}")
             if field is None or not index:
                 continue
-            focal, _, _, third, _, _, _, seventh, _, _, _, eleventh = field.numbers
-            if not focal > 0.0:
-                raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
-            if seventh or eleventh:
-                self._tell_rest(f"P{index}", field)
-            yield f"cam0{rect}", f"{camera}{rect}", (0.0 - third / focal, *IDENTITY[1:]), field.line
-
-    def _tell_rest(self, name: str, field: Field) -> None:
-        """Note what a projection says beyond its baseline: its centre, -K^-1 p."""
-        fx, _, cx, px, _, fy, cy, py, _, _, _, pz = field.numbers
-        if fy:
-            centre = " ".join(f"{-value:.6f}" for value in ((px - cx * pz) / fx, (py - cy * pz) / fy, pz))
-            message = f"{name}: the baseline -P[3]/f is used; the centre of the whole matrix is {centre} m"
-            self.options.tally.note_each(message, field.line)
+            fx, _, cx, px, _, fy, cy, py, _, _, _, pz = field.numbers
+            for focal in (fx, fy):
+                if not focal > 0.0:
+                    raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
+            centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
+            yield f"cam0{rect}", f"{camera}{rect}", (*centre, *IDENTITY[3:]), field.line

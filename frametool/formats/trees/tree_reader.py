@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
-TIMED = frozenset(("samples", *STAMP_KEYS))
+TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
 CHILDREN = frozenset(("children", *TIMED))
 
