@@ -204,14 +204,16 @@ _READING = (
 )  # fmt: skip
 
 
-def reading_options(*, streams: bool = False, order: bool = True, topics: bool = True) -> Adds:
+def reading_options(
+    *, streams: bool = False, order: bool = True, topics: bool = True, camera_axes: Any = _CAMERA_AXES
+) -> Adds:
     """Add to a command the options that say how files of frames are read; `opened` heeds them.
 
     streams: the command has those of streams too, `--in`, `--quiet` and `--from` among them
-    order, topics: it has no --from, or --topic, of its own
+    order, topics: it has no --from, or --topic, of its own; camera_axes: its --camera-axes
     """
     if streams:
-        return together(_TOPIC, *_READING)
+        return together(_TOPIC, *(camera_axes if each is _CAMERA_AXES else each for each in _READING))
     quiet = _of_files("--quiet", "no word on what files were taken for")
     return together(in_option, *[_TOPIC] * topics, quiet, *_READING, *[_ORDER] * order)
 

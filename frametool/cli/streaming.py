@@ -123,6 +123,29 @@ class Stream:
         self.inputs.leave(topics=())
         return self._opened
 
+    def read_clouds_as_rows(self) -> None:
+        """Let the points of a cloud be rows of CSV, which has room for more columns."""
+        begin = self.opened().peek()
+        form = "" if self.within else self.told_form() or (_signed(begin, self.name) if begin else "")
+        if holds_arrays(form):
+            from frametool.text.lines import Pieces
+
+            self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(form, self.opened()))), "csv"
+
+    def _rows_of_cloud(self, form: str, opened: BufferedReader) -> Iterator[bytes]:
+        from frametool.cli.trees import answers
+        from frametool.grammar.result import Style
+        from frametool.stream.as_poses import FormatConverter
+        from frametool.stream.request import Request
+
+        bad, row = self.policy(self.name, "row"), 1
+        request = Request(on_error=self.inputs.on_error, by_default=True)
+        for made in FormatConverter(form, request, Style("csv", ()), self.name, answers()).outcomes(opened):
+            bad.take([fault._replace(line=fault.line + row) for fault in made.faults])
+            row += made.lines
+            if made.text:
+                yield bytes(made.text)
+
     def has_input(self) -> bool:
         """Tell whether something is piped in."""
         if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
@@ -176,7 +199,7 @@ class Stream:
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever form it is."""
-        form = self.told_form() or self.within
+        form = self.within or self.told_form()
         signed = form or _signed(stream.peek(), self.name)
         is_listed = is_trajectory(signed) or holds_arrays(signed)
         if not (form or tables_only or self._says_columns() or is_listed):

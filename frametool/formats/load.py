@@ -230,6 +230,8 @@ class Replaced(NamedTuple):
 class TreeBuilder:
     """What has been read so far, and where the first word on each frame stood."""
 
+    has_cameras = False  # whether files are worth a look for them
+
     def __init__(self, name: str, rules: Rules | None = None) -> None:
         """Create an empty builder; `name` says in messages where they come from."""
         self.name = name
@@ -544,8 +546,7 @@ def load_sources(
             for file in files:
                 _add(builder, file)
             refuse_unknown_joints(files)
-            tree = builder.finish()
-            _bring_cameras(tree, files)
+            tree = _with_cameras(builder.finish(), files) if builder.has_cameras else builder.finish()
     finally:
         close_all(sources)
     if places is not None:
@@ -553,12 +554,13 @@ def load_sources(
     return tree
 
 
+OWN = ("yaml", "json")
 CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "nerf")  # and recordings
 
 
-def _bring_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> None:
+def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
     """Give a tree the cameras of its files: those in trees of ours at once, others when one is asked for."""
-    ours = [file for file in files if file.form in ("yaml", "json") and re.search(r"""camera["']?:""", file.text)]
+    ours = [file for file in files if file.form in OWN]
     others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
     if ours:
         from frametool.formats.cameras import cameras_of
@@ -572,6 +574,7 @@ def _bring_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]
 
     if others:
         tree.read_cameras = read_cameras
+    return tree
 
 
 def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
@@ -599,3 +602,4 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
         raise FormatError("no frames in it", source=file.name)
     builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
     builder.drawn |= file.tally.drawn
+    builder.has_cameras |= file.form not in OWN or re.search(r"""\bcamera["']?:""", file.text) is not None

@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import partial, reduce
 from itertools import chain, repeat
 from math import ceil, floor
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, listing, warn
@@ -23,7 +24,7 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from typing import Any
 
     from frametool.errors import LookupFailed
@@ -42,6 +43,9 @@ class Frames:
 
     at_ns: int | None = None  # the time that a tree was taken at, of one that moves
 
+    cameras: Mapping[str, Camera] = MappingProxyType({})  # of frames, as a tree of ours says
+    read_cameras: Callable[[], dict[str, Callable[[], Camera]]] = staticmethod(dict)  # in files of other forms
+
     def __init__(self, name: str) -> None:
         """Create an empty set of frames; `name` says in error messages where they come from."""
         self.name = name
@@ -51,8 +55,6 @@ class Frames:
         self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
         self.covariances: dict[str, Components] = {}  # of edges, by their child; those that are not here are exact
         self.drawn: dict[str, str] = {}  # edges without a pose, by their child: how often a drawing says they come
-        self.cameras: dict[str, Camera] = {}  # of frames, as a tree of ours says
-        self.read_cameras: Callable[[], dict[str, Callable[[], Camera]]] = dict  # of frames, in files of other forms
         self._varies = False  # whether any frame has ever changed its parent
         self._loops = False  # whether newest parents were found to form a circle
 

@@ -6,7 +6,7 @@ blocks of rows.  Knows no text but that of stamps.
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, isinf
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FrametoolError, ValueInvalid
@@ -57,11 +57,15 @@ class Entry(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of a record: the components of its result; whether its rotation had to be normalised."""
+    """What became of a record: the components of its result; whether its rotation had to be normalised.
+
+    has_gaps: numbers of it may be nan
+    """
 
     entry: Entry
     parts: Components
     mended: bool
+    has_gaps: bool = False
 
 
 def read_entries(
@@ -99,7 +103,7 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
         stamp = (_beside(key_path, document, record, timed.name),)
     elif timed is not None and record.stamps and timed.moves(record.parent.text):
         stamp = record.stamps[:2]
-    elif timed is not None and request.operation.formula is not None:
+    elif timed is not None and request.operation.formula is not None and not request.operation.shown:
         stamp = (_beside(stamp_keys, document, record),)
     elif request.extra_column is not None:
         stamp = _path_beside(document, record, request.extra_column)
@@ -146,7 +150,7 @@ def answer(
     if stamp and (timed is not None or operation.velocity or request.window):
         try:
             at_ns = _stamp_ns(entry, stamp)
-            if timed is not None and operation.formula is None:
+            if timed is not None and (operation.formula is None or operation.shown):
                 edge = timed.pose(entry.record.parent.text, at_ns)
         except FrametoolError as error:
             error.column_name = timed.column if timed else str(entry.stamp[0][-1])  # type: ignore[attr-defined]
@@ -168,7 +172,8 @@ def answer(
         shape, tuple(values), edge, floats, rotation=rotation, compared=compared, seconds=lambda: seconds or 1.0,
         times_ns=at_ns,
     )  # fmt: skip
-    return None if operation.velocity and seconds is None else Answer(entry, parts, bool(warned))
+    has_gaps = operation.shown is not None
+    return None if operation.velocity and seconds is None else Answer(entry, parts, bool(warned), has_gaps)
 
 
 def _stamp_ns(entry: Entry, texts: Sequence[str]) -> int:
@@ -186,7 +191,7 @@ def written(each: Answer) -> list[float]:
     if target.place is not None:
         target.place.check_result(*each.parts[:3])
     numbers = [number + 0.0 for number in target.written(each.parts, floats)]  # none is -0.0
-    if not all(map(isfinite, numbers)):
+    if not all(map(isfinite, numbers)) and (not each.has_gaps or any(map(isinf, numbers))):
         raise ValueInvalid("the result is not finite: the numbers are too large")
     return numbers
 

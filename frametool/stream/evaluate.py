@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from frametool.stream.row_layout import (
     doubt,
     wrong_tail,
 )
-from frametool.stream.rows import assemble, chosen, number_spans, separators, texts_as_rows
+from frametool.stream.rows import assemble, chosen, number_spans, numbers_or_null, separators, texts_as_rows
 from frametool.stream.stamp_columns import (
     NOWHERE,
     by_frame,
@@ -237,7 +237,7 @@ class Run:
     def _movers(self) -> list[Rigid | None]:
         """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
         plan, block, shapes = self.plan, self.block, max(len(self.plan.shapes), 1)
-        if plan.operation.formula is not None:
+        if plan.operation.formula is not None and not plan.operation.shown:
             return [None] * shapes
         sources = [[plan.source]] if plan.source else block.sources
         edges = list(map(self._edge, sources)) or [None] * shapes
@@ -421,10 +421,15 @@ class Run:
             results[:, column] = number
         results += 0.0  # none is -0.0
         if not np.isfinite(results.sum()):
-            for row in np.flatnonzero(~np.isfinite(results).all(axis=1)).tolist():
+            for row in np.flatnonzero(self._is_wrong(results)).tolist():
                 if row not in self.reasons:
                     self._blame(row, *self._why_not_finite(row, moved))
         return results, locked
+
+    def _is_wrong(self, results: Floats) -> Any:
+        """Return which rows have numbers that are none; nan may be one of a formula's."""
+        wrong = np.isinf(results) if self.plan.operation.shown else ~np.isfinite(results)
+        return wrong.any(axis=1)
 
     def _why_not_finite(self, row: int, moved: Sequence[Components]) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""
@@ -476,9 +481,8 @@ class Run:
             return []
         values = None
         if self.results.shape[1]:
-            values = number_spans(
-                self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml
-            )
+            write = partial(numbers_or_null, plan.pieces, plan.null) if plan.operation.shown else number_spans
+            values = write(self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml)
         parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
         return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked, self.results))]
 

@@ -25,7 +25,7 @@ from frametool.stream.answers import Outside, answer, read_entries, texts_of_sta
 from frametool.stream.record import placed, value_at
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
-from frametool.stream.splice import target_of
+from frametool.stream.splice import refuse_member, target_of
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled, rest_of, used_keys
 from frametool.stream.text_parts import Const, Word
@@ -284,7 +284,7 @@ def values_of_unit(
     for each in answers:
         kind = each.entry.record.shape.kind
         if request.operation.formula is not None:
-            yield _formula_result(node, unit, each, request)
+            yield _formula_result(node, unit, each, request, style.form)
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif is_list or not _stays(node, kind, style):
@@ -300,13 +300,19 @@ def _stays(node: Node, kind: str, style: Style) -> bool:
     return style.form != "text" and (style.form not in ("ros1", "ros2") or "header" in (node.value or ()))
 
 
-def _formula_result(node: Node, unit: Path, made: Answer, request: Request) -> Value:
+def _formula_result(node: Node, unit: Path, made: Answer, request: Request, form: str) -> Value:
     """Return what an expression made of a record, with what else the record says."""
     entry, operation = made.entry, request.operation
     shape = entry.record.shape
     kind = operation.result_kind(shape.kind)
     names = [request.prefix + name for name in request.extras(shape)]
     extras: dict[str, Any] = dict(zip(names, made.parts[len(made.parts) - len(names) :], strict=True))
+    if operation.shown is not None:
+        numbers = tuple(extras.values())
+        members = operation.shown.values(request.prefix, numbers)
+        extras = operation.shown.cells(names, numbers) if form == "csv" else members
+        for key in () if operation.shown.replaces else extras:
+            refuse_member(key, node.value)
     if operation.only_adds:
         return plain(node) | extras if type(node.value) is dict else extras
     rest = _rest(node, unit, entry.record)

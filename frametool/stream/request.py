@@ -17,7 +17,7 @@ from frametool.stream.faults import STOP
 from frametool.stream.row_layout import MOVERS, POINT, POSE, SIX, TURNED, VECTOR, Shape, Target, pose_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.place import Earth, Place
     from frametool.geometry.representations import Notation
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frametool.stream.gathering import Gathered
     from frametool.stream.row_layout import Unit
     from frametool.stream.stamp_source import Timed
+    from frametool.stream.text_parts import Word
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS = "start", "previous"  # rows before that a row is compared with
@@ -68,6 +69,43 @@ class Formula(Protocol):
         """Return the components of the result and then the extras; of floats raises FrametoolError where none are."""
 
 
+class Shown(NamedTuple):
+    """How the numbers of a formula are written beside a row; nan is an empty cell, or null.
+
+    words: in tables, the words that a number stands for, by its place
+    members: in records, what stands under each key: a text, a word, or the places of its numbers
+    replaces: columns and members of these names give way, where no prefix makes others of them
+    """
+
+    words: Mapping[int, tuple[str, ...]]
+    members: Mapping[str, str | Word | tuple[int, ...]]
+    replaces: bool = False
+
+    def cells(self, names: Sequence[str], numbers: Components) -> dict[str, Any]:
+        """Return the cells of a table."""
+        return {
+            name: self.words[at][int(number)] if at in self.words else _or_none(number)
+            for at, (name, number) in enumerate(zip(names, numbers, strict=True))
+        }
+
+    def values(self, prefix: str, numbers: Components) -> dict[str, Any]:
+        """Return the members of a record."""
+        from frametool.documents.source import Verbatim
+
+        found: dict[str, Any] = {}
+        value: Any
+        for key, value in self.members.items():
+            if isinstance(value, str):
+                made: Any = value
+            elif hasattr(value, "text"):
+                made = Verbatim(value.text(numbers[value.number]).decode())
+            else:
+                made = [_or_none(numbers[at]) for at in value]
+                made = None if None in made else made if made[1:] else made[0]
+            found[prefix + key] = made
+        return found
+
+
 class Operation(NamedTuple):
     """What is done to each row: turned around if asked for, then multiplied with fixed poses, then compared.
 
@@ -80,7 +118,8 @@ class Operation(NamedTuple):
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
     mirrors: the row is seen in a mirror across y, before all that stands on its left
-    formula: an expression, instead of all this
+    formula: an expression, instead of all this; it is given points that are moved by their edge, or that edge alone
+    shown: how its numbers are written
     uncertain: what moves rows, each by its frame or its time, has a covariance that counts
     similar: a scale beside a pose counts, and is that of the result; multiples: so is that of a matrix s R
     Poses are seven components, and may have a covariance or a scale behind them, as `geometry.placed` has it.
@@ -99,6 +138,7 @@ class Operation(NamedTuple):
     uncertain: bool = False
     similar: bool = False
     multiples: bool = False
+    shown: Shown | None = None
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
         """Name the numbers that come beside the result of a row, and have no place in the row as it was read."""
@@ -224,7 +264,7 @@ class Operation(NamedTuple):
         elif shape.unit is not None:
             own = shape.position(own)
         if self.formula is not None:
-            return self.formula.result(shape.kind, own, beside, times_ns, xp)
+            return self.formula.result(shape.kind, self._moved(own, edge), beside, times_ns, xp)
         if shape.kind != POSE:
             return self._with_place(shape, numbers, self.move(shape, own, beside, edge))
         if shape.covariance:
@@ -236,6 +276,11 @@ class Operation(NamedTuple):
             last = EXACT + len(RELATIVE_EXTRAS)
             found = (*self.with_velocity(found[:last], seconds(), xp), *found[last:])
         return self._with_place(shape, numbers, (*found, *beside))
+
+    def _moved(self, own: Components, edge: Components | None) -> Components:
+        """Return the point that a formula is given, or the pose that would move one."""
+        mover: Any = edge or self.left
+        return own if mover is None else rigid.apply(*mover, *own[:3]) if own else mover
 
     def _with_place(self, shape: Shape, numbers: Components, found: Components) -> Components:
         """Add to a result on the Earth that nothing moves the numbers that it was read as."""
@@ -284,6 +329,11 @@ class Operation(NamedTuple):
         return poses[0], poses[1]
 
 
+def _or_none(number: Number) -> Number | None:
+    return None if number != number else number  # noqa: PLR0124 - nan
+
+
+PLAIN = Shown({}, {})
 COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
 
 

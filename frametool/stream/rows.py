@@ -76,6 +76,18 @@ def number_spans(values: Floats, precision: int | None, separators: bytes, *, ya
     return _with_points(spans, values, separators) if yaml else spans
 
 
+def numbers_or_null(
+    pieces: Sequence[Piece], null: bytes, values: Floats, precision: int | None, separators: bytes, *, yaml: bool
+) -> Spans:
+    """Write the floats that pieces show; nan is an empty cell, where that stands for none."""
+    count = max((piece.last for piece in pieces if isinstance(piece, Out)), default=0)
+    values, separators, gaps = values[:, :count], separators[:count], np.isnan(values[:, :count])
+    if null or not gaps.any():
+        return number_spans(values, precision, separators, yaml=yaml)
+    spans = number_spans(np.where(gaps, 0.0, values), precision, separators)
+    return spans._replace(starts=np.where(gaps, spans.ends - 1, spans.starts))
+
+
 def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
     """Write 1e-05 as 1.0e-05."""
     size = abs(values)

@@ -6,10 +6,12 @@ stands between them, and how one is written.
 
 from __future__ import annotations
 
+from itertools import starmap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.source import Verbatim
 from frametool.documents.yaml_writer import quoted
+from frametool.errors import ValueInvalid, shown
 from frametool.geometry.representations import ROTATIONS
 from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import Pose
@@ -17,7 +19,7 @@ from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
-from frametool.stream.text_parts import Const, IfLocked, Out, Renamed, Word
+from frametool.stream.text_parts import Const, IfLocked, Item, Out, Renamed, Word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -224,12 +226,39 @@ class Splicer:
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
+        if (said := self.request.operation.shown) is not None:
+            return [*filter(None, starmap(self._shown, said.members.items()))]
         names = [self.request.prefix + name for name in self.request.extras(self.record.shape)]
         members, last = [], first
         for key, value in with_entries(dict.fromkeys(names, 0.5)).items():
             members.append(self._member({key: value}, last))
             last += len(value) if isinstance(value, list) else 1
         return members
+
+    def _shown(self, name: str, value: str | Word | tuple[int, ...]) -> tuple[Piece, ...]:
+        """Return a text, a word or numbers as a member; of one that gives way to it the edit, and nothing to add."""
+        key, said = self.request.prefix + name, self.request.operation.shown
+        if said and said.replaces and key in self.node.value:
+            self._replace(self.node.value[key], self._member_of(key, value))
+            return ()
+        refuse_member(key, self.node.value)
+        return self._member_of(key, value)
+
+    def _member_of(self, key: str, value: str | Word | tuple[int, ...]) -> tuple[Piece, ...]:
+        """Return a text, a word, or a list of numbers as a member."""
+        if isinstance(value, str):
+            return self._member({key: value}, 0)
+        begin = self._member({key: 0.5}, 0)[:-1]
+        if isinstance(value, Word):
+            return (*begin, value._replace(number=self.first + value.number))
+        precision = self.request.precision
+        form, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
+        marks = [("[" * (not at), "]" if at == len(value) - 1 else ", ") for at in range(len(value))]
+        marks = marks if value[1:] else [("", "")]
+        items = zip(value, marks, strict=True)
+        return (*begin, *(
+            Item(self.first + at, (*around, "null" * (at == value[0]), form), exponent) for at, around in items
+        ))  # fmt: skip
 
     def _of_other_kind(self) -> list[Edit]:
         """Write what an expression has made of a record in place of all the members that said what it was."""
@@ -395,6 +424,12 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
     from frametool.documents.json import dump
 
     return dump(name)
+
+
+def refuse_member(key: str, members: Any) -> None:
+    """Raise ValueInvalid where a key that is added is there already."""
+    if type(members) is not dict or key in members:
+        raise ValueInvalid(f"key {shown(key)} is there already; name the new ones with --prefix")
 
 
 def root_of_extras(root: Node, record: Record) -> Node:

@@ -170,7 +170,8 @@ def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 
     for depth in range(len(holder), -1, -1):
         if (position := joint_state.position_of(name, around[depth])) is not None:
             return (*holder[:depth], *position)
-        for keys in ((name,), tuple(name.split("."))):
+        steps = name.split(".")
+        for keys in ((name,), steps, [int(each) if each.isdecimal() else each for each in steps]):
             if (found := _below(around[depth], keys)) is not None:
                 if type(found[0]) in (dict, list):
                     raise Misfit(f"expected {wanted}, found {kind(found[0])}", (*holder[:depth], *keys))
@@ -189,9 +190,12 @@ def stamp_keys(document: Any, holder: Path) -> Path:
     raise Misfit(f"@ row: no stamp is found ({', '.join(STAMP_KEYS)}); name its key with --time-column", holder)
 
 
-def _below(value: Any, keys: Sequence[str]) -> tuple[Any] | None:
-    """Follow keys down; None where one is not there."""
+def _below(value: Any, keys: Sequence[str | int]) -> tuple[Any] | None:
+    """Follow keys and indices down; None where one is not there."""
     for key in keys:
+        if type(value) is list and type(key) is int and key < len(value):
+            value = value[key]
+            continue
         if type(value) is not dict or key not in value:
             return None
         value = value[key]

@@ -31,15 +31,17 @@ from frametool.stream.header import (
     wholes_of,
 )
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, lay_out, refuse_repeated
+from frametool.stream.request import PLAIN
 from frametool.stream.row_layout import POSE, SIX, Shape, place_of, six_names
 from frametool.stream.table import rename_of
+from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.stream.layout import Column, Layout
-    from frametool.stream.request import Request
+    from frametool.stream.request import Request, Shown
     from frametool.stream.row_layout import Target
     from frametool.stream.table import Table
 
@@ -85,7 +87,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     edge_of = request.pose_from_frame if on_earth else request.pose_of_row_frame
     if frames and edge_of is None and request.operation.moves and not on_earth:
         edge_of = request.pose_from_frame
-    words, marked = readers_of(shapes[0]) if on_earth else ({}, {})
+    words, marked = readers_of(shapes[0]) if on_earth else ({}, request.operation.shown and _may_be_empty(shapes[0]))
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
     poses = [_written(pose) for pose in poses] if on_earth else poses
@@ -106,7 +108,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         timed=request.timed, beside=request.extra_column or "", source=EARTH_FRAMES[0] if on_earth else "",
         gathered=request.gathered and request.gathered.of_columns(table.names),
         frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
-        window=request.window, words=words, marked=marked,
+        window=request.window, words=words, marked=marked or {},
     ), layout  # fmt: skip
 
 
@@ -188,6 +190,11 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     if request.operation.formula is None:
         return shapes
     return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
+
+
+def _may_be_empty(shape: Shape) -> dict[int, Callable[[str], float]]:
+    """Return how the columns that a formula asks for are read where an empty cell is no number."""
+    return dict.fromkeys(range(shape.own_size, shape.size), number_or_none)
 
 
 def _by_width(width: int, given: Notation | None) -> str:
@@ -298,7 +305,7 @@ def _columns(
     if only_turned and request.by_default and not (request.all_numbers or target.notations or request.keep):
         return columns
     if request.keep or request.operation.only_adds or not ours:
-        return [*columns, *position, *rotation, *extras]
+        return _beside(table, columns, [*position, *rotation, *extras], request.operation.shown or PLAIN)
     if rename_of(request) is not None:
         for place, role in named.items():
             columns[place] = Named(place, role)
@@ -317,6 +324,13 @@ def _columns(
     else:
         at[min(at)] += [*position, *rotation, *extras]
     return [column for place, given in enumerate(columns) for column in at.get(place, [given])]
+
+
+def _beside(table: Table, columns: Sequence[Column], extras: Sequence[Column], shown: Shown) -> list[Column]:
+    """Put new columns behind those that stay, or in the place of those of their names."""
+    more = {getattr(each, "name", at) if shown.replaces else at: each for at, each in enumerate(extras)}
+    mixed = [more.pop(name, kept) for name, kept in zip(_names_or_numbers(table), columns, strict=True)]
+    return [*mixed, *more.values()]
 
 
 def _several(
@@ -383,7 +397,7 @@ def _new_columns(
         if target.place is None:
             moved += [f"{pose.position.prefix}z{pose.position.suffix}"] * (len(moved) < len(XYZ) and not target.absent)
     extras = [request.prefix + name for name in request.extras(shape)]
-    words = {} if target.place is None else target.place.words
+    words = (request.operation.shown or target.place or PLAIN).words
     named = [*enumerate((*moved, *turned, *extras))]
     new: list[Column] = [Worded(at, name, words[at]) if at in words else New(at, name) for at, name in named]
     first, last = len(moved), len(moved) + len(turned)

@@ -102,7 +102,7 @@ def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request,
         request = request._replace(extra_column=_stamp_column(table, source, who))
     if timed is None:
         return request, None
-    if request.operation.formula is not None:
+    if request.operation.formula is not None and not request.operation.shown:
         name = timed.name or _stamp_column(table, source, "@ row")
         return request._replace(timed=timed._replace(name=name)), None
     if timed.name:

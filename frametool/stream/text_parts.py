@@ -31,6 +31,21 @@ class Word(NamedTuple):
         return self.quote + self.words[int(number)].encode() + self.quote
 
 
+class Item(Word):
+    """A number of a list with what stands around it, or another text where it is none.
+
+    words: the text before it, the one behind it, the other one, and the format of the number
+    """
+
+    def text(self, number: float) -> bytes:
+        """Return the text of a number."""
+        before, behind, other, form = self.words
+        if number != number:  # noqa: PLR0124 - nan
+            return other.encode()
+        text = format(number, form)
+        return f"{before}{text if '.' in text else text.replace('e', self.quote.decode())}{behind}".encode()
+
+
 class Instead(NamedTuple):
     """A name of the result in place of a stretch of the input, which stays where there is no result."""
 

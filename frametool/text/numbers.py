@@ -89,6 +89,11 @@ def parse_length(text: str) -> float:
     raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT, _ANGLE} else reason}")
 
 
+def number_or_none(text: str) -> float:
+    """Read a number, nan where there is no text; raises ValueInvalid."""
+    return parse_number(text) if text else math.nan
+
+
 def read_number_or_angle(
     text: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: it is no angle
 ) -> float:

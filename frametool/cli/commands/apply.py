@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
     from frametool.explain.derive import ByTree, DerivationStyle
     from frametool.explain.operations import WrittenPose
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Components
     from frametool.stream.request import Request
 
@@ -76,7 +78,7 @@ def command(inputs: Inputs) -> int:
     several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
     clouds = clouds_of(stream, output) if stream.path and several is None else None
     if inputs.pose is None:
-        way, rest = _way_by_tree(inputs, numbers=bool(stream.given_place))
+        way, rest = way_by_tree(inputs, numbers=bool(stream.given_place))
     else:
         way, rest = _way_by_pose(inputs, task), inputs.arguments
     is_stream = rest in ((), ("-",))
@@ -90,7 +92,7 @@ def command(inputs: Inputs) -> int:
         return several.run(way.from_frame, way.target, has_source=way.has_source)
     kind = _kind(inputs)
     if plan is not None:
-        records = list(_sources(rest, kind))
+        records = list(sources_of(rest, kind))
         refuse(is_stream or len(records) != 1, f"a stream, or several records; {ONE_RECORD}")
         return _derived(task, plan, way, records[0], kind or "")
     request = way.request(*((inputs.frame_column, inputs.time_column) if is_stream else (None, None)))
@@ -106,7 +108,7 @@ def command(inputs: Inputs) -> int:
         task.only_arguments(rest)
         if stream.given_place:
             inputs.ask("given")
-        output.values(values_of(list(_sources(rest, kind, stream.given_place)), request, output))
+        output.values(values_of(list(sources_of(rest, kind, stream.given_place)), request, output))
     way.tell()
     return status
 
@@ -143,6 +145,7 @@ class Way(NamedTuple):
     counters: whether no frame has a number for its name
     uncertain: whether the covariance of what moves records counts, which then comes behind the seven components
     tell: says at the end what was taken for granted of it
+    tree: that of the frames, if any
     """
 
     target: str | None
@@ -154,6 +157,7 @@ class Way(NamedTuple):
     counters: bool = True
     uncertain: bool = False
     tell: Callable[[], None] = lambda: None
+    tree: FrameTree | TransformBuffer | None = None
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
         """Say how records move: from one frame or each from its own, all alike or each at its own time."""
@@ -175,14 +179,14 @@ class Way(NamedTuple):
         )  # fmt: skip
 
 
-def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]:
+def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]:
     """Take tree, target and, if one is named, source from the arguments; the rest are records.
 
     numbers: what looks like one is no frame's name
     """
-    arguments, chosen, uncertain = inputs.arguments, inputs.at, inputs.covariance
+    arguments, chosen, uncertain = inputs.arguments, inputs.at, bool(inputs.covariance)
     refuse(len(arguments) < 2, "name TREE and TARGET, or give --transform")
-    is_named = len(arguments) > 2 and not _is_record(arguments[2]) and not (numbers and _begins_number(arguments[2]))
+    is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
     named = arguments[2:3] if is_named else ()
     rest = arguments[2 + len(named) :]
     tree = load_tree(arguments[0], inputs.more, rules(inputs), streams=rest in ((), ("-",)))
@@ -220,7 +224,7 @@ def _way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]
         return ByTree(tree, target, source, at_ns(chosen))
 
     has_source, tell = source is not None, lookups.tell
-    return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell), rest
+    return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell, tree), rest
 
 
 def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
@@ -254,24 +258,24 @@ def _settled(own: str | None, source: str | None) -> str | None:
     return source or own
 
 
-def _is_record(argument: str) -> bool:
+def is_record(argument: str) -> bool:
     """Tell a record from a frame's name."""
     return argument == "-" or is_inline(argument) or "\n" in argument
 
 
-def _begins_number(argument: str) -> bool:
+def begins_number(argument: str) -> bool:
     """Tell what is meant for one number of a point."""
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _is_apart(argument: str) -> bool:
     """Tell what is no number of a point: a record, a text that was pasted, or nothing."""
-    return not argument or _is_record(argument) or (not _begins_number(argument) and is_pasted(argument))
+    return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
 
 
-def _sources(arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
+def sources_of(arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
     """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
-    if place and not any(map(_is_record, arguments)):
+    if place and not any(map(is_record, arguments)):
         from frametool.cli.earth import mapping_of
 
         yield mapping_of(arguments, place)
