@@ -46,16 +46,9 @@ class Alignment(NamedTuple):
 
 
 def compare(
-    ref: Given,
-    est: Given,
-    *,
-    offset: float | str | None = None,
-    align: str | None = None,
-    mount: Transform | str | None = None,
-    deltas: Iterable[str] | None = None,
-    like: str | None = None,
-    **more: Any,
-) -> Comparison:
+    ref: Given, est: Given, *, offset: float | str | None = None, align: str | None = None,
+    mount: Transform | str | None = None, deltas: Iterable[str] | None = None, like: str | None = None, **more: Any,
+) -> Comparison:  # fmt: skip
     """Compare a trajectory with a reference.
 
     ref, est: a Trajectory, or the path of a file as `load_trajectory` takes it
@@ -90,13 +83,9 @@ def align(ref: Given, est: Given, **settings: Any) -> Alignment:
 
 
 def resample(
-    trajectory: Given,
-    *,
-    rate: float | None = None,
-    at: Sequence[int] | None = None,
-    every: str | None = None,
+    trajectory: Given, *, rate: float | None = None, at: Sequence[int] | None = None, every: str | None = None,
     max_gap_ns: float | None = None,
-) -> Trajectory:
+) -> Trajectory:  # fmt: skip
     """Interpolate a trajectory: `rate` poses a second, `at` stamps in nanoseconds, or `every` "1m" or "5deg".
 
     Moments beyond its ends, or between poses more than a gap apart (3 median intervals if none is said), have none.
@@ -117,12 +106,9 @@ def resample(
 
 
 def solve(
-    measurements: Measured,
-    *,
-    root: str | None = None,
-    fix: Iterable[FrameTree | str | PathLike[str]] = (),
+    measurements: Measured, *, root: str | None = None, fix: Iterable[FrameTree | str | PathLike[str]] = (),
     robust: bool = True,
-) -> TreeSolution:
+) -> TreeSolution:  # fmt: skip
     """Solve for the tree that measurements mean; what does not agree with the rest is left out.
 
     measurements: (parent, child, transform) or (parent, child, transform, covariance), the covariance as 36 numbers or

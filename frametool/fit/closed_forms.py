@@ -21,7 +21,7 @@ from frametool.fit.least_squares import (
     require_near,
     settled,
     skew,
-)
+)  # fmt: skip
 from frametool.geometry import validation
 from frametool.geometry.spread import Spread, mean_and_spread
 from frametool.geometry.transform import Transform
@@ -79,28 +79,18 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
 
     robust = robust and len(heavy) >= FEWEST_POSES
     found = settled(
-        _middle(heavy, roots) if robust else heavy[0],
-        residuals,
-        lambda _, first: heavy.mean(first * mass[counts]),
-        lambda _, kept: mean(kept)[0],
-        unknown=3,
-        robust=robust,
-    )
+        _middle(heavy, roots) if robust else heavy[0], residuals, lambda _, first: heavy.mean(first * mass[counts]),
+        lambda _, kept: mean(kept)[0], unknown=3, robust=robust,
+    )  # fmt: skip
     used, count = counts.copy(), int(found.kept.sum())
     used[used] = found.kept
     off = PoseArrays.of(poses).errors(PoseArrays.of(found.model))
     s_t, s_r = map(float, found.sigmas)
     kept = found.residuals[found.kept]
     return MeanFit(
-        *mean(found.kept),
-        used,
-        counts & ~used,
-        np.sqrt(mass / 6.0) * np.sqrt(lengths(off) ** 2 @ found.sigmas**-2.0),
-        off,
-        (s_t, s_r),
-        3 * count - 3,
-        kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None,
-    )
+        *mean(found.kept), used, counts & ~used, np.sqrt(mass / 6.0) * np.sqrt(lengths(off) ** 2 @ found.sigmas**-2.0),
+        off, (s_t, s_r), 3 * count - 3, kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None,
+    )  # fmt: skip
 
 
 def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = None) -> Array | None:
@@ -157,14 +147,9 @@ class PointsFit(NamedTuple):
 
 
 def solve_points(
-    target: Numbers,
-    source: Numbers,
-    *,
-    weights: Numbers | None = None,
-    scale: bool = False,
-    robust: bool = True,
+    target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True,
     names: tuple[str, str] = ("A", "B"),
-) -> PointsFit:
+) -> PointsFit:  # fmt: skip
     """Fit matched points (n, 3) by weighted least squares; wrong pairs are left out.
 
     weights: (n,), in proportion to 1 / variance; a pair of weight 0 counts for nothing
@@ -189,13 +174,9 @@ def solve_points(
         return chosen.fitted(with_scale=scale, weights=kept[kept > 0.0])
 
     found = settled(
-        start,
-        pairs.weighted_residuals,
-        lambda _, first: pairs.fitted(with_scale=scale, weights=first),
-        fit,
-        unknown=6 + scale,
-        robust=robust,
-    )
+        start, pairs.weighted_residuals, lambda _, first: pairs.fitted(with_scale=scale, weights=first), fit,
+        unknown=6 + scale, robust=robust,
+    )  # fmt: skip
     best, sigma, kept = found.model, float(found.sigmas[0]), found.kept
     covariance, scale_sigma = pairs.at(kept).covariance(best, sigma, with_scale=scale)
     used = mass > 0.0
@@ -203,19 +184,10 @@ def solve_points(
     residuals = _residuals(best, a, b)
     hints = [] if scale else pairs.scale_hints(typical, names, robust=robust)
     return PointsFit(
-        best.transform.canonical(),
-        best.scale,
-        scale_sigma,
-        covariance,
-        used,
-        (mass > 0.0) & ~used,
-        residuals,
-        np.sqrt(mass / 3.0) * length(residuals) / sigma,
-        sigma,
-        3 * int(kept.sum()) - 6 - scale,
-        sqrt((residuals[used] ** 2).sum() / used.sum()),
-        hints + pairs.at(kept).line_hints(sigma, covariance),
-    )
+        best.transform.canonical(), best.scale, scale_sigma, covariance, used, (mass > 0.0) & ~used, residuals,
+        np.sqrt(mass / 3.0) * length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
+        sqrt((residuals[used] ** 2).sum() / used.sum()), hints + pairs.at(kept).line_hints(sigma, covariance),
+    )  # fmt: skip
 
 
 class _Pairs(NamedTuple):

@@ -30,7 +30,7 @@ from frametool.fit.least_squares import (
     settled,
     skew,
     solve_normal,
-)
+)  # fmt: skip
 from frametool.fit.least_squares import log as rotvecs_of
 
 if TYPE_CHECKING:
@@ -86,13 +86,9 @@ class HandEye(NamedTuple):
 
 
 def solve_hand_eye(
-    gripper: Transform,
-    target: Transform,
-    *,
-    eye_to_hand: bool = False,
-    robust: bool = True,
+    gripper: Transform, target: Transform, *, eye_to_hand: bool = False, robust: bool = True,
     names: tuple[str, str, str, str] = NAMES,
-) -> HandEye:
+) -> HandEye:  # fmt: skip
     """Solve for X and Z by least squares, the noise being where it is likeliest; wrong samples are left out.
 
     gripper: base_from_gripper; target: camera_from_target; as many, (n,)
@@ -124,13 +120,10 @@ def solve_hand_eye(
         return min((samples.fitted(each, weights, STEPS) for each in models), key=lambda fit: fit.misfit)
 
     found = settled(
-        start,
-        samples.residuals,
-        lambda model, weights: samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS),
-        likeliest,
-        unknown=6,
+        start, samples.residuals, lambda model,
+        weights: samples.fitted(model._replace(cut="target"), weights, ROUGH_STEPS), likeliest, unknown=6,
         robust=robust,
-    )
+    )  # fmt: skip
     model = found.model
     s_t, s_r = model.sigmas.tolist()
     count, off = int(found.kept.sum()), lengths(found.residuals[found.kept]).T

@@ -224,14 +224,9 @@ class Settled(NamedTuple, Generic[Model]):
 
 
 def settled(
-    model: Model,
-    residuals: Callable[[Model], Array],
-    rough: Callable[[Model, Array], Model],
-    fit: Callable[[Model, Array], Model],
-    *,
-    unknown: int,
-    robust: bool,
-) -> Settled[Model]:
+    model: Model, residuals: Callable[[Model], Array], rough: Callable[[Model, Array], Model],
+    fit: Callable[[Model, Array], Model], *, unknown: int, robust: bool,
+) -> Settled[Model]:  # fmt: skip
     """Fit, leave out what is further off than 3 sigmas, and fit the rest again until the rows stay.
 
     residuals: (n, 3) or (n, 6) of a model; unknown: how many numbers each three of them share

@@ -29,13 +29,9 @@ SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance 
 
 
 def solve_tree(
-    measurements: Sequence[Measurement],
-    *,
-    root: str | None = None,
-    fixed: Fixed = (),
-    robust: bool = True,
+    measurements: Sequence[Measurement], *, root: str | None = None, fixed: Fixed = (), robust: bool = True,
     progress: Callable[[float], None] | None = None,
-) -> TreeSolution:
+) -> TreeSolution:  # fmt: skip
     """Find the tree that fits measurements best.
 
     root: the frame that the others are given in; else the first that is never a child
@@ -72,14 +68,11 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
             _require_regular(covariance, place_of(measurements, row))
             information[row] = inverse(covariance)
     return TreeRows(
-        np.array([bodies.number[name] for name in parents]),
-        np.array([bodies.number[name] for name in children]),
-        _poses([bodies.pose[name] for name in parents]),
-        _poses([bodies.pose[name] for name in children]),
-        _poses([m.transform for m in measurements]),
-        np.array([m.covariance is not None for m in measurements]),
+        np.array([bodies.number[name] for name in parents]), np.array([bodies.number[name] for name in children]),
+        _poses([bodies.pose[name] for name in parents]), _poses([bodies.pose[name] for name in children]),
+        _poses([m.transform for m in measurements]), np.array([m.covariance is not None for m in measurements]),
         information,
-    )
+    )  # fmt: skip
 
 
 def _require_regular(covariance: Array, place: str) -> None:
@@ -119,13 +112,9 @@ class TreeSolution:
     tree: FrameTree
 
     def __init__(
-        self,
-        measurements: Sequence[Measurement],
-        bodies: Bodies,
-        problem: TreeProblem,
-        found: Fitted,
+        self, measurements: Sequence[Measurement], bodies: Bodies, problem: TreeProblem, found: Fitted,
         fits: list[str | None],
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Look at a fit from all sides."""
         self.measurements, self.fits = tuple(measurements), fits
         self.root, self.frames, self.fixed = bodies.root, bodies.frames, frozenset(bodies.parent)

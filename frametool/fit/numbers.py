@@ -200,16 +200,13 @@ def numbers(found: Comparison) -> dict[str, Any]:
         "transform": transform_entry(found),
         "ate_by_alignment": found.ate_by_alignment,
         "ate": {
-            **_errors(ate.m, ate.rad, evo=found.settings.evo),
-            "along_m": _summed(ate.along),
-            "across_m": _summed(ate.across),
-            "up_m": _summed(ate.up),
-            "end_m": float(ate.m[-1]),
+            **_errors(ate.m, ate.rad, evo=found.settings.evo), "along_m": _summed(ate.along),
+            "across_m": _summed(ate.across), "up_m": _summed(ate.up), "end_m": float(ate.m[-1]),
         },
         "rpe": [_relative(found, at) for at in range(len(found.relative))],
         "kitti": _kitti(found),
         "hints": found.hints,
-    }  # fmt: skip
+    }
 
 
 def worlds(found: Comparison) -> tuple[str, str]:
@@ -242,26 +239,17 @@ def _settings(found: Comparison) -> dict[str, Any]:
     is_nearest = settings.match == "nearest"
     has_stamps = pairs.ref.stamps_ns is not None
     return {
-        "match": settings.match if has_stamps else "number",
-        "interpolated": pairs.interpolated,
-        "max_gap_s": pairs.max_gap_s,
-        "max_diff_s": settings.max_diff_ns / 1e9 if is_nearest and has_stamps else None,
+        "match": settings.match if has_stamps else "number", "interpolated": pairs.interpolated,
+        "max_gap_s": pairs.max_gap_s, "max_diff_s": settings.max_diff_ns / 1e9 if is_nearest and has_stamps else None,
         "min_match": settings.min_match,
-        "offset": settings.offset if settings.offset == "auto" else found.offset_ns / 1e9,
-        "align": settings.align,
+        "offset": settings.offset if settings.offset == "auto" else found.offset_ns / 1e9, "align": settings.align,
         "align_first": settings.align_first and str(settings.align_first),
-        "mount": None if found.mount is None else _pose(found.mount),
-        "up": list(settings.up),
-        "delta": [str(delta) for delta, _ in found.relative],
-        "all_pairs": settings.all_pairs,
-        "tolerance": settings.tolerance if settings.all_pairs else None,
-        "pairs_from": settings.pairs_from,
-        "segments_m": list(settings.segments),
-        "segment_step": settings.segment_step,
-        "start_s": _limit(settings.start),
-        "end_s": _limit(settings.end),
-        "as": "evo" if settings.evo else None,
-    }
+        "mount": None if found.mount is None else _pose(found.mount), "up": list(settings.up),
+        "delta": [str(delta) for delta, _ in found.relative], "all_pairs": settings.all_pairs,
+        "tolerance": settings.tolerance if settings.all_pairs else None, "pairs_from": settings.pairs_from,
+        "segments_m": list(settings.segments), "segment_step": settings.segment_step, "start_s": _limit(settings.start),
+        "end_s": _limit(settings.end), "as": "evo" if settings.evo else None,
+    }  # fmt: skip
 
 
 def _limit(limit: tuple[bool, int] | None) -> str | None:

@@ -27,7 +27,7 @@ from frametool.fit.least_squares import (
     rms_sigma,
     skew,
     solve_normal,
-)
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

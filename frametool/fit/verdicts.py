@@ -90,16 +90,14 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "translation of the inverse": _translation_of_inverse,
     "wxyz taken for xyzw": lambda m: m.turned(*m.components[4:], m.components[3]),
     "xyzw taken for wxyz": lambda m: m.turned(m.components[6], *m.components[3:6]),
-    "millimetres": lambda m: m.shifted(1e-3),
-    "metres taken for millimetres": lambda m: m.shifted(1e3),
+    "millimetres": lambda m: m.shifted(1e-3), "metres taken for millimetres": lambda m: m.shifted(1e3),
     "degrees taken for radians": lambda m: m.reread(math.radians),
     "radians taken for degrees": lambda m: m.reread(math.degrees),
     "yaw, pitch, roll taken for roll, pitch, yaw": _yaw_first,
     "optical axes of the child": lambda m: m.transform @ O.inverse(),
-    "optical axes of the parent": lambda m: O @ m.transform,
-    "body axes of the child": lambda m: m.transform @ O,
+    "optical axes of the parent": lambda m: O @ m.transform, "body axes of the child": lambda m: m.transform @ O,
     "body axes of the parent": lambda m: O.inverse() @ m.transform,
-}
+}  # fmt: skip
 
 
 def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array) -> str | None:

@@ -36,9 +36,7 @@ def _frame_transform(result: Result, style: Style) -> dict[str, Any]:
     seconds, nanoseconds = divmod(result.extras.get("stamp_ns") or 0, BILLION)
     rotation = rotation_numbers(result.pose, notation("quaternion"), style)
     return {
-        "timestamp": {"sec": seconds, "nsec": nanoseconds},
-        "parent_frame_id": result.pose.parent or "",
-        "child_frame_id": result.pose.name or "",
-        "translation": dict(zip("xyz", result.pose.components, strict=False)),
+        "timestamp": {"sec": seconds, "nsec": nanoseconds}, "parent_frame_id": result.pose.parent or "",
+        "child_frame_id": result.pose.name or "", "translation": dict(zip("xyz", result.pose.components, strict=False)),
         "rotation": dict(zip("xyzw", rotation, strict=True)),
-    }
+    }  # fmt: skip

@@ -85,14 +85,9 @@ def write_glb(scene: FrameScene) -> bytes:
     _add_axes(part)
     nodes, index = _nodes(scene, flat.poses, flat.axis)
     document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": f"frametool {__version__}"},
-        "extensionsUsed": ["KHR_materials_unlit"],
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": nodes,
-        "meshes": [MESH],
-        "materials": [MATERIAL],
-    }
+        "asset": {"version": "2.0", "generator": f"frametool {__version__}"}, "extensionsUsed": ["KHR_materials_unlit"],
+        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes, "meshes": [MESH], "materials": [MATERIAL],
+    }  # fmt: skip
     if animation := _animation(scene, index, part):
         document["animations"] = [animation]
     part.data += bytes(-len(part.data) % 4)

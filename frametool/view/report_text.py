@@ -21,15 +21,9 @@ if TYPE_CHECKING:
 
 
 HEADINGS = {
-    "rate_hz": "rate Hz",
-    "first_ns": "first",
-    "last_ns": "last",
-    "gap_s": "gap s",
-    "delay_mean_s": "delay s",
-    "delay_max_s": "max s",
-    "backward": "back",
-    "parent_changes": "parents",
-}
+    "rate_hz": "rate Hz", "first_ns": "first", "last_ns": "last", "gap_s": "gap s", "delay_mean_s": "delay s",
+    "delay_max_s": "max s", "backward": "back", "parent_changes": "parents",
+}  # fmt: skip
 MOTION = ("length_m", "duration_s", "speed_mean", "speed_max", "gaps")  # a sentence for each edge that moves
 HIDDEN = ("kind", "gap_until_ns", "parents", "overlap", *MOTION)
 RARE = ("parent_changes",)  # left out where all are 0
@@ -196,14 +190,9 @@ def form_entry(name: str) -> dict[str, Any]:
     """Return what the table says of a form, as plain values; None where it says nothing."""
     row = FORMATS[name]
     return {
-        "name": name,
-        "summary": row.summary,
-        "suffixes": row.suffixes,
-        "reads": row.reads,
-        "writes": row.writes,
-        "states": row.conventions or None,
-        "asks": tuple(map(option_of, row.required_options)),
-    }
+        "name": name, "summary": row.summary, "suffixes": row.suffixes, "reads": row.reads, "writes": row.writes,
+        "states": row.conventions or None, "asks": tuple(map(option_of, row.required_options)),
+    }  # fmt: skip
 
 
 def option_of(ask: str) -> str:
@@ -233,13 +222,10 @@ def write_form(entry: dict[str, Any]) -> str:
     """Return all there is to say of one form, with an example if its module shows one."""
     name = entry["name"]
     facts = {
-        "suffixes": " ".join(entry["suffixes"]),
-        "read as": ", ".join(entry["reads"]),
-        "written from": ", ".join(entry["writes"]),
-        "means": entry["states"],
-        "asks for": ", ".join(entry["asks"]),
+        "suffixes": " ".join(entry["suffixes"]), "read as": ", ".join(entry["reads"]),
+        "written from": ", ".join(entry["writes"]), "means": entry["states"], "asks for": ", ".join(entry["asks"]),
         "known by": ", ".join(_signs(name)),
-    }
+    }  # fmt: skip
     lines = "".join(_labelled(label, [text]) for label, text in facts.items() if text)
     example = "".join(f"    {line}\n" for line in example_of(name))
     return f"{name}: {entry['summary']}\n{lines}" + (f"  example\n{example}" if example else "")
