@@ -9,6 +9,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, alternatives, listing, shown
+from frametool.frames.topology import Groups
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -19,29 +20,6 @@ if TYPE_CHECKING:
 
     Pairs = Sequence[tuple[int, int]]
     Fixed = Sequence[tuple[str, str, Rigid]]
-
-class Groups:
-    """Bodies in groups that grow together (union-find)."""
-
-    def __init__(self, count: int, pairs: Iterable[tuple[int, int]] = ()) -> None:
-        """Start with groups of one, and join some pairs."""
-        self._up = list(range(count))
-        for a, b in pairs:
-            self.join(a, b)
-
-    def of(self, body: int) -> int:
-        """Return the number of a body's group: that of one of its bodies."""
-        up = self._up
-        while up[body] != body:
-            up[body] = body = up[up[body]]
-        return body
-
-    def join(self, a: int, b: int) -> bool:
-        """Put the group of a into that of b; return True if they were two."""
-        a, b = self.of(a), self.of(b)
-        self._up[a] = b
-        return a != b
-
 
 class SpanningTree(NamedTuple):
     """Rows that reach every body from the root on one way.
@@ -76,7 +54,7 @@ class SpanningTree(NamedTuple):
 
 def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree:
     """Grow the tree of the first rows that close no loop (Kruskal); together the rows join all bodies."""
-    groups = Groups(count)
+    groups = Groups[int]()
     near: list[list[tuple[int, int]]] = [[] for _ in range(count)]
     for row in rows:
         a, b = pairs[row]
@@ -95,21 +73,15 @@ def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree
 def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
     """Return the rows of a spanning tree that are in no loop with any of these rows."""
     found = {row for row in tree.row if row >= 0}
-    looped = list(range(len(tree.order)))  # the highest body that loops found so far join it with
-
-    def top(body: int) -> int:
-        while looped[body] != body:
-            looped[body] = body = looped[looped[body]]
-        return body
-
+    looped = Groups[int]()  # bodies that loops found so far join, the highest of each for all
     for row in set(rows) - found:
-        a, b = (top(body) for body in pairs[row])
+        a, b = map(looped.of, pairs[row])
         while a != b:
             if tree.depth[a] < tree.depth[b]:
                 a, b = b, a
             found.discard(tree.row[a])
-            looped[a] = tree.above[a]
-            a = top(a)
+            looped.join(a, tree.above[a])
+            a = looped.of(a)
     return found
 
 
@@ -165,7 +137,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
                         number[other], pose[other] = number[start], pose[name] @ edge
                         reached.append(other)
                     _require_same(name, other, pose[name] @ edge, pose[other])
-    return Bodies(root, frames, number, pose, _entries(frames, fixed))
+    return Bodies(root, frames, number, pose, _entries(fixed))
 
 
 def _require_same(name: str, other: str, one: Transform, two: Transform) -> None:
@@ -175,19 +147,18 @@ def _require_same(name: str, other: str, one: Transform, two: Transform) -> None
         raise ValueInvalid(f"{shown(other)} is fixed in {shown(name)} in two ways, {off} apart; fix one of them")
 
 
-def _entries(frames: tuple[str, ...], fixed: Fixed) -> dict[str, str]:
+def _entries(fixed: Fixed) -> dict[str, str]:
     """Return the parent of each frame that keeps one: every fixed edge but those that would close a loop."""
-    index = {name: at for at, name in enumerate(frames)}
-    groups, parents = Groups(len(frames)), {}
+    groups, parents = Groups[str](), dict[str, str]()
     for parent, child, _ in fixed:
-        if child not in parents and groups.join(index[child], index[parent]):
+        if child not in parents and groups.join(child, parent):
             parents[child] = parent
     return parents
 
 
 def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
     """Raise ValueInvalid, with the frames in their groups, where rows do not join all bodies."""
-    joined = Groups(bodies.size, pairs)
+    joined = Groups(pairs)
     groups: dict[int, list[str]] = {}
     for name in bodies.frames:
         groups.setdefault(joined.of(bodies.number[name]), []).append(name)

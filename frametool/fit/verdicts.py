@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, first_of, printable
-from frametool.fit.graph import Groups, bridges
+from frametool.fit.graph import bridges
 from frametool.fit.least_squares import KEPT, PoseArrays, applied, inverse, length
 from frametool.fit.tree_solver import Fitted, Noise, TreeProblem, jacobians, of_body
+from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
@@ -38,7 +39,7 @@ class Uncertainty:
         """Take a fit; nothing is computed before it is asked for."""
         self._problem, self._found = problem, found
         known = np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist()
-        self._known = Groups(problem.count, (problem.pairs[row] for row in known))
+        self._known = Groups(problem.pairs[row] for row in known)
 
     def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
         """Return the covariance of source in target, each a body and the pose of a frame of it."""

@@ -418,7 +418,7 @@ class FrameTree(Frames):
     def __init__(self, name: str = "") -> None:
         """Create an empty tree; `name` says in error messages where the frames come from."""
         super().__init__(name)
-        self.groups = Groups()  # of frames that hang together
+        self.groups = Groups[str]()  # of frames that hang together
 
     def add(self, parent: str, child: str, transform: Transform, covariance: Any = None) -> None:
         """Hang a frame under a parent; `transform` is parent_from_child, the pose of the child in its parent.

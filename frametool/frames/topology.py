@@ -5,44 +5,51 @@ Each mistake is a BadTopology without a place: a tree raises it, a loader adds w
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from math import isfinite
+from typing import Generic, TypeVar
 
 from frametool.errors import BadTopology, NotConnected, ValueInvalid, bare, shown
 from frametool.geometry.representations import EARTH_FRAMES
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Sequence
+    from collections.abc import Callable, Container, Iterable, Sequence
 
     from frametool.geometry.types import Components, Rigid
 
 MOST_SHOWN = 16  # frames of a cycle
 
 
-class Groups:
-    """Frames in groups that grow together (union-find)."""
+Member = TypeVar("Member", bound=Hashable)
 
-    def __init__(self) -> None:
-        """Begin with every frame alone."""
-        self._up: dict[str, str] = {}
 
-    def of(self, frame: str) -> str:
-        """Return the frame that stands for a group; the way to it is halved for the next time."""
+class Groups(Generic[Member]):
+    """Frames, or bodies, in groups that grow together (union-find)."""
+
+    def __init__(self, pairs: Iterable[tuple[Member, Member]] = ()) -> None:
+        """Begin with every one alone, and join some pairs."""
+        self._up: dict[Member, Member] = {}
+        for one, other in pairs:
+            self.join(one, other)
+
+    def of(self, member: Member) -> Member:
+        """Return the member that stands for a group; the way to it is halved for the next time."""
         up = self._up
-        while (above := up.get(frame)) is not None:
+        while (above := up.get(member)) is not None:
             further = up.get(above)
             if further is None:
                 return above
-            up[frame] = further
-            frame = further
-        return frame
+            up[member] = further
+            member = further
+        return member
 
-    def join(self, frame: str, other: str) -> bool:
-        """Put the group of a frame into that of another; return False if they are one already."""
-        frame, other = self.of(frame), self.of(other)
-        if frame != other:
-            self._up[frame] = other
-        return frame != other
+    def join(self, one: Member, other: Member) -> bool:
+        """Put the group of one into that of the other; return False if they are one already."""
+        one, other = self.of(one), self.of(other)
+        if one != other:
+            self._up[one] = other
+        return one != other
 
 
 def resolve_name(frame: str, known: Container[str]) -> str:

@@ -481,7 +481,7 @@ class _SdfTree:
         self.joints = joints = SdfJoints(frames)
         self.options = frames.options
         self.hung: dict[str, SdfJoint] = {}  # link -> the joint that it hangs on
-        self._groups = Groups()  # of links that hang together
+        self._groups = Groups[str]()  # of links that hang together
         for joint in joints.all:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
