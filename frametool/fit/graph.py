@@ -158,7 +158,9 @@ def _entries(fixed: Fixed) -> dict[str, str]:
 
 def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
     """Raise ValueInvalid, with the frames in their groups, where rows do not join all bodies."""
-    joined = Groups(pairs)
+    joined = Groups[int]()
+    for pair in pairs:
+        joined.join(*pair)
     groups: dict[int, list[str]] = {}
     for name in bodies.frames:
         groups.setdefault(joined.of(bodies.number[name]), []).append(name)

@@ -38,8 +38,9 @@ class Uncertainty:
     def __init__(self, problem: TreeProblem, found: Fitted) -> None:
         """Take a fit; nothing is computed before it is asked for."""
         self._problem, self._found = problem, found
-        known = np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist()
-        self._known = Groups(problem.pairs[row] for row in known)
+        self._known = Groups[int]()
+        for row in np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist():
+            self._known.join(*problem.pairs[row])
 
     def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
         """Return the covariance of source in target, each a body and the pose of a frame of it."""

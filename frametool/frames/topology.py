@@ -14,7 +14,7 @@ from frametool.geometry.representations import EARTH_FRAMES
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterable, Sequence
+    from collections.abc import Callable, Container, Sequence
 
     from frametool.geometry.types import Components, Rigid
 
@@ -27,11 +27,9 @@ Member = TypeVar("Member", bound=Hashable)
 class Groups(Generic[Member]):
     """Frames, or bodies, in groups that grow together (union-find)."""
 
-    def __init__(self, pairs: Iterable[tuple[Member, Member]] = ()) -> None:
-        """Begin with every one alone, and join some pairs."""
+    def __init__(self) -> None:
+        """Begin with every one alone."""
         self._up: dict[Member, Member] = {}
-        for one, other in pairs:
-            self.join(one, other)
 
     def of(self, member: Member) -> Member:
         """Return the member that stands for a group; the way to it is halved for the next time."""
