@@ -124,6 +124,22 @@ def _refuse_unsupported(
         kind.fail(f"{value} ({row.summary}) is not supported: {row.remedy}", param, ctx)
 
 
+def suffix_of(path: str) -> str:
+    """Return a file's suffix in small letters."""
+    return os.path.splitext(path)[1].lower()
+
+
+def file_with(*suffixes: str) -> Callable[[str], str]:
+    """Return what takes the name of a file that ends in one of some suffixes."""
+
+    def parse(path: str) -> str:
+        if suffix_of(path) not in suffixes:
+            raise ValueInvalid(f"{shown(path)} does not end in {' or '.join(suffixes)}")
+        return path
+
+    return parse
+
+
 class AxesName(Text):
     """A convention of axes, or the change from one to another: A_from_B."""
 

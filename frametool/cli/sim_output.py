@@ -12,12 +12,12 @@ from contextlib import ExitStack
 from functools import partial
 from itertools import combinations
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import Inputs, option, refuse, together
-from frametool.cli.options import FULL, Digits
+from frametool.cli.options import FULL, Digits, file_with, suffix_of
 from frametool.cli.output import PICTURES, drawn
 from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
@@ -37,10 +37,9 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from frametool.cli.sink import Write
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene
-    Watch = Callable[[SimulationStep], None]
+    Watch = Callable[[SimulationStep], object]
 
 
 
@@ -84,47 +83,43 @@ output_options = together(  # what is shown of a run
     _of_turtles("--reach D", "metres that count as having come to the target", parse_number, default=0.5),
     _of_turtles("--realtime", "one simulated second a second, instead of as fast as possible"),
     option("--live", "draw the turtles in the terminal, in real time"),
-    option("--view FILE.html", "show their frames over time in a page, as `view`"),
+    option("--view FILE.html", "show their frames over time in a page, as `view`", file_with(".html")),
     option("-f --format", "form of the records  [default: text on a terminal, yaml otherwise]", FORMS,
            name="format_name"),
     option("--precision N|full", "digits after the point  [default: the shortest text that reads back to the same "
            "bits]", Digits(), under="Result"),
     option("-o --output FILE", "write there instead of stdout, whole or not at all", under="Result"),
-    option("--plot FILE", "draw the result into a .svg, .html or .png"),
+    option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(*PICTURES)),
     option("--force", "let --output and --plot replace existing files", requires=("output", "plot", "view"),
            under="Result"),
 )  # fmt: skip
 
 
-class SimOutput(NamedTuple):
+class SimOutput:
     """What is shown of a run, and where: what the options of a command say."""
 
-    style: Style
-    output: str | None
-    emit: str = "commands"
-    reach: float = 0.5
-    realtime: bool = False
-    live: bool = False
-    plot: str | None = None
-    view: str | None = None
-    force: bool = False
-    leaders: bool = False
-
-    @classmethod
-    def of(cls, inputs: Inputs, *, leaders: bool = False) -> SimOutput:
-        """Take what the options say, and check what can be checked before anything runs.
-
-        Raises click.UsageError, FileProblem.
-        """
-        said = {name: getattr(inputs, name) for name in ("emit", "reach", "realtime", "live", "plot", "view", "force")}
-        path = None if inputs.output == "-" else inputs.output
-        made = cls(style_of(inputs), path, **said, leaders=leaders)
-        refuse(made.reach < 0.0, f"--reach must be 0 or more, found {made.reach:g}")
-        if made.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
+    def __init__(self, inputs: Inputs, *, leaders: bool = False) -> None:
+        """Check what can be checked before anything runs; raises click.UsageError, FileProblem."""
+        self.style, self.leaders = style_of(inputs), leaders
+        self.output: str | None = None if inputs.output == "-" else inputs.output
+        self.emit, self.reach, self.realtime, self.live = inputs.emit, inputs.reach, inputs.realtime, inputs.live
+        self.plot, self.view, self.force = inputs.plot, inputs.view, inputs.force
+        refuse(self.reach < 0.0, f"--reach must be 0 or more, found {self.reach:g}")
+        if self.live and not (sys.stdout.isatty() or sys.stderr.isatty()):
             raise click.UsageError("--live draws in a terminal, and neither stdout nor stderr is one; see --plot")
-        refuse(made.view and suffix_of(made.view) != ".html", f"--view takes a file .html; found {made.view}")
-        check_files(made.plot, made.output, made.view, force=made.force)
-        return made
+        named = (("--output", self.output), ("--plot", self.plot), ("--view", self.view))
+        files = [(name, path) for name, path in named if path]
+        for (name, path), (other, same) in combinations(files, 2):
+            if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
+                raise click.UsageError(f"{name} and {other} are the same file: {shown(path)}")
+        for _, path in files:
+            refuse_existing(path, force=self.force)
+            if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
+                raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
+        if suffix_of(self.plot or "") == ".png":
+            from frametool.view.pictures import require_matplotlib
+
+            require_matplotlib()
 
     def run(self, scene: Scene) -> None:
         """Run a scene to its end and sum it up on stderr.
@@ -177,18 +172,11 @@ class SimOutput(NamedTuple):
         else:
             yield log_events()
         if self.output is not None or not (self.live and sys.stdout.isatty()):
-            yield self._writing(stack.enter_context(writing(self.output, force=self.force)), scene)
-
-    def _writing(self, write: Write, scene: Scene) -> Watch:
-        """Return what writes a step's records, each at once, so that a reader at the other end of a pipe sees it."""
-        several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
-        writer = StepWriter(self.emit, self.style, leaders=self.leaders, labelled=several)
-
-        def watch(step: SimulationStep) -> None:
-            for text in writer.write(step):
-                write(text)
-
-        return watch
+            several = self.leaders or self.emit == "poses" or len(scene.followers) > 1
+            writer = StepWriter(self.emit, self.style, leaders=self.leaders, labelled=several)
+            write = stack.enter_context(writing(self.output, force=self.force))
+            # each record at once, so that a reader at the other end of a pipe sees it
+            yield lambda step: [write(text) for text in writer.write(step)]
 
 
 def real_time() -> Watch:
@@ -218,31 +206,6 @@ def style_of(inputs: Inputs) -> Style:
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
     form = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
     return Style(form, precision=None if precision == FULL else precision)
-
-
-def suffix_of(path: str) -> str:
-    """Return a file's suffix in small letters."""
-    return os.path.splitext(path)[1].lower()
-
-
-def check_files(plot: str | None, output: str | None, view: str | None, *, force: bool) -> None:
-    """Refuse before any work what could not be written after it.
-
-    Raises click.UsageError, FileProblem, ValueInvalid when matplotlib is missing.
-    """
-    refuse(plot and suffix_of(plot) not in PICTURES, f"--plot takes {', '.join(PICTURES)}; found {plot}")
-    files = {name: path for name, path in (("--output", output), ("--plot", plot), ("--view", view)) if path}
-    for (name, path), (other, same) in combinations(files.items(), 2):
-        if os.path.realpath(path) == os.path.realpath(same) and not is_special(path):
-            raise click.UsageError(f"{name} and {other} are the same file: {shown(path)}")
-    for path in files.values():
-        refuse_existing(path, force=force)
-        if path != "-" and not os.path.isdir(os.path.dirname(path) or "."):
-            raise FileProblem(f"{path}: no directory {os.path.dirname(path)}")
-    if plot and suffix_of(plot) == ".png":
-        from frametool.view.pictures import require_matplotlib
-
-        require_matplotlib()
 
 
 def leader_of(inputs: Inputs) -> MakeLeader:

@@ -252,7 +252,7 @@ BAD: tuple[tuple[str, dict[str, str], int, str], ...] = (
     ("m.yaml --fix f.yaml", {"m.yaml": LOOP, "f.yaml": "{name: x, parent: base_lnk, xyz: [1, 0, 0]}\n"}, 1,
      "f.yaml: no frame of it is measured: 'base_lnk'; did you mean 'base_link'?"),
     ("missing.yaml", {}, 5, "missing.yaml: no such file or directory"),
-    ("m.yaml -o t.yaml --report t.yaml", {"m.yaml": LOOP}, 2, "'t.yaml': a report is written as .json or .csv"),
+    ("m.yaml -o t.yaml --report t.yaml", {"m.yaml": LOOP}, 2, "'t.yaml' does not end in .json or .csv"),
     ("m.yaml -o t.json --report t.json", {"m.yaml": LOOP}, 2, "--report and -o name one file"),
 )  # fmt: skip
 
@@ -559,7 +559,7 @@ USAGE: tuple[tuple[str, str], ...] = (
     ("--points a b --names c,c", "'c,c': names stand with commas between them, each once"),
     ("- -", "standard input can be read once; only one argument may be -"),
     ("m.yaml --force", "--force needs --output"),
-    ("m.yaml --report r.html", "'r.html': a report is written as .json or .csv"),
+    ("m.yaml --report r.html", "'r.html' does not end in .json or .csv"),
 )  # fmt: skip
 
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from os.path import splitext
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli.command import OPTIONAL, Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import comparisons, error_options, pairing_options, trajectory_options
-from frametool.cli.options import list_options, reading_options
+from frametool.cli.options import file_with, list_options, reading_options, suffix_of
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.errors import FrametoolError, ValueInvalid, shown
+from frametool.errors import FrametoolError
 from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
@@ -28,15 +27,9 @@ TABLES = ("csv", "markdown", "latex")
 REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
 
 
-def _form_of(path: str) -> str:
+def _form_of(path: str | None) -> str:
     """Return the form of a report by its suffix, "" for what is none."""
-    return REPORTS.get(splitext(path)[1].lower(), "")
-
-
-def _read_report(path: str) -> str:
-    if not _form_of(path):
-        raise ValueInvalid(f"{shown(path)}: a report is written as .html or .svg")
-    return path
+    return REPORTS.get(suffix_of(path or ""), "")
 
 
 def _read_limits(text: str) -> list[Limit]:
@@ -54,7 +47,7 @@ def _read_limits(text: str) -> list[Limit]:
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result")
 @option("--fail LIMIT,..", "end with 1 where a number passes one: ate>5cm", _read_limits,
     name="limits")  # fmt: skip
-@option("--report FILE.html|svg", "also a plot of it, in one file; -o: instead", _read_report)
+@option("--report FILE.html|svg", "also a plot of it, in one file; -o: instead", file_with(*REPORTS))
 @trajectory_options
 @reading_options()
 @list_options("markdown", "latex")
@@ -71,11 +64,11 @@ def command(inputs: Inputs) -> int:
     """
     path, told, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
     limits, est = inputs.limits, inputs.est
-    instead = path if path and told is None and _form_of(path) else None
+    instead = path if told is None and _form_of(path) else None
     for name in filter(None, (report, instead)):
         refuse_existing(name, force=inputs.force)
     refuse(instead and rows, "--rows are CSV or JSON, no picture; write them with -f, or leave them out")
-    if len(est) > 1 and "svg" in (_form_of(report or ""), _form_of(instead or "")):
+    if len(est) > 1 and "svg" in (_form_of(report), _form_of(instead)):
         raise click.UsageError("an SVG shows one comparison; write .html for several")
     if explain and (rows or instead or told not in (None, "text")):
         raise click.UsageError("--explain writes text; leave --rows, -f and pictures out")

@@ -97,7 +97,7 @@ def follow(inputs: Inputs) -> None:
         _explain(inputs)
         return
     leader = leader_of(inputs)
-    SimOutput.of(inputs).run(scene_of(inputs, leader))
+    SimOutput(inputs).run(scene_of(inputs, leader))
 
 
 def _explain(inputs: Inputs) -> None:
@@ -148,7 +148,7 @@ def run(inputs: Inputs) -> None:
     law, rate, gain_linear, gain_angular, max_linear, max_angular, target, delay. Events are turtlesim's services:
     spawn, kill, reset, clear, teleport_absolute, teleport_relative, rotate_absolute (ROS 2), set_pen.
     """
-    output, duration = SimOutput.of(inputs), inputs.duration
+    output, duration = SimOutput(inputs), inputs.duration
     with inline_misuse():
         read = read_scene(source_of(inputs.scene), seed=inputs.seed)
     chosen = read if duration is None else read._replace(duration_ns=duration_ns(duration))
@@ -180,7 +180,7 @@ def teleop(inputs: Inputs) -> None:
     """
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {INSTEAD}")
     mailbox = Mailbox()
-    output, scene = SimOutput.of(inputs.but(live=True), leaders=True), scene_of(inputs, lambda: mailbox)
+    output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, lambda: mailbox)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
 

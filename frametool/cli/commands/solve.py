@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from os.path import realpath, splitext
+from os.path import realpath
 from typing import TYPE_CHECKING
 
 import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import read_span
-from frametool.cli.options import reading_options, result_options, whole_pose_options
+from frametool.cli.options import file_with, reading_options, result_options, suffix_of, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import tell
@@ -19,20 +19,12 @@ from frametool.errors import ValueInvalid, shown, warn
 from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
     from frametool.view.fit_text import Solution
 
-REPORTS = {".json": "json", ".csv": "csv"}
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
 SHAPES = ("hand_eye", "points")
 FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
-
-
-def _read_report(path: str) -> str:
-    if splitext(path)[1].lower() not in REPORTS:
-        raise ValueInvalid(f"{shown(path)}: a report is written as .json or .csv")
-    return path
 
 
 def _read_names(text: str) -> list[str]:
@@ -56,7 +48,7 @@ def _read_names(text: str) -> list[str]:
 @option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names,
     requires=("hand_eye", "points"))  # fmt: skip
 @option("--no-robust", "use all rows, wrong ones too")
-@option("--report FILE.json|csv", "numbers of the fit and of each row", _read_report)
+@option("--report FILE.json|csv", "numbers of the fit and of each row", file_with(".json", ".csv"))
 @reading_options()
 @whole_pose_options
 @result_options("tree", "trajectory")
@@ -74,9 +66,15 @@ def command(inputs: Inputs) -> int:
     base<-gripper, TARGET camera<-target, row by row or by their stamps; SAMPLES are {gripper, target}, or of
     moveit_calibration or easy_handeye. Points are matched by id, else by row; a column weight counts.
     """
-    _use_one_thread()
+    for library in ("OPENBLAS", "OMP", "MKL"):  # sums come out in one order: the same bytes each run
+        os.environ[f"{library}_NUM_THREADS"] = "1"
     hand_eye, points, files = inputs.hand_eye, inputs.points, inputs.files
-    _refuse_misuse(files, "--hand-eye" if hand_eye else "--points" if points else "", inputs.peek("names"))
+    refuse_two_readers(files)
+    if hand_eye and len(files) > 2:
+        raise click.UsageError(f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {len(files)} files")
+    refuse(points and len(files) != 2, f"--points takes two files, A B, found {len(files)}")
+    wanted, named = (4, "four names, BASE,GRIPPER,CAMERA,TARGET") if hand_eye else (2, "two names, A,B")
+    refuse(len(inputs.peek("names") or ()) not in (0, wanted), f"--names takes {named}")
     report, path, force = inputs.report, inputs.output, inputs.force
     refuse(report and path and realpath(report) == realpath(path), "--report and -o name one file")
     for name in filter(None, (report, path)):
@@ -86,44 +84,16 @@ def command(inputs: Inputs) -> int:
         raise ValueInvalid(f"{output.style.form} has no place for a scale; write json, yaml or csv")
     from frametool.cli import solving
 
-    robust = not inputs.no_robust
-    if hand_eye:
-        gap = inputs.max_gap_ns if len(files) > 1 else None
-        found = solving.solved_hand_eye(
-            files, eye_to_hand=inputs.eye_to_hand, max_gap_ns=gap, names=inputs.names, robust=robust,
-            normalize=inputs.normalize,
-        )  # fmt: skip
-    elif points:
-        found = solving.solved_points(files, names=inputs.names, scale=inputs.scale, robust=robust)
-    else:
-        chosen = {name: getattr(inputs, name) for name in ("root", "fix", "without", "normalize")}
-        found = solving.solved_tree(files, robust=robust, **chosen)
+    solve = solving.solved_hand_eye if hand_eye else solving.solved_points if points else solving.solved_tree
+    found = solve(inputs, files, robust=not inputs.no_robust)
     from frametool.view.fit_text import write_left_out, write_solution
 
-    said = (write_left_out if inputs.quiet else write_solution)(found)
-    if said:
+    if said := (write_left_out if inputs.quiet else write_solution)(found):
         tell(said.rstrip("\n"))
     if report:
         _write_report(found, report, force=force)
     _write(output, found, on_hand=not (hand_eye and inputs.eye_to_hand))
     return ROWS_SKIPPED if found.left_out else 0
-
-
-def _use_one_thread() -> None:
-    """Make sums come out in one order, whatever the surroundings say: the same bytes each run."""
-    for library in ("OPENBLAS", "OMP", "MKL"):
-        os.environ[f"{library}_NUM_THREADS"] = "1"
-
-
-def _refuse_misuse(files: Sequence[str], shape: str, names: Sequence[str] | None) -> None:
-    """Raise a usage error for options of another shape, and for too many or too few files."""
-    refuse_two_readers(files)
-    if shape == "--hand-eye" and len(files) > 2:
-        raise click.UsageError(f"--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found {len(files)} files")
-    refuse(shape == "--points" and len(files) != 2, f"--points takes two files, A B, found {len(files)}")
-    if names and len(names) != (wanted := 4 if shape == "--hand-eye" else 2):
-        said = "four names, BASE,GRIPPER,CAMERA,TARGET" if wanted == 4 else "two names, A,B"
-        raise click.UsageError(f"--names takes {said}")
 
 
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
@@ -134,8 +104,7 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
         from frametool.grammar.result import Result, uncertain
 
         poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
-        covariances = [uncertain(each.covariance) for each in entries]
-        output.poses([Result(*each) for each in zip(poses, covariances, strict=True)])
+        output.poses([Result(pose, uncertain(each.covariance)) for pose, each in zip(poses, entries, strict=True)])
     elif output.style.form == "handeye" and found.shape == "hand-eye":
         from frametool.formats.trees.handeye import write_mount
 
@@ -159,7 +128,7 @@ def _write_report(found: Solution, path: str, *, force: bool) -> None:
     """Write the numbers of the fit as one document, or those of its rows as a table."""
     from frametool.view.fit_text import report, row_report
 
-    if REPORTS[splitext(path)[1].lower()] == "csv":
+    if suffix_of(path) == ".csv":
         from frametool.formats.rows.csv import write_points
         from frametool.grammar.result import Style
 
