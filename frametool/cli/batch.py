@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import click
 
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
-from frametool.cli.shell_words import NAME, ShellWords, split
+from frametool.cli.shell_words import NAME, goes_on, has_words, split
 from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.cli.trees import TreeCache
 from frametool.documents.source import MOST_CHARACTERS, UTF16, decode
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives
 from frametool.grammar.rotation_spelling import ROTATION_KEYS
+from frametool.ros.messages import LISTS
 from frametool.stream.faults import ROWS_SKIPPED, Misused, RowsSkipped
 from frametool.stream.record import POINT_KEYS
 from frametool.stream.row_layout import PARTS
@@ -39,12 +40,14 @@ class CommandLine(NamedTuple):
 
     number: of its first line
     name: what its result is kept as; "" if it is printed
-    words: those of the command; without any, the line is blank or a comment
+    text: the command itself
+    problem: why it cannot be taken
     """
 
     number: int
     name: str
-    words: ShellWords
+    text: str
+    problem: str
 
 
 def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
@@ -55,26 +58,23 @@ def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
     lines = _lines(stream, source)
     for number, begin, wrong in lines:
         text, problem, joined = begin, wrong, 1
-        name, words = _taken_apart(text)
-        while words.goes_on and not problem:  # a backslash joins the next line to this one
+        while goes_on(_parted(text)[1]) and not problem:  # a backslash joins the next line to this one
             _, more, problem = next(lines, (0, "", ""))
             text = text[:-1] + more
             joined += 1
             if joined > MOST_JOINED:
                 raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
-            name, words = _taken_apart(text)
-        yield CommandLine(number, name, ShellWords([], problem) if problem else words)
+        name, text = _parted(text)
+        if name and not has_words(text):
+            problem = problem or f"no command behind {name} ="
+        if problem or has_words(text):
+            yield CommandLine(number, name, text, problem)
 
 
-def _taken_apart(text: str) -> tuple[str, ShellWords]:
-    """Return the name before `=`, if there is one, and the words behind it."""
+def _parted(text: str) -> tuple[str, str]:
+    """Return the name before `=`, if there is one, and the command behind it."""
     found = _ASSIGNMENT.match(text)
-    if found is None:
-        return "", split(text)
-    words = split(text[found.end() :])
-    if not (words.words or words.problem or words.goes_on):
-        words = ShellWords([], f"no command behind {found[1]} =")
-    return found[1], words
+    return ("", text) if found is None else (found[1], text[found.end() :])
 
 
 def _lines(stream: BinaryIO, source: str) -> Iterator[tuple[int, str, str]]:
@@ -90,8 +90,7 @@ def _lines(stream: BinaryIO, source: str) -> Iterator[tuple[int, str, str]]:
             yield number, "", error.message
 
 
-OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
-OF_RECORDS = {*POINT_KEYS, *ROTATION_KEYS, *PARTS, "x", "y", "z"}
+KEPT = {"frames", *LISTS, *POINT_KEYS, *ROTATION_KEYS, *PARTS, "x", "y", "z"}  # keys of trees, and of records
 READABLE = ("json", "yaml")  # the same numbers; other forms are for printing
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
@@ -116,6 +115,8 @@ class KeptResults:
 
     def keep(self, name: str, text: str) -> None:
         """Keep a result that was printed as JSON; raise ValueInvalid for what no name can keep."""
+        if len(text) > MOST_CHARACTERS:
+            raise ValueInvalid(f"a result of more than {MOST_CHARACTERS} bytes; {KEPT_ARE}")
         lines = text.count("\n")
         if lines != 1:
             raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
@@ -124,7 +125,7 @@ class KeptResults:
         except ValueError:
             raise ValueInvalid(f"{name}: the result is text; {KEPT_ARE}") from None
         keys = set(value) if isinstance(value, dict) else set()
-        if not (isinstance(value, float | int) or keys & OF_TREES or keys & OF_RECORDS):
+        if not (isinstance(value, float | int) or keys & KEPT):
             raise ValueInvalid(f"{name}: the result is a report; {KEPT_ARE}")
         self._texts[name] = text.strip()
         self._failed.pop(name, None)
@@ -141,22 +142,11 @@ def print_as_json(name: str, context: click.Context) -> None:
     if "json" not in getattr(formats, "choices", ()):
         raise Misused(f"{name}: {context.info_name} has no result that can be kept; {KEPT_ARE}")
     params = context.params
-    for param, option in (("output", "-o FILE"), ("explain", "--explain")):
-        if params.get(param):
-            raise Misused(f"{name}: a result is kept or written, not both; leave {option} or {name} = out")
+    if other := ("-o FILE" if params.get("output") else "--explain" if params.get("explain") else ""):
+        raise Misused(f"{name}: a result is kept or written, not both; leave {other} or {name} = out")
     if params["format_name"] not in (None, *READABLE):
         raise Misused(f"{name}: -f {params['format_name']} is for printing, and {name} is kept; leave it out")
     params["format_name"] = "json"
-
-
-class _Limited(BytesIO):
-    """Bytes, no more of them than a document may have."""
-
-    def write(self, data: Any) -> int:
-        """Take some more."""
-        if self.tell() + len(data) > MOST_CHARACTERS:
-            raise ValueInvalid(f"a result of more than {MOST_CHARACTERS} bytes; {KEPT_ARE}")
-        return super().write(data)
 
 
 FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows, as it was told to, has come to its end
@@ -188,8 +178,6 @@ class CommandBatch:
         """Run the commands of a stream as they come and return the exit status of all."""
         with _as_in_a_pipe():
             for line in command_lines(stream, self.source):
-                if not (line.words.words or line.words.problem):
-                    continue
                 self.count += 1
                 status = self._run_line(line)
                 if status in FINISHED:
@@ -211,9 +199,9 @@ class CommandBatch:
         problem: FrametoolError
         with telling_of(BatchLine(self.source, line.number)):
             try:
-                if line.words.problem:
-                    raise Misused(line.words.problem)
-                words = line.words.with_values(self.results.value_of)
+                if line.problem:
+                    raise Misused(line.problem)
+                words = split(line.text, self.results.value_of)
                 status = self._called(words, line.name)
                 if status in FINISHED:
                     return status
@@ -237,7 +225,7 @@ class CommandBatch:
         if not name:
             is_own = words[0].startswith("-")  # an option of frametool itself
             return answered(lambda: called(words) if is_own else called_in(self.context, words), words)
-        held = _Limited()
+        held = BytesIO()
         with redirect_stdout(TextIOWrapper(held, "utf-8", newline="\n", write_through=True)) as stream:
             status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
         if status in FINISHED:

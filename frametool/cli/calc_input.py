@@ -35,6 +35,7 @@ from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit
 from frametool.grammar.readers import tell as tell_notes
 from frametool.grammar.result import Result, Style
+from frametool.ros.messages import LISTS
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
 if TYPE_CHECKING:
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
 
-OF_TREES = frozenset(("frames", "transforms", "static_transforms"))
 LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 LONGEST_PATH = 4096
 
@@ -94,7 +94,7 @@ def _values(source: Source, scope: Scope) -> Term | None:
     from frametool.stream.request import Request
 
     documents = [document.value for document in parse_documents(source.text, source.name)]
-    if any(type(each) is dict and not OF_TREES.isdisjoint(each) for each in documents):
+    if any(type(each) is dict and not {"frames", *LISTS}.isdisjoint(each) for each in documents):
         return None
     alone = documents[0] if len(documents) == 1 and type(documents[0]) is dict else {}
     if not PLACED.keys().isdisjoint(alone) or any(map(may_be_on_earth, alone)):
@@ -238,13 +238,12 @@ def _csv(terms: Sequence[Term], style: Style) -> str:
             raise ValueInvalid("a table holds poses or other values; write json or yaml")
         if isinstance(result, float):
             rows.append({RESULT: result})
-            continue
-        if style.place is not None and term.type.kind == POINT:
+        elif style.place is not None and term.type.kind == POINT:
             rows.append(result)
-            continue
-        *frame, (key, numbers) = result.items()
-        names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
-        rows.append(dict(frame) | dict(zip(names, numbers, strict=True)))
+        else:
+            *frame, (key, numbers) = result.items()
+            names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
+            rows.append(dict(frame) | dict(zip(names, numbers, strict=True)))
     return str(module.write_points(rows, style))
 
 
@@ -281,24 +280,12 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
         if last is not None:
             yield last
 
-    texts = value_texts if output.style.form == "csv" else _parted
-    output.pieces(texts(values(), output.style))
+    output.pieces(value_texts(values(), output.style))
     if not bad.count:
         return 0
     message = f"stdin: {bad.count} of {count} lines skipped"
     bad.tell(RowsSkipped(message, source="stdin", bad=bad.count, rows=count))
     return ROWS_SKIPPED
-
-
-def _parted(terms: Iterable[Term], style: Style) -> Iterator[str]:
-    """Yield the texts of values as they come, and what stands between them."""
-    is_first = True
-    for term in terms:
-        text = "".join(value_texts([term], style))
-        if not is_first and (style.form == "yaml" or (style.form == "text" and text.count("\n") > 1)):
-            yield "---\n" if style.form == "yaml" else "\n"
-        yield text
-        is_first = False
 
 
 def _piped_lines() -> Iterator[str]:

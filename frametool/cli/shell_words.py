@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from frametool.stream.faults import Misused
 
@@ -27,107 +27,75 @@ _TOKEN = re.compile(
     | (?P<plain> [^ \t\r\n\\'"#$|&;<>`]+ | \#)
     | '(?P<single> [^']*)'
     | "(?P<double> (?:[^"\\]|\\.)*)"
+    | (?P<open> ['"].*)
     | \\(?P<escaped> .)
     | (?P<dollar> \$['"] | {_DOLLAR})
     | (?P<special> .)
     """
 )
-_IN_QUOTES = re.compile(rf"(?s)\\(?P<escaped>.)|(?P<dollar>{_DOLLAR})|(?P<special>`)|(?P<plain>[^\\$`]+)")
+_IN_QUOTES = re.compile(rf"(?s)\\(?P<quoted>.)|(?P<dollar>{_DOLLAR})|(?P<special>`)")
+_LINES, _NAMES = "write one command a line", "keep a result by NAME = COMMAND and give $NAME"
 _INSTEAD = {
-    "|": "keep a result by NAME = COMMAND and give $NAME",
-    "<": "name the file as an argument, or with -i",
-    ">": "write files with -o FILE",
-    ";": "write one command a line",
-    "&": "write one command a line",
-    "`": "keep a result by NAME = COMMAND and give $NAME",
-    "$(": "keep a result by NAME = COMMAND and give $NAME",
-}
+    "|": _NAMES, "`": _NAMES, "$(": _NAMES, "<": "name the file as an argument, or with -i",
+    ">": "write files with -o FILE", ";": _LINES, "&": _LINES,
+}  # fmt: skip
 
 
-class WordPart(NamedTuple):
-    """A piece of a word: text, or the name whose value stands there."""
-
-    text: str
-    is_name: bool = False
-
-
-class ShellWords(NamedTuple):
-    """The words of a line, each in its pieces.
-
-    problem: why they cannot be taken; "" if they can
-    goes_on: the line ends in a backslash, so the next one belongs to it
-    """
-
-    words: list[list[WordPart]]
-    problem: str = ""
-    goes_on: bool = False
-
-    def with_values(self, value_of: Callable[[str], str]) -> list[str]:
-        """Return the words with the values of names in them."""
-        return ["".join(value_of(part.text) if part.is_name else part.text for part in word) for word in self.words]
-
-
-def split(line: str) -> ShellWords:
-    """Take a line apart; a `#` that begins a word begins a comment."""
-    words: list[list[WordPart]] = []
-    word: list[WordPart] | None = None
-    problem = ""
+def _tokens(line: str) -> Iterator[tuple[re.Match[str], bool]]:
+    """Yield the tokens of a line up to a comment, each with whether a word begins there."""
+    begins = True
     for token in _TOKEN.finditer(line):
-        kind, text = token.lastgroup or "", token[0]
-        if kind == "blank":
-            word = None
-            continue
-        if text == "#" and word is None:
-            break
-        if kind == "special" and (text == "\\" or (text in "'\"" and _ends_in_backslash(line))):
-            return ShellWords(words, problem, goes_on=True)
-        if kind == "special" and text in "'\"":
-            return ShellWords(words, problem or f"the {text} in column {token.start() + 1} is not closed")
-        try:
-            parts = list(_parts(kind, token[kind], is_first=word is None))
-        except Misused as refused:
-            problem = problem or str(refused)
-            parts = []
-        if word is None:
-            word = []
-            words.append(word)
-        word += parts
-    return ShellWords(words, problem)
+        if begins and token[0] == "#":
+            return
+        yield token, begins
+        begins = token.lastgroup == "blank"
 
 
-def _parts(kind: str, text: str, *, is_first: bool = False) -> Iterator[WordPart]:
-    """Yield the pieces of a token; raise Misused for what only a shell can do."""
+def has_words(line: str) -> bool:
+    """Return True for a line that is neither blank nor a comment."""
+    return any(token.lastgroup != "blank" for token, _ in _tokens(line))
+
+
+def goes_on(line: str) -> bool:
+    """Return True for a line that ends in a backslash which no other one takes and which is in no comment."""
+    backslashes = len(line) - len(line.rstrip("\\"))
+    return backslashes % 2 == 1 and any(token.end() == len(line) for token, _ in _tokens(line))
+
+
+def split(line: str, value_of: Callable[[str], str]) -> list[str]:
+    """Return the words of a line with the values of names in them; raise Misused for what cannot be taken."""
+    words: list[str] = []
+    for token, begins in _tokens(line):
+        kind = token.lastgroup or ""
+        if kind == "open":
+            raise Misused(f"the {token[0][0]} in column {token.start() + 1} is not closed")
+        if kind != "blank":
+            words += [""] * begins
+            words[-1] += _text(kind, token[kind], value_of, begins=begins)
+    return words
+
+
+def _text(kind: str, text: str, value_of: Callable[[str], str], *, begins: bool = False) -> str:
+    """Return what a token stands for."""
     if kind == "double":
-        for token in _IN_QUOTES.finditer(text):
-            inner = token.lastgroup or ""
-            yield from _parts("quoted" if inner == "escaped" else inner, token[inner])
-    elif kind == "dollar":
-        yield _named(text)
-    elif kind == "special":
+        return _IN_QUOTES.sub(lambda each: _text(each.lastgroup or "", each[each.lastgroup or ""], value_of), text)
+    if kind == "dollar":
+        return _dollar(text, value_of)
+    if kind == "special":
         raise Misused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
-    elif kind == "quoted":  # a backslash in double quotes stays before what needs none
-        yield WordPart(text if text in '$`"\\' else f"\\{text}")
-    elif kind == "plain" and is_first and text.startswith("~/"):
-        yield WordPart(os.path.expanduser(text))
-    else:
-        yield WordPart(text)
+    if kind == "quoted":  # a backslash in double quotes stays before what needs none
+        return text if text in '$`"\\' else f"\\{text}"
+    return os.path.expanduser(text) if kind == "plain" and begins and text.startswith("~/") else text
 
 
-def _named(text: str) -> WordPart:
+def _dollar(text: str, value_of: Callable[[str], str]) -> str:
     """Return what a dollar sign and what follows it stand for."""
     behind = text[1:]
     bare = behind[1:-1] if behind.startswith("{") else behind
     if re.fullmatch(NAME, bare):
-        return WordPart(bare, is_name=True)
-    if behind == "$":
-        return WordPart("$")
+        return value_of(bare)
     if behind == "(":
         raise Misused(f"$( is for a shell: {_INSTEAD['$(']}; in single quotes it is text")
-    if not behind:
-        return WordPart(text)
-    raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
-
-
-def _ends_in_backslash(line: str) -> bool:
-    """Tell whether the last character is a backslash that no other one takes."""
-    return (len(line) - len(line.rstrip("\\"))) % 2 == 1
+    if behind not in ("", "$"):
+        raise Misused(f"{text} names nothing: names are letters, digits and _; $$ is a dollar sign")
+    return "$"
