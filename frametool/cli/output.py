@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from click import UsageError
 
 from frametool.cli.options import FULL
-from frametool.cli.sink import is_special, writing
+from frametool.cli.sink import filling, is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats.table import (
@@ -385,11 +385,7 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
 
 def opened_place(form: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
     """Open the place where results of a form go."""
-    if is_folder(form) and path is not None:
-        from frametool.cli.folder_sink import filling
-
-        return filling(path, force=force)
-    return writing(path, force=force)
+    return filling(path, force=force) if is_folder(form) and path is not None else writing(path, force=force)
 
 
 PICTURES = (".svg", ".html", ".png")

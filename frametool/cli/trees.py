@@ -9,7 +9,7 @@ import os
 import sys
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -45,58 +45,42 @@ MOST_BYTES = 1 << 28  # of the files and texts they were read from
 SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
 
 
-class Remembered(NamedTuple):
-    """A value, and the files it was read from as they were then."""
-
-    value: Any
-    files: dict[str, list[FileState]]
-    size: int
-
-    def is_current(self) -> bool:
-        """Tell whether all files still are what was read."""
-        try:
-            return all(states_of(path) == states for path, states in self.files.items())
-        except OSError:
-            return False
-
-
 class TreeCache:
     """What the lines of a batch have read last, mostly trees; its context keeps one.
 
-    The key of a value is all that says how it was read.
+    Each value stands with the states of its files as it was read, and their size; its key is all that says how.
     """
 
     def __init__(self) -> None:
         """Create an empty cache."""
-        self._values: dict[Hashable, Remembered] = {}
+        self._values: dict[Hashable, tuple[Any, dict[str, list[FileState]], int]] = {}
 
     def read(self, arguments: Sequence[str], options: Hashable, read: Callable[[], Value]) -> Value:
         """Return what `read` makes of some arguments: as it did before, or anew where a file has changed."""
         key = (tuple(arguments), options)
         found = self._values.pop(key, None)
-        if found is None or not found.is_current():
+        if found is None or not _are_current(found[1]):
             texts = [argument for argument in arguments if is_inline(argument)]
             with noting_files() as files:
-                for argument in arguments:
-                    if argument not in texts and os.path.exists(argument):
-                        files[argument] = states_of(argument)
+                files |= {each: states_of(each) for each in arguments if each not in texts and os.path.exists(each)}
                 value = read()
-            if not _may_be_kept(files):
+            states = [state for each in files.values() for state in each]
+            plain = all(os.path.isfile(path) or os.path.isdir(path) for path in files)  # which can be read again
+            if not plain or max((each.ctime_ns for each in states), default=0) >= time.time_ns() - SETTLED_NS:
                 return value
-            size = sum(map(len, texts)) + sum(state.size for states in files.values() for state in states)
-            found = Remembered(value, files, size)
+            found = value, files, sum(map(len, texts)) + sum(each.size for each in states)
         self._values[key] = found  # as the youngest
-        while len(self._values) > MOST or sum(each.size for each in self._values.values()) > MOST_BYTES:
+        while len(self._values) > MOST or sum(size for *_, size in self._values.values()) > MOST_BYTES:
             del self._values[next(iter(self._values))]
-        return found.value  # type: ignore[no-any-return]
+        return found[0]
 
 
-def _may_be_kept(files: dict[str, list[FileState]]) -> bool:
-    """Tell whether files can be read again, and whether a change would show."""
-    plain = all(os.path.isfile(path) or os.path.isdir(path) for path in files)
-    youngest = max((state.ctime_ns for states in files.values() for state in states), default=0)
-    return plain and youngest < time.time_ns() - SETTLED_NS
-
+def _are_current(files: dict[str, list[FileState]]) -> bool:
+    """Return True if all files still are what was read."""
+    try:
+        return all(states_of(path) == states for path, states in files.items())
+    except OSError:
+        return False
 
 
 def load_tree(
