@@ -138,8 +138,7 @@ class Sheet:
 
     def __init__(self, digits: int | None = DIGITS, *, clean: bool) -> None:
         """Begin an empty sheet."""
-        self.digits = digits
-        self.clean = clean
+        self.digits, self.clean = digits, clean
         self.items: list[Item] = []
         self.matrices: dict[str, Matrix] = {}
         self.reach = 1.0

@@ -156,7 +156,7 @@ _BIN = _arrays(
 )  # fmt: skip
 _XYZI = ("x", "y", "z", "intensity")
 _LAS_HEAD = rb"LASF.{100}"
-_ARROW = _arrays("", "frametool.formats.rows.arrow_files", texts=True)
+_ARROW = _arrays("", "frametool.formats.rows.arrow", texts=True)
 
 FORMATS = {
     "yaml": Format(

@@ -13,8 +13,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER
-from frametool.formats.rows.trajectory import StampFile, blocks, describe
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, describe
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from io import BufferedReader
 
     from frametool.formats.rows.column_file import Batch
-    from frametool.formats.rows.trajectory import PoseBlock
+    from frametool.formats.rows.pose_rows import PoseBlock
     from frametool.formats.table import Poses
     from frametool.grammar.edges import Answers
     from frametool.grammar.result import Style

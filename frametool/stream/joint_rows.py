@@ -18,7 +18,7 @@ from frametool.grammar.edges import Tally
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
-from frametool.ros import joint_state, messages
+from frametool.ros import messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.stream.faults import Fault, Misused
 from frametool.stream.record_text import without_noise
@@ -150,7 +150,7 @@ def echoed(begin: bytes) -> str:
     first = _lines_of(begin)[:1] or [""]
     if first[0].startswith("%time,"):
         return "csv1"
-    return "csv2" if joint_state.looks_like_row(first[0]) else ""
+    return "csv2" if messages.looks_like_row(first[0]) else ""
 
 
 def _lines_of(begin: bytes) -> list[str]:
@@ -162,13 +162,13 @@ def _echoed_names(begin: bytes, source: str) -> list[str]:
     lines = _lines_of(begin)
     try:
         if echoed(begin) == "csv2":
-            state = joint_state.of_row(joint_state.unquoted(lines[0]))
+            state = messages.of_row(messages.unquoted(lines[0]))
         else:
             header = lines[0].split(",")
             cells = lines[1].split(",") if len(lines) > 1 else []
             names = [name.removeprefix("field.") for name in header]
-            state = joint_state.of_numbered(dict(zip(names, cells, strict=False)))
-        return [joint for joint, *_ in joint_state.positions(state)]
+            state = messages.of_numbered(dict(zip(names, cells, strict=False)))
+        return [joint for joint, *_ in messages.positions(state)]
     except Misfit as misfit:
         raise FormatError(str(misfit), source=source, line=1) from None
 
@@ -183,8 +183,8 @@ def _keys(begin: bytes, form: str, source: str) -> list[str]:
     if type(value) is not dict:
         raise FormatError("expected a mapping with a key for each joint, or JointState messages", source=source, line=1)
     inner = value["msg"] if messages.is_envelope(value) else value
-    if joint_state.is_joint_state(inner):
-        return [joint for joint, *_ in joint_state.positions(inner)]
+    if messages.is_joint_state(inner):
+        return [joint for joint, *_ in messages.positions(inner)]
     return list(_flat_keys(value))
 
 
@@ -211,8 +211,8 @@ def joint_poses(stream: BinaryIO, rows: JointRows, bad: BadRows, *, numbered: bo
             if isinstance(message, FormatError):
                 raise message
             value: Any = message.value
-            state = joint_state.of_numbered(value) if numbered else joint_state.of_row(joint_state.unquoted(value))
-            stamp_ns = joint_state.stamp_of_state(state)
+            state = messages.of_numbered(value) if numbered else messages.of_row(messages.unquoted(value))
+            stamp_ns = messages.stamp_of_state(state)
             stamp = {} if stamp_ns is None else {"stamp_ns": stamp_ns}
             yield Result(Pose.of(_pose(state, rows), rows.tip, rows.base), stamp)
         except (FormatError, ValueInvalid) as error:
@@ -230,7 +230,7 @@ def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[Messag
 
 def _pose(state: dict[str, Any], rows: JointRows) -> Any:
     """Return the pose for one message."""
-    found = {joint: parse_number(text) for joint, text, _ in joint_state.positions(state)}
+    found = {joint: parse_number(text) for joint, text, _ in messages.positions(state)}
     if missing := [joint for joint in rows.columns if joint not in found]:
         raise Misfit(f"no position of {listing(missing)} in it")
     return rows.result("", (), [found[joint] for joint in rows.columns], None, floats)

@@ -355,10 +355,10 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
 
     A JointState gives way to the pose, and the frame in its header becomes that of the pose.
     """
-    from frametool.ros import joint_state
+    from frametool.ros import messages
 
-    if joint_state.is_joint_state(value):
-        members = tuple(key for key in joint_state.LISTS if key in value)
+    if messages.is_joint_state(value):
+        members = tuple(key for key in messages.STATE_LISTS if key in value)
         header, parent = value.get("header"), Name()
         record = Record(path, Shape("", None), members=members)
         if type(header) is dict:

@@ -162,13 +162,13 @@ def key_path(document: Any, holder: Path, name: str, wanted: str = "a time like 
 
     The name of a joint leads to its position in a JointState.
     """
-    from frametool.ros import joint_state
+    from frametool.ros import messages
 
     around = [document]
     for step in holder:
         around.append(around[-1][step])
     for depth in range(len(holder), -1, -1):
-        if (position := joint_state.position_of(name, around[depth])) is not None:
+        if (position := messages.position_of(name, around[depth])) is not None:
             return (*holder[:depth], *position)
         steps = name.split(".")
         for keys in ((name,), steps, [int(each) if each.isdecimal() else each for each in steps]):

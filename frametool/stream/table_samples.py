@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 from frametool.documents.source import not_text
 from frametool.errors import FormatError
-from frametool.formats.rows.trajectory import StampFile, describe
+from frametool.formats.rows.pose_rows import StampFile, describe
 from frametool.formats.table import FORMATS
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation

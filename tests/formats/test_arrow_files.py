@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import frametool
-from frametool.formats.rows.arrow_files import codec_in
+from frametool.formats.rows.arrow import codec_in
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")

@@ -39,7 +39,7 @@ from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.readers import Misfit, as_mapping, kind
-from frametool.ros import joint_state, messages
+from frametool.ros import messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
 from frametool.text.csv_line import split_line
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
@@ -421,11 +421,11 @@ class JointFile:
         else:
             try:
                 mapping = as_mapping(value, "a map of joints, or a JointState")
-                if not joint_state.is_joint_state(mapping):
+                if not messages.is_joint_state(mapping):
                     yield from self._map(mapping, path, message)
                     return
-                stamp_ns = joint_state.stamp_of_state(mapping)
-                for joint, position, place in joint_state.positions(mapping):
+                stamp_ns = messages.stamp_of_state(mapping)
+                for joint, position, place in messages.positions(mapping):
                     refuse = partial(_refused, message, (*path, *place))
                     yield JointSample(joint, _finite(position, place), stamp_ns, refuse, message.source)
             except Misfit as misfit:
@@ -450,11 +450,11 @@ class JointFile:
         name = self.file.name
         if first.startswith("%time,"):
             rows = read_messages(self.file.stream, name, "csv1", self.tally)
-            yield from self._messages(rows, joint_state.of_numbered)
-        elif joint_state.looks_like_row(first):
+            yield from self._messages(rows, messages.of_numbered)
+        elif messages.looks_like_row(first):
             texts = line_texts(self.file.stream, name, self.tally)
             rows = (Message(text, Source(name, text), line, cells=True) for line, text in texts)
-            yield from self._messages(rows, lambda row: joint_state.of_row(joint_state.unquoted(row)))
+            yield from self._messages(rows, lambda row: messages.of_row(messages.unquoted(row)))
         else:
             yield from self._columns(form)
 

@@ -103,8 +103,7 @@ class SdfFrame:
 
     def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: XmlNode) -> None:
         """Create a frame whose pose is not read yet."""
-        self.kind = kind
-        self.local = local
+        self.kind, self.local = kind, local
         self.scope: SdfFrame = scope or self
         self.name: str = local if scope is None or scope.kind == WORLD else f"{scope.name}::{local}"
         self.holder = holder

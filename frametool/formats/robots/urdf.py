@@ -114,8 +114,7 @@ class _Reader:
     """Read links and joints one by one."""
 
     def __init__(self, xml: XmlFile, options: Options) -> None:
-        self.xml = xml
-        self.options = options
+        self.xml, self.options = xml, options
         self.frames: dict[str, int] = {}
         self.joints: dict[str, tuple[Link, Element]] = {}
 

@@ -1,27 +1,49 @@
-"""Columns of Arrow tables as arrays of numbers and texts: nulls beside them, each type kept.
+"""Parquet and Arrow IPC (Feather), by pyarrow, the extra `frametool[arrow]`: one way in, one way out, any to any.
 
-Loads pyarrow, the extra `arrow`, where it is asked for; nothing else does.  Knows no file.
+Parquet is known by PAR1, a file of Arrow by ARROW1.  Rows are read and written in groups, those of the input or of a
+million: types, metadata and compression stay.  A column that passes is not looked into; a new one stands in the type
+of the one it replaces, with its metadata.  Columns are arrays of numbers and texts: nulls beside them, each type kept.
 """
 
 from __future__ import annotations
 
 import json
-from contextlib import suppress
+import os
+import struct
+from collections import Counter
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frametool import sizes
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
-from frametool.errors import FileProblem, ValueInvalid, shown
-from frametool.formats.rows.column_file import FLOATS, WHOLE, Batch, ColumnNumbers, plain_value, whole_stamps
+from frametool.errors import FileProblem, FormatError, ValueInvalid, printable, shown, warn
+from frametool.formats.rows.column_file import (
+    FLOATS,
+    WHOLE,
+    Batch,
+    Collected,
+    ColumnFile,
+    ColumnNumbers,
+    plain_value,
+    seekable,
+    whole_stamps,
+)
 from frametool.frames.stamps import SUFFIXES
 from frametool.text.parse import nanoseconds_of
 
 if TYPE_CHECKING:
-    from frametool.formats.rows.column_file import Kind
+    from collections.abc import Iterator, Sequence
+
+    from frametool.documents.source import InputFile
+    from frametool.formats.rows.column_file import Kind, Made, OutColumn
+    from frametool.grammar.edges import Options
+    from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Ints
+
 
 # the types of numbers as Arrow prints them -> how numpy calls them
 NUMBERS: dict[str, Kind] = {"double": np.dtype("f8"), "float": np.dtype("f4"), "halffloat": np.dtype("f2")}
@@ -98,8 +120,7 @@ class ArrowBatch(Batch):
         """Take rows, and what they take in the file."""
         self.rows = rows
         self.size = int(rows.num_rows)
-        self.bytes_read = bytes_read
-        self.ends_group = ends_group
+        self.bytes_read, self.ends_group = bytes_read, ends_group
 
     def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats, nan where it is null."""
@@ -153,3 +174,397 @@ def _of_json(text: str | None) -> Any:
         return text and json.loads(text, parse_float=Verbatim, parse_int=Verbatim)
     except (ValueError, RecursionError):
         return text
+
+
+BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow"}
+NEW_GROUP = 1 << 20  # rows of a group where the input has none
+HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory that writing a group may take: times its size, and bytes beside
+NULLS = True  # its columns have room for them
+AT_ONCE = 1 << 16  # rows of a batch: what is made of it stays near the cache
+
+
+@contextmanager
+def translated(name: str) -> Iterator[None]:
+    """Turn whatever pyarrow raises for a broken file into one line; raises FormatError."""
+    pa = require_pyarrow(name)
+    try:
+        yield
+    except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError, MemoryError) as error:
+        first = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise FormatError(f"it cannot be read: {printable(first[:200].rstrip('. '))}", source=name) from None
+
+
+class ArrowFile(ColumnFile):
+    """A file that was opened: its schema is read, its rows are not."""
+
+    gaps = False
+    source: Any  # what pyarrow reads
+
+    def __init__(self, file: InputFile, form: str) -> None:
+        """Read the schema; raises FormatError."""
+        self.name = file.name
+        self.form = form
+        with translated(self.name):
+            self.schema = self.opened(file)
+            self.names: tuple[str, ...] | None = tuple(self.schema.names)
+        self.width = len(self.schema.names)
+        self.kinds = [kind_of(field.type) for field in self.schema]
+
+    def opened(self, file: InputFile) -> Any:
+        """Open the file and return its schema."""
+        raise NotImplementedError
+
+    def encoding(self) -> dict[str, Any]:
+        """Return how the file is compressed and encoded, for the writer of its own form."""
+        raise NotImplementedError
+
+    def read(self) -> Iterator[ArrowBatch]:
+        """Yield the rows; raises FormatError where the file is broken."""
+        raise NotImplementedError
+
+    def batches(self) -> Iterator[ArrowBatch]:
+        """Yield the rows, and close the file behind them; raises FormatError where it is broken."""
+        with self.source:  # a thread of pyarrow may hold it longer than its reader
+            for batch in self.read():
+                yield batch
+                batch.rows = None  # they keep their whole group in memory
+
+    def guarded(self, found: Iterator[Any]) -> Iterator[Any]:
+        """Yield what pyarrow reads; raises FormatError where the file is broken."""
+        while True:
+            with translated(self.name):
+                rows = next(found, None)
+            if rows is None:
+                return
+            yield rows
+            del rows  # before the next are read
+
+    def random_access(self, file: InputFile) -> Any:
+        """Return what pyarrow reads at any place; what comes by a pipe is put into a file without a name first."""
+        pa = require_pyarrow(self.name)
+        if file.path != "-" and os.path.isfile(file.path):
+            return pa.OSFile(file.path)
+        stream = seekable(file, self)
+        stream.seek(0)
+        return pa.PythonFile(stream, mode="r")
+
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
+        """Return what writes the same schema, compressed in the same way; the form may be another one of Arrow's."""
+        del drops
+        form = style.form if style.form in WRITERS else self.form
+        same = WRITERS[form] is WRITERS[self.form]
+        return WRITERS[form](form, columns, self.schema, self.encoding() if same else {})
+
+
+class GroupWriter:
+    """Collect rows until a group is whole; a form says how a file begins and how a group is written."""
+
+    def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
+        """Take the columns of the result, the schema of the input if it has one, and how that was encoded."""
+        self.pa = require_pyarrow("Arrow")
+        self.form, self.columns, self.how = form, columns, how
+        self.sink = Collected()
+        self.file = self.pa.PythonFile(self.sink, mode="w")
+        fields = [self._field(column, given) for column in columns]
+        self.schema = self.pa.schema(fields, metadata=None if given is None else given.metadata)
+        self.writer: Any = None
+        self.waiting: list[Any] = []
+        self.size = self.count = self.read = 0
+
+    def begin(self) -> Any:
+        """Return what writes to `file`; it can be closed."""
+        raise NotImplementedError
+
+    def write(self, table: Any) -> None:
+        """Write a group of rows."""
+        raise NotImplementedError
+
+    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> memoryview:
+        """Return what is written once a group of rows is whole."""
+        new = self._rows(batch, rows, made)
+        self.waiting.append(new)
+        self.size += bytes_of(new)
+        self.count += new.num_rows
+        self.read += new.num_rows if batch is None else batch.size
+        ends = batch.ends_group if batch is not None else self.count >= NEW_GROUP
+        if ends or self.size > sizes.GROUP:
+            self._write_group()
+        return self.sink.taken()
+
+    def end(self) -> Iterator[bytes]:
+        """Yield the last group and what stands behind all."""
+        if self.waiting or self.writer is None:
+            self._write_group()
+        self.writer.close()
+        yield bytes(self.sink.taken())
+
+    def _field(self, column: OutColumn, given: Any | None) -> Any:
+        """Return the field of a column: that of the input where it passes or is replaced."""
+        if given is not None:
+            replaced = given.get_all_field_indices(column.name) if column.passed is None else [column.passed]
+            if replaced:
+                return given.field(replaced[0])
+        kind = self.pa.string() if column.kind is None else self.pa.from_numpy_dtype(column.kind)
+        return self.pa.field(column.name, kind, metadata=IS_JSON if column.is_json else None)
+
+    def _rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> Any:
+        """Return some rows of a batch as a RecordBatch, with what is made for them."""
+        new = iter(made)
+        arrays = []
+        for column, field in zip(self.columns, self.schema, strict=True):
+            if column.passed is None or batch is None:
+                arrays.append(self._made(next(new), field))
+            else:
+                passed = batch.rows.column(column.passed)
+                arrays.append(passed if rows is None else passed.take(self.pa.array(rows)))
+        return self.pa.RecordBatch.from_arrays(arrays, schema=self.schema)
+
+    def _made(self, made: Made, field: Any) -> Any:
+        """Return what is made as a column; raises ValueInvalid for a null that the schema does not allow."""
+        if made.absent is not None and not field.nullable and made.absent.any():
+            raise ValueInvalid(f"column {field.name} is declared not to hold nulls, and a row becomes null there")
+        if isinstance(made.values, np.ndarray):
+            return self.pa.array(made.values, type=field.type, mask=made.absent)
+        texts = self.pa.array([text or None for text in made.values], self.pa.string())
+        if self.pa.types.is_dictionary(field.type):
+            texts = texts.dictionary_encode()
+        return texts.cast(field.type)
+
+    def _write_group(self) -> None:
+        """Write what waits; a group whose rows were all left out is none."""
+        table = self.pa.Table.from_batches(self.waiting, self.schema)
+        np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, where pyarrow would end the process
+        if self.writer is None:
+            self.writer = self.begin()
+        if self.count or (self.waiting and not self.read):
+            self.write(table)
+        self.waiting, self.size, self.count, self.read = [], 0, 0, 0
+
+
+# --- Arrow IPC: batches as a file with a directory at its end (Feather) ---
+
+BODY_AT = 8  # behind the magic and two bytes that fill it up
+MESSAGE = b"\xff\xff\xff\xff"  # what each message begins with
+CODECS = ("lz4", "zstd")
+RECORD_BATCH = 3
+
+
+class IpcFile(ArrowFile):
+    """A file of Arrow."""
+
+    def opened(self, file: InputFile) -> Any:
+        """Open the file and return its schema."""
+        ipc = require_pyarrow(self.name, "ipc")
+        self.codec = codec_in(file.head()[BODY_AT:])
+        self.source = self.random_access(file)
+        self.reader = ipc.open_file(self.source)
+        return self.reader.schema
+
+    def encoding(self) -> dict[str, Any]:
+        """Return the codec of the batches."""
+        return {"compression": self.codec}
+
+    def _records(self) -> Iterator[Any]:
+        """Yield the batches of the file."""
+        for rows in map(self.reader.get_batch, range(self.reader.num_record_batches)):
+            rows.validate(full=True)  # what is broken ends the process where it is touched
+            yield rows
+            del rows
+
+    def read(self) -> Iterator[ArrowBatch]:
+        """Yield the rows; raises FormatError where the file is broken."""
+        for rows in self.guarded(self._records()):
+            for start in range(0, max(rows.num_rows, 1), AT_ONCE):
+                part = rows.slice(start, AT_ONCE)
+                yield ArrowBatch(part, bytes_of(part), ends_group=start + AT_ONCE >= rows.num_rows)
+            del rows, part  # before the next are read
+
+
+def bytes_of(rows: Any) -> int:
+    """Return what rows take; pyarrow before 22 measures no views of texts: about so much."""
+    try:
+        return int(rows.nbytes)
+    except TypeError:
+        return 16 * int(rows.num_rows * rows.num_columns)
+
+
+def codec_in(data: bytes) -> str | None:
+    """Return how the first batch of rows is compressed, as far as it is among the first bytes.
+
+    Source: format/Message.fbs and File.fbs of Arrow; a message is a flatbuffer behind its length.
+    """
+    at = 0
+    with suppress(struct.error, IndexError):
+        while data[at : at + 4] == MESSAGE:
+            (size,) = struct.unpack_from("<i", data, at + 4)
+            message = memoryview(data)[at + 8 : at + 8 + size]
+            root = struct.unpack_from("<i", message, 0)[0]
+            body = _number(message, root, 3, "<q")
+            if _number(message, root, 1, "<B") == RECORD_BATCH:
+                batch = _table(message, root, 2)
+                compressed = _place(message, batch, 3)
+                return CODECS[_number(message, _table(message, batch, 3), 0, "<b")] if compressed else None
+            at += 8 + size + body
+    return None
+
+
+def _place(message: memoryview, table: int, field: int) -> int:
+    """Return where a field of a table stands; 0 for one that is not there."""
+    directory = table - struct.unpack_from("<i", message, table)[0]
+    (size,) = struct.unpack_from("<H", message, directory)
+    entry = 4 + 2 * field
+    offset = struct.unpack_from("<H", message, directory + entry)[0] if entry < size else 0
+    return table + offset if offset else 0
+
+
+def _number(message: memoryview, table: int, field: int, form: str) -> int:
+    """Return a number of a table, 0 if it is not there."""
+    place = _place(message, table, field)
+    return int(struct.unpack_from(form, message, place)[0]) if place else 0
+
+
+def _table(message: memoryview, table: int, field: int) -> int:
+    """Return where a table within a table stands."""
+    return _place(message, table, field) + _number(message, table, field, "<i")
+
+
+class IpcWriter(GroupWriter):
+    """Write each group of rows as one batch."""
+
+    def begin(self) -> Any:
+        """Return the writer of a file."""
+        ipc = require_pyarrow("Arrow", "ipc")
+        return ipc.new_file(self.file, self.schema, options=ipc.IpcWriteOptions(**self.how))
+
+    def write(self, table: Any) -> None:
+        """Write a batch."""
+        empty = self.pa.RecordBatch.from_pylist([], schema=self.schema)
+        for batch in table.combine_chunks().to_batches() or [empty]:
+            self.writer.write_batch(batch)
+
+
+# --- Parquet ---
+
+SMALL = 1 << 26  # bytes of a group that may be held beside another one
+BUFFER = 1 << 20  # bytes that are read at once of a group that is not held
+SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of a number as it is
+DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
+OWN_SCHEMA = b"ARROW:schema"
+OLD_LIST = ".list.item"  # what lists were called before the standard's `.list.element`
+
+
+class ParquetFile(ArrowFile):
+    """A file of Parquet."""
+
+    def opened(self, file: InputFile) -> Any:
+        """Open the file and return its schema."""
+        self.source = self.random_access(file)
+        self.file = require_pyarrow(self.name, "parquet").ParquetFile(self.source, pre_buffer=False)
+        self.about = self.file.metadata
+        self.warned = False
+        if self.about.num_row_groups:
+            next(self._rows_of(0, 1), None)  # of a damaged group this raises, where its description aborts
+        return self.file.schema_arrow
+
+    def read(self) -> Iterator[ArrowBatch]:
+        """Yield the rows, group by group; while a small one is worked on, the next is read."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        count = self.about.num_row_groups
+        following = None
+        with ThreadPoolExecutor(1) as ahead:
+            for group in range(count):
+                table = self._table(group) if following is None else following.result()
+                is_small = self.about.row_group(group).total_byte_size <= SMALL
+                following = ahead.submit(self._table, group + 1) if is_small and group + 1 < count else None
+                yield from self._of_group(group, table)
+                table = None  # before the next is read
+
+    def _table(self, group: int) -> Any:
+        """Read a group, its columns side by side; None for one that is too large to be held."""
+        if self.about.row_group(group).total_byte_size > sizes.GROUP:
+            return None
+        with translated(self.name):
+            return self.file.read_row_group(group)
+
+    def _of_group(self, group: int, table: Any) -> Iterator[ArrowBatch]:
+        """Yield the batches of a group, of its table or, where that would be too large, as they are read."""
+        about = self.about.row_group(group)
+        left = about.num_rows
+        packed = sum(about.column(at).total_compressed_size for at in range(about.num_columns))
+        share = packed / max(left, 1)
+        if table is not None:
+            empty = require_pyarrow("Arrow").RecordBatch.from_pylist([], schema=self.schema)
+            parts = iter(table.to_batches(max_chunksize=AT_ONCE) or [empty])
+        else:
+            parts = self.guarded(self._rows_of(group, AT_ONCE))
+            if not self.warned:
+                warn(f"{self.name}: groups of rows beyond {sizes.GROUP >> 20} MiB are written in parts")
+            self.warned = True
+        for rows in parts:
+            left -= rows.num_rows
+            yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
+
+    def _rows_of(self, group: int, count: int) -> Iterator[Any]:
+        """Return what reads so many rows of a group at a time."""
+        parquet = require_pyarrow(self.name, "parquet")
+        file = parquet.ParquetFile(self.source, metadata=self.about, buffer_size=BUFFER, pre_buffer=False)
+        found: Iterator[Any] = file.iter_batches(batch_size=count, row_groups=[group])
+        return found
+
+    def encoding(self) -> dict[str, Any]:
+        """Return how the columns are compressed and encoded, as the writer of pyarrow takes it."""
+        if not self.about.num_row_groups:
+            return {}
+        group = self.about.row_group(0)
+        columns = [group.column(at) for at in range(group.num_columns)]
+        codecs = {column.path_in_schema: column.compression.replace("UNCOMPRESSED", "NONE") for column in columns}
+        return {
+            "compression": codecs,
+            "use_dictionary": [column.path_in_schema for column in columns if _repeats(column)],
+            "use_deprecated_int96_timestamps": any(column.physical_type == "INT96" for column in columns),
+            "use_compliant_nested_type": not any(OLD_LIST in column.path_in_schema for column in columns),
+            "store_schema": OWN_SCHEMA in (self.about.metadata or {}),
+        }
+
+
+def _repeats(column: Any) -> bool:
+    """Tell whether a dictionary of the values of a column made it shorter; for others trying costs time."""
+    plain = SIZES.get(column.physical_type, 0) * column.num_values
+    return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
+
+
+class ParquetWriter(GroupWriter):
+    """Write groups of rows."""
+
+    def begin(self) -> Any:
+        """Return the writer of a file; columns that the input does not have are compressed as most of it are."""
+        how, codecs = self.how, self.how.get("compression")
+        if codecs:
+            usual = Counter(codecs.values()).most_common(1)[0][0]
+            missing = [field.name for field in self.schema if field.name not in codecs]
+            how = {**how, "compression": {**dict.fromkeys(missing, usual), **codecs}}
+        return require_pyarrow("Parquet", "parquet").ParquetWriter(self.file, self.schema, **how)
+
+    def write(self, table: Any) -> None:
+        """Write a group."""
+        self.writer.write_table(table, row_group_size=max(table.num_rows, 1))
+
+
+WRITERS: dict[str, type[GroupWriter]] = {"parquet": ParquetWriter, "arrow": IpcWriter}
+
+
+def open_columns(file: InputFile, _options: Options) -> ArrowFile:
+    """Open a file of any of these forms; raises FileProblem without pyarrow, FormatError for a broken file."""
+    require_pyarrow(file.name)
+    head = file.head()
+    form = next((form for begin, form in BEGINNINGS.items() if head.startswith(begin)), "")
+    if not form:
+        found = f"it begins with {shown(head[:8])}" if head else "it is empty"
+        raise FormatError(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}", source=file.name)
+    return (ParquetFile if form == "parquet" else IpcFile)(file, form)
+
+
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
+    """Return what writes rows made elsewhere."""
+    return WRITERS[style.form](style.form, columns, None, {})

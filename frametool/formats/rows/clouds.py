@@ -63,8 +63,7 @@ class CloudFile(ColumnFile):
         self.width = len(names)
         self.record = record
         self.kinds = [record[place] for place in range(len(names))]
-        self.count = count
-        self.what = what
+        self.count, self.what = count, what
         self.text: TextRows | None = None
         self.is_last = True  # nothing stands behind the points
         self.behind = b""
@@ -164,10 +163,7 @@ class TextRows:
 
     def __init__(self, cloud: CloudFile, at: Sequence[int], width: int, line: int) -> None:
         """Take where the columns of a cloud stand among the `width` cells of a row."""
-        self.cloud = cloud
-        self.at = at
-        self.width = width
-        self.line = line
+        self.cloud, self.at, self.width, self.line = cloud, at, width, line
         self._rest = b""
 
     def problem(self, message: str, line: int = 0) -> FormatError:
@@ -222,8 +218,7 @@ class TextBatch(Batch):
 
     def __init__(self, cells: Cells, table: TextRows) -> None:
         """Take the cells of the rows that a table reads next."""
-        self.cells = cells
-        self.table = table
+        self.cells, self.table = cells, table
         self.line = table.line
         self.size = len(cells.rows)
         self.bytes_read = len(cells.data) - 2 * MARGIN

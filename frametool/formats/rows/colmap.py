@@ -15,8 +15,7 @@ import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm
-from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
+from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:

@@ -326,10 +326,7 @@ class CountedWriter:
         head: makes the header for so many rows; behind: yields what follows the rows
         count: how many rows there will be; None if that is known at the end only: they wait in a file until then.
         """
-        self.encode = encode
-        self.head = head
-        self.count = count
-        self.behind = behind
+        self.encode, self.head, self.count, self.behind = encode, head, count, behind
         self.written = 0
         self.begun = False
         self.waiting = temporary_file(self) if count is None else None

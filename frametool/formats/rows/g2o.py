@@ -14,8 +14,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, did_you_mean, listing, shown
-from frametool.formats.rows.pose_rows import Numbers, RowForm
-from frametool.formats.rows.trajectory import Written, numbers_in, samples, text_lines, whole_in
+from frametool.formats.rows.pose_rows import Numbers, RowForm, Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import FORMATS, Poses
 from frametool.geometry import euler, floats
 

@@ -111,8 +111,7 @@ class LasBatch(StructuredBatch):
     def __init__(self, points: Any, names: Sequence[str]) -> None:
         """Take a record of the library and the names of the columns."""
         super().__init__(points.array)
-        self.points = points
-        self.names = names
+        self.points, self.names = points, names
 
     def column(self, place: int) -> NDArray[Any]:
         """Return a column as it is."""
@@ -186,10 +185,7 @@ class LasWriter:
 
     def __init__(self, header: Any, columns: Sequence[OutColumn], *, packed: bool, name: str = "las") -> None:
         """Take a header, whose offsets are chosen when the first points come."""
-        self.header = header
-        self.columns = columns
-        self.packed = packed
-        self.name = name
+        self.header, self.columns, self.packed, self.name = header, columns, packed, name
         self.kept = temporary_file(self)
         self.writer: Any = None
         self.count = 0

@@ -3,24 +3,37 @@
     RowForm(("seconds", b" ", Numbers(7, b" "), b"\\n"))                         a row of a TUM trajectory
     1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0
 
-The table is filled in by `frametool.stream.writers`, for one pose and for a million.
+The table is filled in by `frametool.stream.writers`, for one pose and for a million.  Also what all files of poses of
+one thing that moves share when they are read, lines in, blocks of poses out: checked rotations, direction, axes of
+cameras, stamps, names of the two frames.
 """
 
 from __future__ import annotations
 
-from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+import re
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, listing, warn
+from frametool.documents.chunks import lines
+from frametool.documents.document import format_error
+from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import format_stamp
+from frametool.frames.stamps import BILLION, format_stamp, parse_stamp, whole_stamp
 from frametool.geometry import quaternion, rigid
+from frametool.geometry.representations import notation
+from frametool.grammar.edges import Samples
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from frametool.documents.source import InputFile
+    from frametool.formats.table import Poses
     from frametool.geometry.types import Components
+    from frametool.grammar.edges import Options
+    from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
+
 
 HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
 LOSABLE = {"frames": "names of frames", "stamps": "stamps"}
@@ -62,8 +75,7 @@ class DroppedFields:
 
     def __init__(self, form: RowForm, style: Style) -> None:
         """Collect nothing yet; raises ValueInvalid for notations that the form does not have."""
-        self.form = form
-        self.style = style
+        self.form, self.style = form, style
         self.found: dict[str, None] = {}
         self.counted = False
         self.by_stamp = False
@@ -131,3 +143,183 @@ def rows_of_matrix(*pose: float) -> Components:
     tx, ty, tz, *turn = pose
     r = quaternion.to_matrix(*turn)
     return tuple(chain(r[0:3], [tx], r[3:6], [ty], r[6:9], [tz]))
+
+
+BLOCK = 1 << 12  # poses
+NUMBERED = 1 << 33  # above this, a number times a second is beyond what a stamp holds
+
+
+class Written(NamedTuple):
+    """One pose as it is written.
+
+    numbers: x, y, z, then those of the rotation
+    number: what it is counted as
+    line: where it stands; path: the way to it, in a document
+    image: the name of its picture, if it has one
+    names: of the frame it is seen from and of what it is the pose of, if each has its own
+    """
+
+    numbers: tuple[float, ...]
+    number: int
+    line: int = 0
+    image: str = ""
+    path: Path = ()
+    names: tuple[str, str] | None = None
+
+
+class PoseBlock(NamedTuple):
+    """Poses of a thing in the world, checked.
+
+    poses: tx, ty, tz, x, y, z, w, arrays of n; stamps_ns: int64 of n
+    lines: where each stands; images: the names of their pictures, "" for none; numbers: what they are counted as
+    names: the two frames of each, or None where the form says which two they all have
+    """
+
+    poses: Components
+    stamps_ns: Any
+    lines: Sequence[int]
+    images: Sequence[str]
+    numbers: Sequence[int]
+    names: Sequence[tuple[str, str] | None]
+
+
+def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
+    """Yield the poses of a file as samples of one frame; what was taken for granted is told beside the file's name."""
+    parent, child = options.answers.names(*form.frames)
+    for block in blocks(rows, form, file, options):
+        columns = [part.tolist() for part in block.poses]
+        yield Samples(parent, child, block.stamps_ns.tolist(), list(zip(*columns, strict=True)), block.lines)
+    options.tally.axes[child] = options.answers.camera_axes or form.axes
+
+
+def blocks(
+    rows: Iterator[Written], form: Poses, file: InputFile, options: Options, *, named: bool = True
+) -> Iterator[PoseBlock]:
+    """Yield the poses of a file, checked, block by block.
+
+    named: the two frames are called as the form or --frames says, which is told
+    Raises or reports FormatError with the place of a rotation that is none.
+    """
+    stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
+    count = 0
+    while some := list(islice(rows, BLOCK)):
+        good, poses = _checked(some, form, file, options)
+        times = [stamps.at(count + at) if stamps else _counted(some[at], file) for at in range(len(some))]
+        count += len(some)
+        yield _block(some, good, poses, times)
+    if stamps:
+        stamps.finish(count, file.name)
+    describe(options, form, count, named=named)
+
+
+def describe(options: Options, form: Poses, count: int, *, named: bool = True) -> None:
+    """Keep what was taken for granted of a trajectory, to be told beside the name of its file."""
+    parent, child = options.answers.names(*form.frames)
+    said = [f"{count} {'pose' if count == 1 else 'poses'}" + f" of {child} in {parent} (--frames)" * named]
+    if form.counted and not options.answers.stamps:
+        said.append(f"seconds are {form.counted} (--stamps)")
+    if axes := options.answers.camera_axes or form.axes:
+        said.append(f"{axes} axes" + " (--camera-axes)" * bool(options.answers.camera_axes))
+    options.tally.about = ", ".join(said)
+
+
+def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Options) -> tuple[Any, Components]:
+    """Return which rows are poses, and the poses of the thing in the world."""
+    import numpy as np
+
+    from frametool.geometry import rigid
+    from frametool.geometry.batch_validation import read_rotations
+
+    columns = np.array([row.numbers for row in some], np.float64).T
+    found = read_rotations(notation(form.rotation), list(columns[3:]), normalize=options.normalize)
+    for at, reason in sorted(found.reasons.items()):
+        options.report(error_at(file, some[at], reason))
+    if form.rotation == "matrix":
+        options.tally.projected = max(options.tally.projected, found.off)
+    else:
+        options.tally.rough += [some[at].line for at in found.mended.tolist()]
+    poses: Components = (*columns[:3], *found.quaternions)
+    if form.inverse:
+        poses = rigid.inverse(*poses)
+    return [at for at in range(len(some)) if at not in found.reasons], poses
+
+
+def _block(some: Sequence[Written], good: Sequence[int], poses: Components, times: Sequence[int]) -> PoseBlock:
+    import numpy as np
+
+    stamps = np.array(times, np.int64)
+    if len(good) < len(some):
+        poses, stamps = tuple(part[list(good)] for part in poses), stamps[list(good)]
+        some = [some[at] for at in good]
+    _, numbers, lines, images, _, names = zip(*some, strict=True)
+    return PoseBlock(poses, stamps, lines, images, numbers, names)
+
+
+def _counted(row: Written, file: InputFile) -> int:
+    """Return the number of a pose as seconds."""
+    if row.number >= NUMBERED:
+        raise error_at(file, row, f"{row.number} is too large to count seconds; give --stamps FILE")
+    return row.number * BILLION
+
+
+def error_at(file: InputFile, row: Written, message: str) -> FormatError:
+    """Make the error for a pose of a file."""
+    if row.path:
+        return format_error(file.source, row.path, message)
+    return FormatError(message, source=file.name, line=row.line)
+
+
+class StampFile:
+    """Times of poses, one a line: decimal seconds, or nanoseconds with `ns`, to the nanosecond."""
+
+    def __init__(self, path: str) -> None:
+        """Read them; raises FileProblem, FormatError."""
+        from frametool.documents.source import read_text
+
+        self.path = path
+        self.stamps: list[int] = []
+        for number, line in enumerate(read_text(path).splitlines(), 1):
+            bare = line.strip()
+            if bare and not bare.startswith("#"):
+                try:
+                    self.stamps.append(whole_stamp(parse_stamp(bare)))
+                except ValueInvalid as error:
+                    raise FormatError(str(error), source=path, line=number) from None
+
+    def at(self, index: int) -> int:
+        """Return the time of a pose, counted from 0."""
+        if index >= len(self.stamps):
+            message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
+            raise FormatError(message, source=self.path)
+        return self.stamps[index]
+
+    def finish(self, count: int, name: str) -> None:
+        """Check that there was one time for each pose."""
+        if count != len(self.stamps):
+            raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
+
+
+def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
+    """Yield the lines of a file with their numbers, in bounded memory."""
+    for piece in lines(file.stream, file.name):
+        yield from enumerate(piece.text.removesuffix("\n").split("\n"), piece.line)
+
+
+def position_and_turn(rows: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    """Return the numbers of a pose from the rows of its matrix, as `Written` has them."""
+    return (*(row[3] for row in rows[:3]), *(number for row in rows[:3] for number in row[:3]))
+
+
+def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
+    """Read a word as a whole number, which `what` names; raises FormatError."""
+    if not re.fullmatch("[0-9]{1,18}", word):
+        raise FormatError(f"expected {what}, a whole number, found {shown(word)}", source=file.name, line=line)
+    return int(word)
+
+
+def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:
+    """Read the words of a line as numbers; raises FormatError."""
+    try:
+        return [parse_number(word) for word in words]
+    except ValueInvalid as error:
+        raise FormatError(str(error), source=file.name, line=line) from None

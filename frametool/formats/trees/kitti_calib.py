@@ -74,8 +74,7 @@ class Calibration:
 
     def __init__(self, file: InputFile, options: Options) -> None:
         """Read the lines; raises FormatError."""
-        self.file = file
-        self.options = options
+        self.file, self.options = file, options
         self.reading = Reading(file.source, normalize=options.normalize)
         self.names = dict(zip((*CAMERAS, "velo", "imu"), options.answers.names(*CAMERAS, "velo", "imu"), strict=True))
         self.fields: dict[str, Field] = {}

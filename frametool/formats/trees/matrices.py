@@ -408,9 +408,7 @@ class Matrices:
 
     def __init__(self, document: dict[str, Any], naming: FrameNames, answers: Answers, reading: Reading) -> None:
         """Read all of it; raises Misfit."""
-        self.naming = naming
-        self.answers = answers
-        self.reading = reading
+        self.naming, self.answers, self.reading = naming, answers, reading
         self.left: list[str] = []
         self.asked = 0
         self.blocks = _renamed(_blocks(document, "", ()), naming)

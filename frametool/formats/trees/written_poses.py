@@ -45,8 +45,7 @@ class Precision:
 
     def __init__(self, form: str, notation: str) -> None:
         """Start with nothing written; `notation` says in what rotations are written."""
-        self.form = form
-        self.notation = notation
+        self.form, self.notation = form, notation
         self.metres = 0.0
         self.radians = 0.0
 
