@@ -171,7 +171,7 @@ class Beginning:
         if not self.text.lstrip().startswith("<"):
             return ""
         text = re.sub(r"(?s)<!--.*?(?:-->|\Z)", "", self.text)
-        return re.sub(r"(?s)\A\s*(?:<[?!][^>]*>\s*)*", "", text)
+        return re.sub(r"(?s)\A\s*(?:<[?!][^>]*>\s*)*", "", text) or " "
 
     @cached_property
     def elements(self) -> list[str]:
@@ -324,7 +324,7 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
         return form, known_by
     if "tree" not in reads and (what := not_text(head)):
         raise _no_text(what, name)
-    if "tree" in reads and begin.xml:
+    if "tree" in reads and begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
         raise _unknown(begin, *reads, name=name)
     if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
         what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
@@ -390,7 +390,8 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     what = "this text"
     if begin.xml:
         likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].magic))
-        what = f"XML with the root element {bare(begin.elements[0])}" if begin.elements else "XML without an element"
+        what = f"XML without an element{f' in its first {HEAD >> 10} KiB' * (len(begin.head) >= HEAD)}"
+        what = f"XML with the root element {bare(begin.elements[0])}" if begin.elements else what
     named = f"forms: {first_of(likely, _MOST_NAMED)}" if likely else "none of those read here is XML"
     return FormatError(
         f"cannot tell the form of {what}; {named}; `frametool formats` lists all, --in FORM names one",

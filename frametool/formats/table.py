@@ -204,8 +204,10 @@ FORMATS = {
         required_options=("frames",), magic=(("line", rf"(?:{_MESSAGE_KEYS}): *$|(?:transforms|header): *[\[{{]"),),
     ),
     "jsonl": _read_tree(
-        "messages as JSON, one a line (rosbridge, Foxglove)", _MESSAGES,
-        required_options=("frames",), magic=(("line", r'\{.*"(?:child_frame_id|transforms|frame_id|op)".*\}\s*$'),),
+        "messages as JSON, one a line (rosbridge, Foxglove)",
+        _MESSAGES,
+        required_options=("frames",),
+        magic=(("line", r'\{.*"(?:header|(?:static_)?transforms|parent_frame_id|op)".*\}\s*$'),),
     ),
     "csv1": _read_tree(
         "CSV of `rostopic echo -p`", _MESSAGES, required_options=("frames",), magic=(("line", "%time,"),)

@@ -12,7 +12,6 @@ import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
 from frametool.formats.rows import pcd
-from frametool.formats.rows.clouds import NORMALS
 from frametool.formats.rows.column_file import (
     FLOATS,
     ColumnFile,
@@ -24,19 +23,18 @@ from frametool.formats.rows.column_file import (
     rows_of_batch,
 )
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import in_nanoseconds, stamp_column
+from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_column
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused, RowNote
-from frametool.stream.header import XYZ
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_layout import POINT, POSE, VECTOR, Shape
+from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import Naming, Table, unnamed
-from frametool.stream.table_plan import plan_table
+from frametool.stream.table_plan import plan_table, with_vectors
 from frametool.stream.table_stream import moves_in_time, settle_stamps
 from frametool.text.cells import Cells
 from frametool.text.spans import Spans, framed
@@ -84,7 +82,7 @@ class ColumnRows:
         self.source = source
         names = file.names
         self.table = Table(b",", names, file.width, header=tuple(quoted(name, b",") for name in names or ()))
-        request = _with_vectors(file, request)
+        request = with_vectors(file.names, request, file.vectors)
         try:
             self.request, self.unasked = settle_stamps(self.table, request, source)
             self.plan, self.layout = plan_table(self.table, self.request, source)
@@ -368,17 +366,6 @@ class ColumnRows:
                 texts = texts_of(names.spans[role])
                 found[role] = texts if rows is None else [texts[row] for row in rows.tolist()]
         return found
-
-
-def _with_vectors(file: ColumnFile, request: Request) -> Request:
-    """Ask for the vectors that turn with the points of a file, where its points are not named otherwise."""
-    names = set(file.names or ())
-    there = [columns for columns in file.vectors if names >= {*XYZ, *columns}]  # without x, y, z it is no point at all
-    if not there or not request.operation.moves or request.columns or request.kind not in ("", POINT):
-        return request
-    columns = (",".join(XYZ), *(",".join(each) for each in there))
-    kinds = (POINT, *[VECTOR] * len(there))
-    return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
 
 
 def _chosen(block: Block, rows: Ints) -> Block:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, listing, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
-from frametool.grammar.names import COLUMN_WORDS
+from frametool.grammar.names import COLUMN_WORDS, NORMALS
 from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
@@ -275,6 +275,7 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
     header = Header(names)
     positions, rotations = find_positions(header), find_rotations(header, given)
+    positions = [each for each in positions if each.names not in NORMALS]
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
         return [_only_pose(header, positions, rotations, given, source)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []

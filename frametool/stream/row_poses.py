@@ -22,13 +22,13 @@ from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault
 from frametool.stream.header import listed
-from frametool.stream.layout import NAMED
+from frametool.stream.layout import NAMED, New
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, Shape
 from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
 from frametool.stream.table import UNCLOSED, Naming, at_other_times, coded, table_block, unnamed
-from frametool.stream.table_plan import plan_table
+from frametool.stream.table_plan import plan_table, with_vectors
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
@@ -104,6 +104,7 @@ class TablePoses:
         """
         self.table = begun.table
         self.form = form
+        request = with_vectors(self.table.names, request)
         self.plan, layout = plan_table(self.table, request._replace(all_numbers=True), source)
         self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
         named = request.for_kind(self.shape.kind)
@@ -163,16 +164,18 @@ class TablePoses:
         self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         same = rows is run.rows and len(rows) == run.count
         parts = block.parts if same else [chosen(part, rows) for part in block.parts]
-        texts = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
+        texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
+        own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.shape[1]
+        beside = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
+        texts |= {each.name: results[:, each.number] for each in beside}
         names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
         for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
             names[role] = _texts(part)
         lines = block.places[rows]
         if b'"' in body:
             lines = np.array([block.line_of(row) for row in rows.tolist()], np.int64)
-        return RowPoses(
-            results, None if stamps is None else stamps[rows], lines, names[0], names[1], texts, block.frames
-        )
+        stamps = None if stamps is None else stamps[rows]
+        return RowPoses(results[:, :own], stamps, lines, names[0], names[1], texts, block.frames)
 
     def _stamps(self, cells: Sequence[tuple[Spans, ...]]) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
         """Read the stamps of a block; return them, and which rows have none that can be read."""

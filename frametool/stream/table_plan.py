@@ -8,6 +8,7 @@ from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.grammar.names import (
     EARTH_FRAMES,
     NAME_KEYS,
+    NORMALS,
     PARENT_COLUMNS,
     PARENT_KEYS,
     in_nanoseconds,
@@ -32,7 +33,7 @@ from frametool.stream.header import (
 )
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, lay_out, refuse_repeated
 from frametool.stream.request import PLAIN
-from frametool.stream.row_layout import POSE, SIX, Shape, place_of, six_names
+from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, place_of, six_names
 from frametool.stream.table import rename_of
 from frametool.text.numbers import number_or_none
 
@@ -170,6 +171,24 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
         if (pose := find_pose(others, request, source)) is not None:
             return [pose]
     return find_poses(others, request.given, request.poses, source)
+
+
+def with_vectors(
+    names: Sequence[str] | None, request: Request, vectors: Sequence[tuple[str, ...]] = NORMALS
+) -> Request:
+    """Ask for the vectors that turn with the points of a file, where its points are not named otherwise."""
+    there = [columns for columns in vectors if {*(names or ())} >= {*XYZ, *columns}]  # without x, y, z it is no point
+    operation = request.operation
+    if not there or request.columns or request.kind not in ("", POINT):
+        return request
+    if operation.turns and (operation.left is not None or operation.mirrors):
+        named = ", ".join(map(" ".join, there))
+        raise Misused(f"{named} would keep to the old axes; --columns x,y,z turns the points alone, apply all of them")
+    if not operation.moves:
+        return request
+    columns = (",".join(XYZ), *(",".join(each) for each in there))
+    kinds = (POINT, *[VECTOR] * len(there))
+    return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
 
 
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:

@@ -24,7 +24,7 @@ from frametool.stream.table import (
     open_table,
     table_block,
 )
-from frametool.stream.table_plan import plan_table
+from frametool.stream.table_plan import plan_table, with_vectors
 from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
@@ -44,7 +44,7 @@ def run_table(
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header)
-    request, unasked = settle_stamps(table, request, source)
+    request, unasked = settle_stamps(table, with_vectors(table.names, request), source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request

@@ -136,6 +136,8 @@ def test_names_of_frames_are_the_same_in_tables_lines_and_trees(parent: str, chi
     assert run("invert", stdin=table).out.splitlines()[1] == "cam,base,-2.0,1.0,-3.0,-90.0"
     line = run("invert", stdin=f'{{"{parent}": "a", "{child}": "b", "xyz": [1, 2, 3]}}\n')
     assert line.out == f'{{"{parent}": "b", "{child}": "a", "xyz": [-1.0, -2.0, -3.0]}}\n'
+    lines = f'{{"{parent}": "base", "{child}": "cam", "xyz": [1, 2, 3]}}\n{{"{parent}": "cam", "{child}": "imu", "xyz": [1, 0, 0]}}\n'
+    assert json.loads(run("lookup", "t.jsonl", "base", "imu", "-f", "json", files={"t.jsonl": lines}).out)["xyz"] == [2.0, 2.0, 3.0]
 
 
 P = '{"parent": "b", "name": "a", "xyz": [1, 2, 3], "rpy_deg": [0, 0, 90]}'

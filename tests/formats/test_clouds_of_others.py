@@ -68,3 +68,28 @@ def test_what_we_make_of_a_table_others_read(run: Run, tmp_path: Path, form: str
         found = pytest.importorskip("plyfile").PlyData.read(tmp_path / "out.ply")["vertex"].data
     assert np.allclose(xyz(found), moved(POINTS[:20]), rtol=1e-12)
     assert found["id"].tolist() == list(range(20))
+
+
+@pytest.mark.parametrize("names", ["nx,ny,nz", "normal_x,normal_y,normal_z"])
+@pytest.mark.parametrize("given", ["csv", "pcd", "ply"])
+@pytest.mark.parametrize("form", ["csv", "pcd", "ply", "npy", "json"])
+def test_normals_turn_along_from_each_form_into_each(run: Run, tmp_path: Path, names: str, given: str, form: str) -> None:
+    (tmp_path / "a.csv").write_text(f"x,y,z,{names},ring\n1,2,3,0,0,1,7\n4,5,6,1,0,0,8\n")
+    steps = [["convert", "-i", "a.csv", "-o", f"a.{given}"]] * (given != "csv")
+    turn = "{xyz: [0, 0, 1], rpy_deg: [0, 90, 0]}"
+    for step in (*steps, ["apply", "--transform", turn, "-i", f"a.{given}", "-o", f"b.{form}"]):
+        assert run(*step).status == 0
+    back = run("apply", "--transform", "{}", "-i", f"b.{form}", "-f", "csv", "--as", "point").out.splitlines()
+    rows = [dict(zip(back[0].split(","), map(float, row.split(",")), strict=True)) for row in back[1:]]
+    assert [[row[name] for name in ("x", "y", "z", *names.split(","), "ring")] for row in rows] == [[3, 2, 0, 1, 0, 0, 7], [6, 5, -3, 0, 0, -1, 8]]
+
+
+def test_normals_that_axes_would_leave_behind_are_refused(run: Run) -> None:
+    refused = run("convert", "--world-axes", "x,-y,-z", stdin="x,y,z,nx,ny,nz\n1,2,3,0,0,1\n")
+    assert (refused.status, refused.err) == (2, "frametool: nx ny nz would keep to the old axes; --columns x,y,z turns the points alone, apply all of them\n")
+
+
+def test_a_sensor_moves_along_under_a_scale_too(run: Run) -> None:
+    cloud_of = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 3\n"
+    done = run("apply", "--transform", "{xyz: [1, 0, 0], scale: 2}", "-i", "a.pcd", files={"a.pcd": cloud_of})
+    assert ("VIEWPOINT 3.0 4.0 6.0 1.0 0.0 0.0 0.0\n" in done.out, done.out.splitlines()[-1]) == (True, "3.0 4.0 6.0")

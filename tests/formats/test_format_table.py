@@ -477,6 +477,7 @@ def test_a_form_that_was_written_is_refused_as_an_output_with_what_to_write(run:
 
 @pytest.mark.parametrize(("data", "said"), [
     (b"<note/>", "cannot tell the form of XML with the root element note; none of those read here is XML; `frametool "),
+    (b"<!DOCTYPE note [" + b"<!ELEMENT a>" * 6000, "cannot tell the form of XML without an element in its first 64 KiB; none of"),
     (b"<!DOCTYPE note", "cannot tell the form of XML without an element; none of those read here is XML; `frametool "),
 ])  # fmt: skip
 def test_xml_where_no_form_is_xml_names_no_forms(run: Callable[..., Any], data: bytes, said: str) -> None:

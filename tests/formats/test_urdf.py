@@ -247,3 +247,8 @@ def test_elements_nested_without_end_are_no_trouble(tmp_path: Path) -> None:
 def test_the_example_is_read(run: Run) -> None:
     done = run("lookup", str(ARM), "left_finger", "right_finger", "-j", "gripper=20mm", "-f", "json")
     assert '"xyz": [0.0, -0.04, 0.0]' in done.out
+
+
+def test_a_doctype_of_many_declarations_is_passed_by(tmp_path: Path) -> None:
+    declared = "".join(f"<!ELEMENT e{number} (#PCDATA)>\n" for number in range(3000))
+    assert loaded(tmp_path, f"<!DOCTYPE robot [{declared}]>{robot(joint(), links='a b')}").frames == ("a", "b")

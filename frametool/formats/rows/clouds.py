@@ -23,6 +23,7 @@ from frametool.formats.rows.column_file import (
     pieces,
     record_batches,
 )
+from frametool.grammar.names import NORMALS
 from frametool.text.cells import split_blank
 from frametool.text.lines import read_blocks
 from frametool.text.numbers import explain_number
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 Code = TypeVar("Code")
 
 LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times what the longest known has
-NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 _MOST_POINTS = 1 << 62
 _NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
 _EXACT = 2.0**53

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from frametool.documents.source import InputFile
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.text.spans import Flags, Floats, Ints
 
@@ -159,7 +159,7 @@ class ColumnFile(Protocol):
         """Return the type of a column's numbers; None for what is not a number."""
         return self.kinds[place]
 
-    def moved_by(self, pose: Rigid | None) -> None:
+    def moved_by(self, pose: Components | None) -> None:
         """Move what has a place among the points by the pose that moves all of them, before any is read.
 
         That is the pose of the sensor, or rotations of splats; None: there is no such pose.

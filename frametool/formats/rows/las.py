@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Made, OutColumn
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
@@ -150,7 +150,7 @@ class LasFile(ColumnFile):
         self.width = len(self.names)
         self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # several in one are no number
 
-    def moved_by(self, pose: Rigid | None) -> None:
+    def moved_by(self, pose: Components | None) -> None:
         """Warn that a coordinate system is kept."""
         del pose
         if any(type(vlr).__name__.startswith(("Wkt", "Geo")) for vlr in self.header.vlrs):

@@ -38,7 +38,7 @@ from frametool.formats.rows.column_file import (
     read_exactly,
     rows_of_batch,
 )
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import floats, placed, quaternion
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
@@ -311,7 +311,7 @@ class PcdFile(CloudFile):
             every = sum(field.values for field in head.fields)
             self.text = TextRows(self, [column.cell for column in self.columns], every, head.text.count(b"\n") + 1)
 
-    def moved_by(self, pose: Rigid | None) -> None:
+    def moved_by(self, pose: Components | None) -> None:
         """Move VIEWPOINT by the pose that moves all points; None: there is no such one."""
         if self.head.viewpoint is None:
             return
@@ -323,7 +323,8 @@ class PcdFile(CloudFile):
         if quaternion.complaint(x, y, z, w):
             warn(f"{name}: VIEWPOINT is left as it is: {w:g} {x:g} {y:g} {z:g} is no rotation")
             return
-        self.viewpoint = viewpoint_words(rigid.compose(*pose, tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
+        moved = placed.compose(pose, (tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
+        self.viewpoint = viewpoint_words(placed.pose_of(moved))
 
     def batches(self) -> Iterator[Batch]:
         """Yield the points; raises FormatError where the file ends too early, or holds more."""

@@ -21,13 +21,13 @@ from __future__ import annotations
 import re
 from functools import partial
 from itertools import chain, takewhile
+from math import log
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.rows.clouds import (
-    NORMALS,
     CloudFile,
     TextRows,
     count_in,
@@ -45,6 +45,8 @@ from frametool.formats.rows.column_file import (
     read_exactly,
     record_of,
 )
+from frametool.geometry.rigid import EXACT, SCALED
+from frametool.grammar.names import NORMALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -52,7 +54,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Batch, Kind, OutColumn
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
@@ -275,9 +277,11 @@ class PlyFile(CloudFile):
             raise FormatError(f"the file ends before its vertices, {count} lines early", source=self.file.name)
         return b"".join(lines)
 
-    def moved_by(self, pose: Rigid | None) -> None:
+    def moved_by(self, pose: Components | None) -> None:
         """Turn the rotations of splats with the pose that moves all points; None: there is no such one."""
         name = self.file.name
+        if pose is not None and len(pose) == SCALED and "scale_0" in self.names:
+            warn(f"{name}: scale_0 .. scale_2, the sizes of splats, are left as they are: add {log(pose[EXACT]):.9g}")
         turns = pose is None or pose[6] * pose[6] < 1.0
         if not turns or not set(SPLAT) <= set(self.names):
             return
@@ -285,7 +289,7 @@ class PlyFile(CloudFile):
             why = "not all points are moved by the same pose" if pose is None else "only binary files are turned"
             warn(f"{name}: rot_0 .. rot_3, the rotations of splats, are left as they are: {why}")
             return
-        self.turn = pose[3:]
+        self.turn = pose[3:EXACT]
         if "f_rest_0" in self.names:
             warn(f"{name}: f_rest_*, spherical harmonics, are left as they are: colours keep to the old axes")
 
