@@ -275,7 +275,8 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
     header = Header(names)
     positions, rotations = find_positions(header), find_rotations(header, given)
-    positions = [each for each in positions if each.names not in NORMALS]
+    if len(positions) > 1:
+        positions = [each for each in positions if each.names not in NORMALS]
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
         return [_only_pose(header, positions, rotations, given, source)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []

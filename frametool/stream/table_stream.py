@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, FrametoolError, listing
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import stamp_places
+from frametool.grammar.names import NORMAL_NAMES, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault, Misused, RowNote
 from frametool.stream.rows import written
@@ -44,7 +44,8 @@ def run_table(
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
     table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header)
-    request, unasked = settle_stamps(table, with_vectors(table.names, request), source)
+    request = request if NORMAL_NAMES.isdisjoint(table.names or ()) else with_vectors(table.names, request)
+    request, unasked = settle_stamps(table, request, source)
     plan, layout = plan_table(table, request, source)
     yield Outcome(table.opening(layout), lines=lines, size=taken)
     named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
