@@ -274,18 +274,20 @@ def test_a_frame_without_intrinsics(tmp_path: Path) -> None:
         made.camera("base")
 
 
+MODELS = (
+    "EUCM, FISHEYE, FOV, FULL_OPENCV, OPENCV, OPENCV_FISHEYE, PINHOLE, RADIAL, RADIAL_FISHEYE, SIMPLE_FISHEYE, SIMPLE_PINHOLE, "
+    "SIMPLE_RADIAL, SIMPLE_RADIAL_FISHEYE"
+)
 REFUSED = {
     "fish.yml: 4 coefficients: --model plumb_bob or --model equidistant": ("fish.yml", FORMS["OpenCV YAML, 4 coefficients"]["files"]["fish.yml"]),
     "cam.yaml: plumb_bob has 4 or 5 coefficients in D, not 3": ("cam.yaml", json.dumps({"camera": {**OURS, "D": [0.1, 0.1, 0.1]}})),
     "cam.yaml: camera: unknown key 'sise'; did you mean 'size'? keys: D, K, P, R, alpha, axes, beta, model, size, skew, w, xi":
         ("cam.yaml", json.dumps({"camera": {**OURS, "sise": [1, 1]}})),
     "cam.yaml: 'x' is not a number": ("cam.yaml", json.dumps({"camera": {**OURS, "K": ["x", 1, 1, 1]}})),
-    "cameras.txt:2: THIN_PRISM_FISHEYE is not read; models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, SIMPLE_FISHEYE, "
-    "FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, OPENCV_FISHEYE, FOV, EUCM": ("cameras.txt", "# Camera list\n12 THIN_PRISM_FISHEYE 640 480 1 1 1 1 0 0 0 0\n"),
+    f"cameras.txt:2: THIN_PRISM_FISHEYE is not read; models: {MODELS}": ("cameras.txt", "# Camera list\n12 THIN_PRISM_FISHEYE 640 480 1 1 1 1 0 0 0 0\n"),
     "cameras.txt:1: PINHOLE has 4 parameters, not 3": ("cameras.txt", "1 PINHOLE 640 480 500 320 240\n"),
     "t.json: camera_angle_x needs --size W,H": ("t.json", '{"camera_angle_x": 0.7, "frames": []}'),
-    "t.json: EQUIRECTANGULAR is not read; models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, SIMPLE_FISHEYE, FISHEYE, "
-    "SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, OPENCV_FISHEYE, FOV, EUCM": ("t.json", '{"camera_model": "EQUIRECTANGULAR", "fl_x": 500, "w": 4, "h": 3, "frames": []}'),
+    f"t.json: EQUIRECTANGULAR is not read; models: {MODELS}": ("t.json", '{"camera_model": "EQUIRECTANGULAR", "fl_x": 500, "w": 4, "h": 3, "frames": []}'),
     "poses.yaml: no camera in it: neither K nor what else `frametool help cameras` lists": ("poses.yaml", "frames: {base: {}}"),
 }  # fmt: skip
 
