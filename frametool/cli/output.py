@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from frametool.stream.record_results import Rows
     from frametool.stream.request import Operation
     from frametool.stream.row_poses import RowPoses
-    from frametool.view.pictures import Picture
 
 BATCH = 256  # poses
 WITH_PLACES = ("text", "yaml", "json", "csv", *writers("recording"))
@@ -129,20 +128,24 @@ class Output:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.form} has no place for {names}; write csv, json, yaml or text")
 
-    def poses(self, results: Iterable[Result]) -> None:
-        """Write poses."""
+    def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
+        """Write results: poses as poses; points, vectors and messages as the mappings they are."""
         self._refuse_place()
         if self._in_blocks:
-            self.pieces(self._blocks(iter(results)))
-        else:
-            found = list(results)
-            beside = {key for each in found for key in each.said(self.style)}
-            if "scale" in beside:
-                from frametool.stream.writers import refuse_scale_in
+            self.pieces(self._blocks(iter(values)))
+            return
+        found = list(values)
+        poses = [each for each in found if isinstance(each, Result)]
+        if len(poses) < len(found) and self.style.form != "csv":
+            self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
+            return
+        beside = {key for each in poses for key in each.said(self.style)}
+        if "scale" in beside:
+            from frametool.stream.writers import refuse_scale_in
 
-                refuse_scale_in(self.style.form, beside)
-            self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
-            self._tell_dropped(key for each in found for key in each.extras)
+            refuse_scale_in(self.style.form, beside)
+        self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
+        self._tell_dropped(key for each in poses for key in each.extras)
 
     def _tell_dropped(self, keys: Iterable[str]) -> None:
         """Name what results say besides where the form has no place for it."""
@@ -174,7 +177,8 @@ class Output:
         from frametool.stream.block_writer import writer_for
 
         batch = list(islice(values, BLOCK))
-        placed = not (self._holds_arrays and all(map(_has_no_position, batch)))
+        turns = [each for each in batch if isinstance(each, Result) and each.pose.position is None]
+        placed = not (self._holds_arrays and len(turns) == len(batch))
         kind, block = self._block(batch, placed=placed)
         writer = writer_for(self.style, kind, placed=placed)
         while batch:
@@ -190,29 +194,15 @@ class Output:
         from frametool.stream.row_layout import POSE
         from frametool.stream.row_poses import block_of, block_of_points
 
-        found = list(map(_as_pose if self.is_trajectory else _as_point, batch))
+        found = batch if self.is_trajectory else list(map(_as_point, batch))
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
             return POSE, block_of(poses, placed=placed)
+        if self.is_trajectory:
+            raise ValueInvalid("a trajectory holds poses; a point has no rotation")
         if poses:
             raise ValueInvalid(f"{self.style.form} holds things of one kind, found poses among others")
         return block_of_points([each for each in found if not isinstance(each, Result)])
-
-    def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
-        """Write results: poses as poses; points, vectors and messages as the mappings they are."""
-        if self._in_blocks:
-            self._refuse_place()
-            self.pieces(self._blocks(iter(values)))
-            return
-        if self.style.form == "csv":
-            self.text(self._module("").write_poses(values, self.style))
-            return
-        found = list(values)
-        poses = [each for each in found if isinstance(each, Result)]
-        if len(poses) == len(found):
-            self.poses(poses)
-        else:
-            self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
 
     def rows(self, blocks: Iterator[Rows]) -> None:
         """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
@@ -258,12 +248,11 @@ class Output:
         if is_recording(self.style.form):
             self.pieces(self._module("").tree_pieces(tree, self.style))
             return
-        if self.style.form not in ("yaml", "json") and (
-            "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
-        ):
+        holds_samples = "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
+        if holds_samples and self.style.form not in ("yaml", "json"):
             if self.is_trajectory:
                 self.take_axes_in(tree, _only_mover(tree, self.style.form))
-            self.poses(sample_results(tree))
+            self.values(sample_results(tree))
             return
         if self.style.form != "text":
             if loses := FORMATS[self.style.form].not_stored:
@@ -353,24 +342,12 @@ def in_colour(text: str, marks: Sequence[str]) -> str:
     return coloured(text, marks)
 
 
-def _has_no_position(value: Result | dict[str, Any]) -> bool:
-    """Tell a rotation without a position."""
-    return isinstance(value, Result) and value.pose.position is None
-
-
 def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:
     """Take a result without a rotation for a point."""
     if not isinstance(value, Result) or value.pose.rotation is not None or value.pose.position is None:
         return value
     named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
     return {key: each for key, each in named.items() if each is not None} | value.extras
-
-
-def _as_pose(value: Result | dict[str, Any]) -> Result:
-    """Take a result for a pose; raise ValueInvalid for a point or a message."""
-    if not isinstance(value, Result):
-        raise ValueInvalid("a trajectory holds poses; a point has no rotation")
-    return value
 
 
 def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
@@ -386,17 +363,3 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
 def opened_place(form: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
     """Open the place where results of a form go."""
     return filling(path, force=force) if is_folder(form) and path is not None else writing(path, force=force)
-
-
-PICTURES = (".svg", ".html", ".png")
-
-
-def drawn(picture: Picture, suffix: str, more: str = "") -> str | bytes:
-    """Return a picture in the form of a suffix of PICTURES; `more` stands below it in HTML."""
-    if suffix == ".png":
-        from frametool.view.pictures import write_png
-
-        return write_png(picture)
-    from frametool.view.pictures import write_html, write_svg
-
-    return write_svg(picture) if suffix == ".svg" else write_html(picture, more)

@@ -18,7 +18,6 @@ import click
 
 from frametool.cli.command import Inputs, option, refuse, together
 from frametool.cli.options import FULL, Digits, file_with, suffix_of
-from frametool.cli.output import PICTURES, drawn
 from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
@@ -89,7 +88,7 @@ output_options = together(  # what is shown of a run
     option("--precision N|full", "digits after the point  [default: the shortest text that reads back to the same "
            "bits]", Digits(), under="Result"),
     option("-o --output FILE", "write there instead of stdout, whole or not at all", under="Result"),
-    option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(*PICTURES)),
+    option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(".svg", ".html", ".png")),
     option("--force", "let --output and --plot replace existing files", requires=("output", "plot", "view"),
            under="Result"),
 )  # fmt: skip
@@ -149,10 +148,11 @@ class SimOutput:
         """Return what is written after the run, by file: what watches the steps, and what then makes the content."""
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
+            from frametool.view.pictures import write_picture
             from frametool.view.run_plot import Drawing, last_commands, run_picture
 
-            drawing, suffix = Drawing(scene), suffix_of(self.plot)
-            pictures[self.plot] = drawing.watch, lambda: drawn(run_picture(drawing), suffix, last_commands(drawing))
+            run, suffix = Drawing(scene), suffix_of(self.plot)
+            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix, last_commands(run))
         if self.view:
             from frametool.view.exports import RunPage
 

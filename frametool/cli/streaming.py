@@ -77,7 +77,9 @@ class Stream:
             self.path = None
         self._opened: BufferedReader | None = None
         self.within = ""  # the form of the records in a bag
-        self.given = one_notation(inputs.peek("given"))
+        told: Any = inputs.peek("given") or (None,)
+        refuse(len(told) > 1, "--from takes one representation")
+        self.given: Any = told[0]
         self.given_place = ""
         if self.given is not None and self.given.representation.is_place:
             self.given, self.given_place = None, self.given.representation.name
@@ -203,7 +205,9 @@ class Stream:
         signed = form or _signed(stream.peek(), self.name)
         is_listed = is_trajectory(signed) or holds_arrays(signed)
         if not (form or tables_only or self._says_columns() or is_listed):
-            pasted, stream = self._pasted(stream, request)
+            from frametool.cli.poses import pasted_stream
+
+            pasted, stream = pasted_stream(stream, self.name, request._replace(given=request.given or self.given))
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
@@ -231,9 +235,10 @@ class Stream:
         asked = tuple(ask for ask in FORMATS[form].required_options if ask in keeps)
         self.inputs.forms_read = (*self.inputs.forms_read, (form, asked))
         outcomes, about = way(stream, form, request, output)
+        bad = self.policy(self.name, "row" if holds_arrays(form) else "line")
         if request.gathered is not None:
-            outcomes = request.gathered.placing(outcomes, self.policy(self.name, _counted(form)).place)
-        status = self._write(outcomes, output, gathers=request.gathered is not None, counted=_counted(form))
+            outcomes = request.gathered.placing(outcomes, bad.place)
+        status = self._write(outcomes, output, bad, gathers=request.gathered is not None)
         if about is not None and (states := FORMATS[form].conventions) and not self.inputs.quiet:
             say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
         return status
@@ -265,9 +270,7 @@ class Stream:
         no_room |= not output.notations and is_turned(output.style.in_form(output.told or form))
         return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
 
-    def _as_columns(
-        self, stream: Any, form: str, request: Request, output: Output
-    ) -> tuple[Generator[Outcome], About]:
+    def _as_columns(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write columns of numbers in the form they came in, or in another that holds such."""
         from importlib import import_module
 
@@ -322,12 +325,6 @@ class Stream:
         looked = self.inputs.peek
         return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
 
-    def _pasted(self, stream: BufferedReader, request: Request) -> tuple[Source | None, BufferedReader]:
-        """Look for what was pasted; the stream is then another, with the same in it."""
-        from frametool.cli.poses import pasted_stream
-
-        return pasted_stream(stream, self.name, request._replace(given=request.given or self.given))
-
     def _run_pasted(self, source: Source, request: Request, output: Output) -> int:
         """Write the results of a text that was pasted."""
         from frametool.stream.record_values import read_poses, results
@@ -355,9 +352,7 @@ class Stream:
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
-        return BadRows(
-            name, self.inputs.on_error, most=self.inputs.max_errors, tell=self._tell, counted=counted
-        )
+        return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=self._tell, counted=counted)
 
     def _completed(self, request: Request, output: Output, form: str) -> Request:
         """Add what the stream's options say to the request."""
@@ -374,23 +369,18 @@ class Stream:
         if not has_no_text(output.told or form):
             told.ask("precision")
         return request._replace(
-            given=request.given or self.given,
-            notations=request.notations or output.notations,
-            place=output.style.in_form(output.told or form).place,
-            given_place=self.given_place,
-            precision=output.style.precision,
-            keep_sign=output.style.keep_sign,
-            on_error=told.on_error,
-        )
+            given=request.given or self.given, notations=request.notations or output.notations,
+            place=output.style.in_form(output.told or form).place, given_place=self.given_place,
+            precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=told.on_error,
+        )  # fmt: skip
 
-    def _write(self, outcomes: Generator[Outcome], output: Output, *, gathers: bool, counted: str) -> int:
+    def _write(self, outcomes: Generator[Outcome], output: Output, bad: BadRows, *, gathers: bool) -> int:
         """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
         from contextlib import closing, nullcontext
 
         from frametool.stream.run import run
         from frametool.view.tree_text import ProgressBar
 
-        bad = self.policy(self.name, counted)
         with (
             nullcontext(lambda _: None) if gathers else output.opened() as write,
             ProgressBar(os.path.getsize(self.path) if self.path else None, quiet=self.inputs.quiet) as progress,
@@ -409,11 +399,6 @@ def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
 def _may_be_bag(path: str) -> bool:
     """Tell a bag by its suffix, or a folder."""
     return path.endswith(BAGS) or os.path.isdir(path)
-
-
-def _counted(form: str) -> str:
-    """Return what places count in a form."""
-    return "row" if holds_arrays(form) else "line"
 
 
 def _signed(begin: bytes, name: str) -> str:
@@ -448,9 +433,3 @@ def _form_of(path: str) -> str:
             return detect(file.read(HEAD), *STREAMED, name=path)[0]
     except (OSError, ValueError):
         return ""
-
-
-def one_notation(given: Any) -> Any:
-    """Take the one representation of --from."""
-    refuse(given and len(given) > 1, "--from takes one representation")
-    return given[0] if given else None

@@ -125,6 +125,13 @@ def write_html(picture: Picture, more: str = "") -> str:
     return f'<!DOCTYPE html>\n<html lang="en">\n{head}\n<body>\n{write_svg(picture)}{more}</body>\n</html>\n'
 
 
+def write_picture(picture: Picture, suffix: str, more: str = "") -> str | bytes:
+    """Return a picture in the form of a suffix: .png, .svg or .html; `more` stands below it in HTML."""
+    if suffix == ".png":
+        return write_png(picture)
+    return write_svg(picture) if suffix == ".svg" else write_html(picture, more)
+
+
 def _element(shape: Shape) -> str:
     match shape:
         case PictureLine(points, colour, width, alpha, dashes, title):

@@ -44,7 +44,7 @@ def command(inputs: Inputs) -> int:
         write_trajectory(into or entry, whole)
     if not entry.is_trajectory:
         pose = Pose.of(found.fit.transform.components, named[1], named[0])
-        entry.poses([Result(pose._replace(scale=found.fit.scale))])
+        entry.values([Result(pose._replace(scale=found.fit.scale))])
     return ROWS_SKIPPED if skipped else 0
 
 

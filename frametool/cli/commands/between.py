@@ -39,7 +39,7 @@ def command(inputs: Inputs) -> None:
     result = turn_between(start, end)
     if result.extras["angle_deg"] > 180.0 - OPPOSITE:
         say("note: the directions are opposite: half a turn about any axis at right angles to them; one was chosen")
-    output.poses([result])
+    output.values([result])
 
 
 def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:

@@ -58,5 +58,5 @@ def command(inputs: Inputs) -> int:
     if any(pose.covariance for pair in pairs for pose in pair):
         warn(LEFT_OUT.format("interpolate"))
     between = [interpolated(first, last, each) for first, last in pairs for each in asked]
-    task.output.poses([Result(pose, shared_stamp((pose,))) for pose in between])
+    task.output.values([Result(pose, shared_stamp((pose,))) for pose in between])
     return 0

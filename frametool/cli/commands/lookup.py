@@ -106,9 +106,9 @@ def command(inputs: Inputs) -> int:
     if inputs.times is not None or every:
         status = _many(task, lookups, target, source, window)
     elif fixed is not None:
-        output.poses([looked_up_across(tree, target, at, source, source_at, fixed)])
+        output.values([looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
-        output.poses([lookups.result(target, source, at)])
+        output.values([lookups.result(target, source, at)])
     lookups.tell()
     return status
 

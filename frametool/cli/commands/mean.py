@@ -69,7 +69,7 @@ def command(inputs: Inputs) -> int:
     if gathered.stamped:
         warn("stamps left out: a mean is of no one time")
     result, left_out = _mean(gathered, given, robust=robust)
-    task.output.poses([result])
+    task.output.values([result])
     most = MOST + (len(left_out) == MOST + 1)
     for line in left_out[:most]:
         warn(line)

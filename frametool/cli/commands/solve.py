@@ -104,7 +104,7 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
         from frametool.grammar.result import Result, uncertain
 
         poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
-        output.poses([Result(pose, uncertain(each.covariance)) for pose, each in zip(poses, entries, strict=True)])
+        output.values([Result(pose, uncertain(each.covariance)) for pose, each in zip(poses, entries, strict=True)])
     elif output.style.form == "handeye" and found.shape == "hand-eye":
         from frametool.formats.trees.handeye import write_mount
 

@@ -11,7 +11,6 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
-from frametool.cli.output import drawn
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.trees import FRAME, frame_name, load_tree, opened
@@ -144,14 +143,14 @@ def _content(
         from frametool.view.terminal import TerminalPicture
 
         return TerminalPicture(scene, *get_terminal_size(PIPE_SIZE), eye).text()
-    from frametool.view.pictures import still_picture
+    from frametool.view.pictures import still_picture, write_picture
 
     still = still_picture(scene, eye, title, before)
     if still.crowded:
         say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
     if still.hidden:
         say(f"note: {still.hidden} names found no place")
-    return drawn(still.picture, f".{form}")
+    return write_picture(still.picture, f".{form}")
 
 
 def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
