@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
     from frametool.geometry.types import Rigid
-    from frametool.ros.point_clouds import PointCloud
+    from frametool.recordings.messages import PointCloud
 
 PLACES: dict[str, Callable[[PointCloud], str]] = {
     "stamp_ns": lambda cloud: str(cloud.stamp_ns),
@@ -46,8 +46,8 @@ class BagOfClouds:
     def __init__(self, path: str, output: Output, stream: Stream) -> None:
         """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
         from frametool.grammar.edges import Tally
+        from frametool.recordings.messages import cloud_topics
         from frametool.recordings.read import opened_recording
-        from frametool.ros.point_clouds import cloud_topics
 
         self.path = path
         self.output = output
@@ -76,7 +76,7 @@ class BagOfClouds:
 
         pose_of: the pose that moves what is given in a frame at a time
         """
-        from frametool.ros.point_clouds import read_clouds
+        from frametool.recordings.messages import read_clouds
 
         bad = self.stream.policy(self.path, "message")
         inputs().refuse_idle()

@@ -259,7 +259,7 @@ class Output:
                 say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return
-        from frametool.view.tree_text import print_tree, write_tree
+        from frametool.view.pose_text import print_tree, write_tree
 
         if self.path is None and (sys.stdout.isatty() or color == "always"):
             print_tree(tree, self.style, color)
@@ -337,7 +337,7 @@ def in_colour(text: str, marks: Sequence[str]) -> str:
     """Return text for the terminal: named groups of patterns in the colour of their name, unless NO_COLOR is set."""
     if os.environ.get("NO_COLOR"):
         return text
-    from frametool.view.tree_text import coloured
+    from frametool.view.pose_text import coloured
 
     return coloured(text, marks)
 

@@ -30,7 +30,7 @@ UNSURE = 1.2  # times too small: given sigmas of which it is told
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Solve the tree that the measurements of files mean, beside what is fixed."""
     from frametool.fit.measured_tree import solve_tree
-    from frametool.view.tree_text import ProgressBar
+    from frametool.view.pose_text import ProgressBar
 
     measurements = _measurements(inputs, files)
     fixed = _fixed_edges(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else {}
@@ -158,7 +158,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
 
 def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
-    from frametool.fit.pairs import paired_samples
+    from frametool.fit.alignment import paired_samples
 
     named, gap = zip(files, forms_of(2), strict=True), inputs.max_gap_ns
     read = [trajectory(file, STOP, form, normalize=inputs.normalize)[:2] for file, form in named]

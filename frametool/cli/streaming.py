@@ -379,7 +379,7 @@ class Stream:
         from contextlib import closing, nullcontext
 
         from frametool.stream.run import run
-        from frametool.view.tree_text import ProgressBar
+        from frametool.view.pose_text import ProgressBar
 
         with (
             nullcontext(lambda _: None) if gathers else output.opened() as write,

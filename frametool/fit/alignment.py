@@ -1,27 +1,33 @@
-"""The transform, and the scale, that bring an estimate onto its reference; where its body is the reference's.
+"""Trajectories brought together: pairs of poses, one clock, and the transform and scale that bring one onto the other.
 
-point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
+Poses are paired at common stamps, or with the nearest ones; those of a gripper with those of a target too.  Clocks:
+t_ref = t_est + offset.  point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
 """
 
 from __future__ import annotations
 
-from math import atan2
+from math import atan2, isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.fit.least_squares import align_vectors, solve_normal
+from frametool.fit.least_squares import align_vectors, length, solve_normal
+from frametool.frames.trajectory import BODY, WORLD
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.stream.samples import HandEyeSamples
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frametool.fit.comparison import Delta
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array
 
 
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
-LEAST = 3  # pairs
+FEWEST = 3  # pairs
 STILL = 1e-9  # rms, of 1 + the largest coordinate: what rounding moves
 THIN = 1e-5  # of the second axis over the first: a line
 
@@ -65,8 +71,8 @@ def principal_axes(xyz: Array) -> Array:
 
 
 def _require_plane(kind: str, xyz: Array, name: str) -> None:
-    if len(xyz) < LEAST:
-        raise Unaligned(f"{len(xyz)} pairs; {kind} needs {LEAST}; --align origin or none")
+    if len(xyz) < FEWEST:
+        raise Unaligned(f"{len(xyz)} pairs; {kind} needs {FEWEST}; --align origin or none")
     first, second, _ = principal_axes(xyz)
     if first < STILL * (1 + np.abs(xyz).max()):
         raise Unaligned(f"{name} does not move; --align none")
@@ -111,7 +117,7 @@ def _origin(ref: Trajectory, est: Trajectory) -> Fit:
     return Fit(ref.poses[0] @ est.poses[0].inverse())
 
 
-STEPS = 50
+ARM_STEPS = 50
 SEEN = 1e-6  # rms of metres that a metre of the arm moves: along a direction that the turns show
 DONE = 1e-13
 
@@ -126,7 +132,7 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
     if est.rotation is None:
         raise ValueInvalid("a lever arm needs rotations of the estimate")
     arm = np.zeros(3)
-    for _ in range(STEPS):
+    for _ in range(ARM_STEPS):
         shifted = est._replace(xyz=est.xyz + est.rotation.apply(arm))
         fit = fitted(kind, ref, shifted, up)
         placed = fit.moved(shifted)
@@ -155,3 +161,334 @@ def _tangents(kind: str, xyz: Array, up: Array) -> Array | None:
     if kind == "sim3":
         parts.append(centred)
     return np.stack([part.reshape(-1) for part in parts], -1)
+
+
+GAP = 3  # median intervals that may lie between two neighbours which are interpolated
+NEAR_NS = 50_000_000  # between stamps of a gripper and a target that are paired
+
+
+class Pairs(NamedTuple):
+    """Poses of the reference and of the estimate, one each, at the stamps of the reference's clock.
+
+    possible: how many there could be: poses of the walked trajectory within the time of the other
+    shared: how many poses of one trajectory have more than one partner
+    interpolated: "ref", "est" or None; max_gap_s: how far its neighbours may be apart
+    """
+
+    ref: Trajectory
+    est: Trajectory
+    possible: int
+    shared: int = 0
+    interpolated: str | None = None
+    max_gap_s: float | None = None
+
+    def at(self, index: Array | slice) -> Pairs:
+        """Choose pairs as numpy does."""
+        return self._replace(ref=self.ref.at(index), est=self.est.at(index))
+
+
+def by_number(ref: Trajectory, est: Trajectory) -> Pairs:
+    """Pair two trajectories without stamps, pose by pose."""
+    count = min(ref.size, est.size)
+    return Pairs(ref.at(slice(count)), est.at(slice(count)), est.size)
+
+
+def interpolated(ref: Trajectory, est: Trajectory, max_gap_ns: float | None = None) -> Pairs:
+    """Pair the stamps of one with poses between two of the other, the denser one: straight line and slerp.
+
+    Never beyond its ends, nor where its neighbours are more than a gap apart; an equal stamp needs none.
+    """
+    walks_est = interval(ref.stamps_ns) <= interval(est.stamps_ns)
+    walked, dense = (est, ref) if walks_est else (ref, est)
+    gap_ns = GAP * interval(dense.stamps_ns) if max_gap_ns is None else max_gap_ns
+    made, has_partner = between(dense, walked.stamps_ns, gap_ns)
+    kept = walked.at(has_partner)
+    sides = (made, kept) if walks_est else (kept, made)
+    possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
+    name = "ref" if walks_est else "est"
+    return Pairs(*sides, possible, 0, name, gap_ns / 1e9 if isfinite(gap_ns) else None)
+
+
+def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Trajectory, Array]:
+    """Return poses at the stamps that lie between neighbours of a trajectory, and which stamps those are."""
+    own = dense.stamps_ns
+    after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
+    before = np.where(own[after] == stamps_ns, after, (after - 1).clip(0))
+    gap = own[after] - own[before]
+    found = (own[before] <= stamps_ns) & (stamps_ns <= own[after]) & (gap <= max_gap_ns)
+    after, before, gap, at = after[found], before[found], gap[found], stamps_ns[found]
+    fraction = (at - own[before]) / np.maximum(gap, 1)
+    start, end = dense.at(before), dense.at(after)
+    if start.xyzw is None:
+        xyz = start.xyz + fraction[:, None] * (end.xyz - start.xyz)
+        return start._replace(stamps_ns=at, xyz=xyz), found
+    return start.with_poses(start.poses.interpolate(end.poses, fraction))._replace(stamps_ns=at), found
+
+
+def nearest(ref: Trajectory, est: Trajectory, max_diff_ns: float) -> Pairs:
+    """Pair each pose of the shorter one with that of the nearest stamp of the other, of two the earlier."""
+    walks_est = est.size <= ref.size
+    walked, other = (est, ref) if walks_est else (ref, est)
+    other = other.at(np.argsort(other.stamps_ns, kind="stable"))
+    after = np.searchsorted(other.stamps_ns, walked.stamps_ns).clip(1 if other.size > 1 else 0, other.size - 1)
+    before = (after - 1).clip(0)
+    from_before = walked.stamps_ns - other.stamps_ns[before]
+    index = np.where(from_before <= other.stamps_ns[after] - walked.stamps_ns, before, after)
+    close = np.abs(other.stamps_ns[index] - walked.stamps_ns) <= max_diff_ns
+    index = index[close]
+    sides = (other.at(index), walked.at(close)) if walks_est else (walked.at(close), other.at(index))
+    possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
+    return Pairs(*sides, possible, len(index) - len(np.unique(index)))
+
+
+def interval(stamps_ns: Array) -> float:
+    """Return the median time from one stamp to the next; of a single one endless."""
+    return float(np.median(np.diff(stamps_ns))) if len(stamps_ns) > 1 else float("inf")
+
+
+def _inside(stamps_ns: Array, span: Array) -> int:
+    return int(np.count_nonzero((span.min() <= stamps_ns) & (stamps_ns <= span.max())))
+
+
+def paired_samples(
+    gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None
+) -> HandEyeSamples:
+    """Pair poses: the gripper's at the target's stamps, or row by row where not both have stamps.
+
+    Between two that are no more than a gap apart it is interpolated, else the nearest within the gap is taken.
+    Raises ValueInvalid where there are as many as nothing pairs.
+    """
+    names = [name if each.world != WORLD or each.body != BODY else None
+             for each in (gripper, target) for name in (each.world, each.body)]  # fmt: skip
+    for each, file in ((gripper, files[0]), (target, files[1])):
+        if each.xyzw is None:
+            raise ValueInvalid(f"{file}: positions alone are no poses: rotations are needed here")
+    if gripper.stamps_ns is None or target.stamps_ns is None:
+        if gripper.size != target.size:
+            counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"
+            raise ValueInvalid(f"{counts}, and no stamps to pair them")
+        places = _places(files[1], target, range(target.size))
+        return HandEyeSamples(gripper.poses, target.poses, places, tuple(names), files)
+    gap_ns, dense = NEAR_NS if max_gap_ns is None else max_gap_ns, gripper.in_order()
+    made, is_between = between(dense, target.stamps_ns, gap_ns)
+    index = np.searchsorted(dense.stamps_ns, target.stamps_ns).clip(1, max(dense.size - 1, 1))
+    off = np.abs(dense.stamps_ns[[index - 1, index.clip(0, dense.size - 1)]] - target.stamps_ns)
+    nearest, near = np.where(off[0] <= off[1], index - 1, index.clip(0, dense.size - 1)), off.min(0) <= gap_ns
+    chosen = dense.at(nearest)
+    chosen.xyz[is_between], chosen.xyzw[is_between] = made.xyz, made.xyzw
+    kept = np.flatnonzero(is_between | near)
+    gap = f"{gap_ns / 1e6:g} ms"
+    if not len(kept):
+        apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
+        raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
+    told = []
+    if alone := target.size - len(kept):
+        told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
+    sides = chosen.at(kept).poses, target.at(kept).poses
+    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", told)
+
+
+def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:
+    """Name where poses stand: by line, or by row where there are none."""
+    if each.lines is None:
+        return [f"{file} row {row + 1}" for row in rows]
+    return [f"{file}:{line}" for line in each.lines.tolist()]
+
+
+LIMIT_S = 10.0
+REFINED_S = 1e-7
+STEPS = 8
+LEAST = 3  # poses: two speeds make the least course
+NEARBY = 1.2  # of a step: what the best of all lags and its neighbours may miss
+DOUBT = 0.25  # of a step: the standard error that least squares may have
+TINY = 1e-12
+AS_GOOD = 0.99  # of the best score: another lag may be the true one
+DIGITS = 9  # of a score, and of seconds: stamps are whole nanoseconds
+
+
+class ClockOffset(NamedTuple):
+    """The offset in seconds, how well speeds agree there (1 is perfectly), and another that is about as good."""
+
+    seconds: float
+    score: float
+    rival: float | None = None
+
+    def shifted(self, change: float, shift_ns: int) -> ClockOffset:
+        """Return it refined by a change, on clocks that had been shifted."""
+        rival = None if self.rival is None else self.rival + shift_ns / 1e9
+        return ClockOffset(self.seconds + change + shift_ns / 1e9, self.score, rival)
+
+
+def clock_offset(
+    ref: Trajectory, est: Trajectory, *, limit_s: float = LIMIT_S, kind: str = "sim3", by_turning: bool = False
+) -> ClockOffset:
+    """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares.
+
+    by_turning: by angular speeds alone if both turn, as those do not depend on where a body is measured
+    Where the two spans do not meet, their first stamps are put together and every lag is tried.
+    """
+    if min(ref.size, est.size) < LEAST:
+        return ClockOffset(0.0, -1.0)
+    unit = np.ldexp(1.0, np.frexp(max(np.abs(ref.xyz).max(), np.abs(est.xyz).max()))[1])  # so that no square overflows
+    ref, est = (each._replace(xyz=each.xyz / unit) for each in (ref, est))
+    first = int(ref.stamps_ns[0])
+    shift = 0
+    if est.stamps_ns[0] > ref.stamps_ns[-1] or est.stamps_ns[-1] < ref.stamps_ns[0]:
+        shift, limit_s = first - int(est.stamps_ns[0]), np.inf
+    times = [(ref.stamps_ns - first) / 1e9, (est.stamps_ns + shift - first) / 1e9]
+    step = min(float(np.median(np.diff(each))) for each in times) / 2
+    best = ClockOffset(0.0, -1.0)
+    for turning in (True, False):
+        speeds = [_speeds(each, at, turning=turning) for each, at in zip((ref, est), times, strict=True)]
+        courses = [each for each in speeds if each is not None]
+        if len(courses) < len(speeds):
+            continue
+        best = max(best, _best_lag(courses[0], courses[1], step, limit_s), key=lambda found: found.score)
+        if by_turning and turning and best.score > 0:
+            return best.shifted(_refined_speeds(courses[0], courses[1], best.seconds, step) - best.seconds, shift)
+    change = _refined(ref, est, shift, best.seconds, step, kind) - best.seconds if best.score > 0 else 0.0
+    return best.shifted(change, shift)
+
+
+def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
+    """Return the times between poses and the angular speed or speed there; None where there is none to speak of."""
+    if turning and each.rotation is None:
+        return None
+    if turning:
+        rotation = each.rotation
+        moved = rotation[:-1].distance(rotation[1:])  # type: ignore[index]
+    else:
+        moved = length(np.diff(each.xyz, axis=0))
+    speed = moved / np.diff(times)
+    return None if np.std(speed) < 1e-6 * max(TINY, np.max(speed)) else ((times[1:] + times[:-1]) / 2, speed)
+
+
+def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit_s: float) -> ClockOffset:
+    """Return the lag of the highest correlation, normalised over what overlaps at it; between samples by a parabola.
+
+    At least half of the shorter course overlaps.  All sums are correlations of courses, masks and squares: by FFT.
+    """
+    low, high = min(a[0][0], b[0][0]), max(a[0][-1], b[0][-1])
+    grid = low + step * np.arange(int((high - low) / step) + 1)
+    size = 1 << (2 * len(grid) - 1).bit_length()
+    masks = [((grid >= at[0]) & (grid <= at[-1])).astype(float) for at, _ in (a, b)]
+    courses = [np.interp(grid, at, speed) * mask for (at, speed), mask in zip((a, b), masks, strict=True)]
+    courses = [course - mask * (course.sum() / mask.sum()) for course, mask in zip(courses, masks, strict=True)]
+
+    def correlated(x: Array, y: Array) -> Array:
+        found: Array = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return found
+
+    count = np.maximum(correlated(*masks), 1e-9)
+    sums = correlated(courses[0], masks[1]), correlated(masks[0], courses[1])
+    squares = correlated(courses[0] ** 2, masks[1]), correlated(masks[0], courses[1] ** 2)
+    covariance = correlated(*courses) - sums[0] * sums[1] / count
+    spread = [np.maximum(square - total**2 / count, TINY) for square, total in zip(squares, sums, strict=True)]
+    lags = np.arange(size)
+    lags[size // 2 :] -= size
+    shortest = min(at[-1] - at[0] for at, _ in (a, b))
+    tried = (np.abs(lags * step) <= limit_s) & (count * step >= shortest / 2)
+    score = np.where(tried, covariance / np.sqrt(spread[0]) / np.sqrt(spread[1]), -1.0)
+    score = np.round(score, DIGITS)  # further digits are those of the FFT, which adds as the processor likes
+    at = int(np.argmax(score))
+    before, here, after = score[at - 1], score[at], score[(at + 1) % size]
+    bend = before - 2 * here + after
+    part = 0.5 * (before - after) / bend if bend < 0 and min(before, after) > -1 else 0.0
+    other = _rival(np.fft.fftshift(score), (at + size // 2) % size)
+    rival = None if other is None else round(float((other - size // 2) * step), DIGITS)
+    return ClockOffset(round(float((lags[at] + part) * step), DIGITS), float(here), rival)
+
+
+def _rival(score: Array, best: int) -> int | None:
+    """Return the index of another peak that is as good to a per cent, None where the best stands alone."""
+    near = score >= AS_GOOD * score[best]
+    valleys = np.flatnonzero(~near)
+    at = np.searchsorted(valleys, best)
+    near[valleys[at - 1] if at else 0 : valleys[at] if at < len(valleys) else len(near)] = False  # the same peak
+    return int(np.argmax(np.where(near, score, -np.inf))) if near.any() and score[best] > 0 else None
+
+
+def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
+    """Refine a lag until the speeds a agree best with the speeds b (Gauss-Newton on one number)."""
+    found = seconds
+    for _ in range(STEPS):
+        at = b[0] + found
+        inside = (at >= a[0][0] + step) & (at <= a[0][-1] - step)
+        sooner, here, later = (np.interp(at[inside] + lag, *a) for lag in (-step, 0.0, step))
+        slope = (later - sooner) / (2.0 * step)
+        change = float(slope @ (b[1][inside] - here)) / max(float(slope @ slope), TINY)
+        found += min(max(change, -step), step)
+        if abs(change) < REFINED_S:
+            break
+    return found if abs(found - seconds) < NEARBY * step else seconds
+
+
+def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
+    """Let what is left along the velocity after the fit be time: Gauss-Newton on one number.
+
+    Drift is along the velocity too, but alike from pose to pose: where what is left is so alike that it says less
+    than the correlation did, or wants a lag beyond what that leaves open (a lever arm does), the lag stays.
+    """
+    up = np.array([0.0, 0.0, 1.0])
+    plain = ref._replace(xyzw=None)
+    half, gap_ns = round(step * 1e9), GAP * interval(ref.stamps_ns)
+    found = seconds
+    for _ in range(STEPS):
+        at = est.stamps_ns + shift + round(found * 1e9)
+        inside = np.logical_and.reduce([between(plain, at + lag, gap_ns)[1] for lag in (-half, 0, half)])
+        own = est.at(inside)._replace(xyzw=None)
+        sooner, here, later = (between(plain, at[inside] + lag, gap_ns)[0].xyz for lag in (-half, 0, half))
+        velocity = (later - sooner) / (2e-9 * half)
+        try:
+            fit = fitted(kind, plain._replace(xyz=here), own, up)
+        except Unaligned:
+            return seconds
+        left, unsteady = ((fit.moved(own).xyz - here) * velocity).sum(-1), velocity - centre(velocity)
+        squared = max(float((unsteady**2).sum()), TINY)  # a constant velocity is a shift of the fit
+        change = min(max(float(left.sum()) / squared, -step), step)
+        found += change
+        if abs(change) < REFINED_S:
+            break
+    centred = left - left.mean()
+    alike = float(centred[1:] @ centred[:-1]) / max(float(centred @ centred), TINY)
+    doubt = sqrt(float(left @ left) * (1 + alike) / max(1 - alike, TINY)) / squared
+    return found if doubt < DOUBT * step and abs(found - seconds) < NEARBY * step else seconds
+
+
+MOST = 100_000_000  # poses
+BILLION = 10**9
+
+
+def resampled(each: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None) -> Trajectory:
+    """Return a trajectory at stamps that lie within it: straight line and slerp, as pairs are interpolated.
+
+    Stamps between poses that are more than a gap apart, 3 median intervals if none is said, have no pose.
+    """
+    return between(each, stamps_ns, GAP * interval(each.stamps_ns) if max_gap_ns is None else max_gap_ns)[0]
+
+
+def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:
+    """Return stamps from the first pose on, so many a second, each rounded by itself."""
+    first, last = int(each.stamps_ns[0]), int(each.stamps_ns[-1])
+    count = int((last - first) * rate_hz / BILLION * (1 + 1e-12)) + 1
+    if count > MOST:
+        raise ValueInvalid(f"{count} poses are more than {MOST}; give a lower rate")
+    stamps: Array = first + np.rint(np.arange(count) * (BILLION / rate_hz)).astype(np.int64)
+    return stamps[stamps <= last]
+
+
+def stamps_every(each: Trajectory, delta: Delta) -> Array:
+    """Return the stamps at which a trajectory is a whole number of steps along its path, or its turning."""
+    along = delta.along(each)
+    if along is None:
+        raise ValueInvalid(f"steps of {delta} need rotations")
+    count = int(along[-1] / delta.amount * (1 + 1e-12)) + 1
+    if count > MOST:
+        raise ValueInvalid(f"{count} poses are more than {MOST}; give longer steps")
+    wanted = np.minimum(np.arange(count) * delta.amount, along[-1])
+    after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
+    step = along[after] - along[after - 1]
+    part = np.divide(wanted - along[after - 1], step, out=np.zeros(count), where=step > 0.0)
+    gaps = each.stamps_ns[after] - each.stamps_ns[after - 1]
+    stamps: Array = each.stamps_ns[after - 1] + np.rint(part * gaps).astype(np.int64)
+    return stamps

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid, alternatives, warn
+from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
 from frametool.fit.comparison import AUTO, EVO, Delta, Settings, parse_delta
 from frametool.fit.comparison import compare as compared
 from frametool.fit.measured_tree import TreeSolution, solve_tree
 from frametool.fit.numbers import whole_estimate
-from frametool.fit.pairs import resampled, stamps_at_rate, stamps_every
 from frametool.frames.lookups import FrameTree, taken
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation

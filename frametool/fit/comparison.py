@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import ValueInvalid, shown
-from frametool.fit import pairs as pairing
-from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, fitted, lever_arm, principal_axes
+from frametool.fit import alignment as pairing
+from frametool.fit.alignment import ALIGNMENTS, LIMIT_S, Fit, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
-from frametool.fit.pairs import LIMIT_S, clock_offset
 from frametool.frames.stamps import format_stamp
 from frametool.frames.trajectory import way
 from frametool.geometry import earth, quaternion
@@ -25,8 +24,8 @@ from frametool.grammar.names import EARTH_FRAMES
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from frametool.fit.alignment import Pairs
     from frametool.fit.numbers import AbsoluteErrors, RelativeErrors, SegmentErrors
-    from frametool.fit.pairs import Pairs
     from frametool.frames.trajectory import Trajectory
     from frametool.geometry.types import Array, Rigid
 

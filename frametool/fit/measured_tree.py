@@ -1,19 +1,28 @@
-"""The tree that measurements mean: where each frame is in the root, how sure that is, what was left out and why."""
+"""The tree that measurements mean: where each frame is in the root, how sure that is, what was left out and why.
+
+Blunders are named, rivals exchanged, and loops where nothing tells are errors.  Covariances are first order, the
+inverse of the normal equations, all loops in.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid, alternatives, shown
+from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown
 from frametool.fit.graph import bodies_of, bridges, require_connected
-from frametool.fit.least_squares import NotSettled, PoseArrays, inverse
-from frametool.fit.tree_solver import Fitted, TreeProblem, TreeRows
-from frametool.fit.verdicts import Uncertainty, judged, place_of
+from frametool.fit.least_squares import KEPT, NotSettled, PoseArrays, applied, inverse, length
+from frametool.fit.tree_solver import Fitted, Noise, TreeProblem, TreeRows, jacobians, of_body
+from frametool.frames.topology import Groups
+from frametool.geometry.conventions import axes_change
+from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
+from frametool.lint.tree_diff import Tolerance
+from frametool.stream.measurements import Measurement, parted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,7 +30,264 @@ if TYPE_CHECKING:
     from frametool.fit.graph import Bodies, Fixed
     from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Array
-    from frametool.stream.measurements import Measurement
+
+
+class Uncertainty:
+    """Covariances (6, 6) of poses between frames of bodies, along the axes of the target frame.
+
+    None where a pose depends on rows whose noise is neither given nor shown by a loop.
+    """
+
+    def __init__(self, problem: TreeProblem, found: Fitted) -> None:
+        """Take a fit; nothing is computed before it is asked for."""
+        self._problem, self._found = problem, found
+        self._known = Groups[int]()
+        for row in np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist():
+            self._known.join(*problem.pairs[row])
+
+    def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
+        """Return the covariance of source in target, each a body and the pose of a frame of it."""
+        if target[0] == source[0]:
+            return np.zeros((6, 6))
+        if self._known.of(target[0]) != self._known.of(source[0]):
+            return None
+        by_ends = zip((target, source), jacobians(target[1], source[1], np.zeros(3)), strict=True)
+        slopes = np.hstack([of_body(by, self._found.bodies.at(body), frame) for (body, frame), by in by_ends])
+        ends = [target[0], source[0]]
+        found: Array = slopes @ self._of_bodies[ends][:, :, ends].reshape(12, 12) @ slopes.T
+        return (found + found.T) / 2.0
+
+    @cached_property
+    def _of_bodies(self) -> Array:
+        """Return the covariance of all bodies, (bodies, 6, bodies, 6); zeros for the root."""
+        problem, found = self._problem, self._found
+        information = problem.information(found.noise) * found.kept[:, None, None]
+        whole = np.zeros((problem.count, 6, problem.count, 6))
+        if problem.unknown:
+            normal = problem.normal_equations(found.bodies, information)[0]
+            whole[1:, :, 1:] = inverse(normal).reshape(problem.unknown, 6, problem.unknown, 6)
+        return whole
+
+
+NEAR = Tolerance(0.01, math.radians(1.0))  # where nothing says how sure a measurement is
+LEAST = 1e-9  # metres, radians
+FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
+ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
+TIE = 1e-9  # of u: what is not nearer than this explains nothing
+O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, as in papers
+
+
+def _translation_of_inverse(m: Measurement) -> Transform:
+    rotation = m.transform.rotation
+    return Transform(rotation, -rotation.apply(m.components[:3]))
+
+
+def _yaw_first(m: Measurement) -> Transform | None:
+    if m.written is None or m.written[0] != "rpy":
+        return None
+    return m.turned(*Rotation.from_rpy(m.written[1][::-1]).components)
+
+
+# what a measurement was meant to be, if this blunder was made
+BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
+    "inverted": lambda m: m.transform.inverse(),
+    "rotation inverted": lambda m: m.turned(*m.transform.rotation.inverse().components),
+    "translation of the inverse": _translation_of_inverse,
+    "wxyz taken for xyzw": lambda m: m.turned(*m.components[4:], m.components[3]),
+    "xyzw taken for wxyz": lambda m: m.turned(m.components[6], *m.components[3:6]),
+    "millimetres": lambda m: m.shifted(1e-3), "metres taken for millimetres": lambda m: m.shifted(1e3),
+    "degrees taken for radians": lambda m: m.reread(math.radians),
+    "radians taken for degrees": lambda m: m.reread(math.degrees),
+    "yaw, pitch, roll taken for roll, pitch, yaw": _yaw_first,
+    "optical axes of the child": lambda m: m.transform @ O.inverse(),
+    "optical axes of the parent": lambda m: O @ m.transform, "body axes of the child": lambda m: m.transform @ O,
+    "body axes of the parent": lambda m: O.inverse() @ m.transform,
+}  # fmt: skip
+
+
+def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array) -> str | None:
+    """Name the blunder that best explains a measurement of a pose; None where none does.
+
+    pose: where the child is in the parent; information: the inverse covariance (6, 6) of the measurement
+    It must bring the measurement within 4 sigmas, and nearer than it is as it stands.  Of blunders that noise cannot
+    tell from the best, the first is named: half a turn is its own inverse.
+    """
+    meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
+    tried = [*meant.values(), measurement.transform]
+    poses = PoseArrays.of(Transform.of(*map(np.array, zip(*(each.components for each in tried), strict=True))))
+    errors = pose.at(None).errors(poses)
+    u = _sigmas(errors, information)
+    best = int(u[:-1].argmin())
+    if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
+        return None
+    as_good = (_sigmas(errors - errors[best], information) <= ALIKE) & (u <= FITTING)
+    return list(meant)[int(as_good.argmax())]
+
+
+def loops(
+    tree: FrameTree, measurements: Sequence[Measurement], tolerance: Tolerance | None
+) -> tuple[list[Finding], list[str], int]:
+    """Compare measurements with a tree: findings of those that are off, frames it lacks, how many have no way in it.
+
+    tolerance: what still agrees; None: 3 sigmas where a measurement has a covariance, else 10 mm and 1 deg
+    """
+    findings, lacking, apart = [], dict[str, None](), 0
+    for each in measurements:
+        unknown = [name for name in each[:2] if name not in tree.frames]
+        lacking |= dict.fromkeys(unknown)
+        if unknown:
+            continue
+        try:
+            pose = PoseArrays.of(tree.lookup(each.parent, each.child))
+        except NotConnected:
+            apart += 1
+            continue
+        error = pose.errors(PoseArrays.of(each.transform))
+        metres, radians = map(float, length(error.reshape(2, 3)))
+        if tolerance is None and each.covariance is not None:
+            information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
+            u = _sigmas(error[None], information)[0]
+            agrees, sigmas = u <= KEPT, f" ({u:.1f} sigmas)"
+        else:
+            near = tolerance or NEAR
+            agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
+            # `FITTING` sigmas are reached where both halves reach the tolerance
+            sigma = np.maximum(np.repeat([near.metres, near.radians], 3), LEAST) / FITTING / 3**0.5
+            information = np.diag(sigma**-2.0)
+        if not agrees:
+            words = best_blunder(each, pose, information)
+            off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg{sigmas} off the tree"
+            message = f"{printable(each.parent)}<-{printable(each.child)} is {off}"
+            message += f"; fits when {words}" if words else ""
+            findings.append(Finding("loop", message, *parted(each.place)))
+    return findings, [*lacking], apart
+
+
+def _sigmas(errors: Array, information: Array) -> Array:
+    squares = (errors * applied(information, errors)).sum(-1)
+    found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
+    return found
+
+
+ONE_LINE = 200  # characters
+
+
+class Verdicts(NamedTuple):
+    """The words for each row, and what is not settled.
+
+    noise: rows without a blunder that the doubt about the fit explains; swaps: rows to exchange, (left out, rival)
+    undecided: the first row of whose loop nothing tells which is wrong, with its rivals
+    """
+
+    fits: list[str | None]
+    noise: list[int]
+    swaps: list[tuple[int, int]]
+    undecided: tuple[int, list[int]] | None
+
+
+def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> tuple[Fitted, list[str | None]]:
+    """Name the blunders in what was left out; where a rival has one instead, leave out the rival.
+
+    Raises ValueInvalid where none of a row and its rivals, or more than one, has a blunder that fits.
+    """
+    tried = {found.kept.tobytes()}
+    while True:
+        case = _Case(problem, measurements, found)
+        fits, noise, swaps, undecided = case.verdicts()
+        for taken, left in ((noise, []), *(([row], [rival]) for row, rival in swaps)):
+            kept = found.kept.copy()
+            kept[taken], kept[left] = True, False
+            if kept.tobytes() not in tried:
+                break
+        else:
+            break
+        tried.add(kept.tobytes())
+        bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())]).at(0)
+        found = problem.selected(bodies, kept, found.noise, robust=True)
+    if undecided:
+        raise ValueInvalid(case.open_loop(*undecided))
+    return found, fits
+
+
+def place_of(measurements: Sequence[Measurement], row: int) -> str:
+    """Return where a measurement stands, else its number."""
+    return printable(measurements[row].place) or f"measurement {row + 1}"
+
+
+class _Case:
+    """A fit, and the rows that it keeps and leaves out."""
+
+    def __init__(self, problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> None:
+        self.problem, self.measurements, self.found = problem, measurements, found
+        kept = np.flatnonzero(found.kept).tolist()
+        self.tree = problem.tree(kept)
+        self.alone = bridges(self.tree, problem.pairs, kept)
+        self.parents, self.children = problem.ends(found.bodies)
+        self.poses = self.parents.inverse @ self.children
+        self.errors = self.poses.errors(problem.rows.measured)
+        self.information = problem.information(found.noise, found.noise.factor)
+        noise = found.noise.at_least(Noise()) if found.few_loops else found.noise
+        self.least_information = problem.information(noise, noise.factor)
+        self.uncertainty = Uncertainty(problem, found)
+
+    def verdicts(self) -> Verdicts:
+        """Try the blunders on each row left out, and on its rivals: kept rows that only it checks."""
+        fits: list[str | None] = [None] * self.problem.size
+        noise, swaps, undecided = [], [], None
+        for row in np.flatnonzero(~self.found.kept).tolist():
+            rivals = sorted(self.alone.intersection(self.tree.way(*self.problem.pairs[row])))
+            words = {row: best_blunder(self.measurements[row], self.poses.at(row), self.information[row])}
+            for rival in rivals:
+                pose = self._pose_without(rival, row)
+                words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
+            blamed = [each for each, blunder in words.items() if blunder]
+            unsure = self._beside_doubt(row, self.least_information[row])
+            if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
+                noise.append(row)
+            if not rivals:
+                doubted = self._beside_doubt(row, self.information[row])
+                fits[row] = words[row] or best_blunder(self.measurements[row], self.poses.at(row), doubted)
+            elif blamed == [row]:
+                fits[row] = words[row]
+            elif len(blamed) == 1:
+                swaps.append((row, blamed[0]))
+            else:
+                undecided = undecided or (row, rivals)
+        return Verdicts(fits, noise, swaps, undecided)
+
+    def _beside_doubt(self, row: int, information: Array) -> Array:
+        """Return the information on a row beside the doubt about the pose that the fit has between its frames."""
+        parent, child = self.problem.pairs[row]
+        doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
+        return information if doubt is None else inverse(inverse(information) + doubt)
+
+    def _pose_without(self, rival: int, row: int) -> PoseArrays:
+        """Return the pose that a rival would measure, were the bodies that hang by it placed by a row left out."""
+        measured, pairs = self.problem.rows.measured.at(row), self.problem.pairs
+        hanging = set(self.tree.beyond(rival))
+        parent, child = self.parents.at(row), self.children.at(row)
+        if pairs[row][1] in hanging:
+            moved = parent @ measured @ child.inverse
+        else:
+            moved = child @ measured.inverse @ parent.inverse
+        ends = self.parents.at(rival), self.children.at(rival)
+        parent, child = (moved @ end if body in hanging else end for end, body in zip(ends, pairs[rival], strict=True))
+        return parent.inverse @ child
+
+    def open_loop(self, row: int, rivals: list[int]) -> str:
+        """Return which rows form a loop, and how far it is open, on one line."""
+        error = self.errors[row]
+        open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
+        places = [place_of(self.measurements, each) for each in sorted([row, *rivals])]
+        advice = "measure again or leave one out"
+        if self.measurements[row].place:
+            advice += f" (--without {place_of(self.measurements, row)})"
+        for most in range(len(places), 0, -1):
+            text = f"undecided: {first_of(places, most)} form a loop open by {open_by}; {advice}"
+            if len(text) <= ONE_LINE:
+                break
+        return text
+
 
 ROOT = PoseArrays(np.eye(3), np.zeros(3))
 FEW_LOOPS = 6  # fewer leave the sigmas rough where rotations can close them

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from frametool.formats.rows.column_file import Batch, ColumnWriter, Kind
     from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
-    from frametool.ros.point_clouds import PointCloud
+    from frametool.recordings.messages import PointCloud
     from frametool.stream.table import BlockNames
     from frametool.text.spans import Flags, Floats, Ints
 

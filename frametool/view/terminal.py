@@ -16,8 +16,8 @@ from unicodedata import east_asian_width
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE
+from frametool.view.pose_text import coloured_console
 from frametool.view.scene import SLANTED, Flat, Projection, Size, best_spot, nice, words_of
-from frametool.view.tree_text import coloured_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -10,10 +10,10 @@ from rigs import rig
 from worlds import ring
 
 from frametool.errors import ValueInvalid
+from frametool.fit.alignment import clock_offset
 from frametool.fit.comparison import AUTO, EVO, Comparison, Settings, compare, parse_delta
 from frametool.fit.hand_eye import solve_hand_eye
 from frametool.fit.measured_tree import solve_tree
-from frametool.fit.pairs import clock_offset
 from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

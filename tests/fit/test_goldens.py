@@ -9,10 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from frametool.fit.alignment import ALIGNMENTS, Unaligned, fitted, lever_arm
+from frametool.fit.alignment import (
+    ALIGNMENTS,
+    Pairs,
+    Unaligned,
+    by_number,
+    clock_offset,
+    fitted,
+    interpolated,
+    lever_arm,
+    nearest,
+)
 from frametool.fit.comparison import Delta, parse_delta
 from frametool.fit.numbers import absolute_errors, all_pairs, chained, relative_errors, segment_errors, statistics
-from frametool.fit.pairs import Pairs, by_number, clock_offset, interpolated, nearest
 from frametool.frames.trajectory import Trajectory, way
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

@@ -14,8 +14,7 @@ import pytest
 from worlds import COVARIANCE, SIGMA_M, SIGMA_RAD, World, inverted, world
 
 from frametool.errors import ValueInvalid
-from frametool.fit.measured_tree import TreeSolution, solve_tree
-from frametool.fit.verdicts import BLUNDERS
+from frametool.fit.measured_tree import BLUNDERS, TreeSolution, solve_tree
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from frametool.fit.verdicts import BLUNDERS
+from frametool.fit.measured_tree import BLUNDERS
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 from frametool.stream.measurements import Measurement

@@ -116,7 +116,7 @@ def _with_loops(
     """Return what is wrong with files, then the measurements that do not agree; tell what was not compared."""
     if not rows:
         return check(files, normalize=normalize)
-    from frametool.fit.verdicts import loops
+    from frametool.fit.measured_tree import loops
     from frametool.frames.lookups import FrameTree
 
     tree = FrameTree()

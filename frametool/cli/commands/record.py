@@ -18,7 +18,7 @@ from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.grammar.edges import Tally
 from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP
-from frametool.view.tree_text import ProgressBar
+from frametool.view.pose_text import ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -47,7 +47,7 @@ def command(inputs: Inputs) -> int:
     refuse(rate is not None and rate <= 0, "--rate is more than 0")
     output = Output(inputs, "poses", otherwise=by_name(path, writers("poses")) or "csv")
     found, name, skipped = trajectory(path, inputs.on_error, forms_of(1)[0])
-    from frametool.fit.pairs import resampled, stamps_at_rate, stamps_every
+    from frametool.fit.alignment import resampled, stamps_at_rate, stamps_every
 
     found = _in_order(found, name)
     counted = found.stamps_ns is None
