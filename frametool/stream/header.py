@@ -288,25 +288,26 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
 
 
-def plain_pose(names: Sequence[str]) -> PoseColumns:
-    """Find the one point or pose among names without affixes, if there is one.
+def plain_pose(names: Sequence[str], *, affixed: bool) -> PoseColumns:
+    """Find the one point or pose among the keys of a record: without affixes, else under some if it may be `affixed`.
 
     Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
     """
-    header = Header(names)
-    bare = ("", "")
+    header, full, bare = Header(names), Header(names), ("", "")
     header.found = {word: {bare: spots[bare]} for word, spots in header.found.items() if bare in spots}
-    positions, rotations = find_positions(header), find_rotations(header, None)
+    positions = find_positions(header) or (find_positions(full) if affixed else [])
+    rotations = find_rotations(header, None) or (find_rotations(full, None) if affixed else [])
     if len(rotations) > 1 or len(positions) > 1:
         what = "rotation" if len(rotations) > 1 else "position"
         shown = " and ".join(each.shown for each in (rotations if len(rotations) > 1 else positions))
         raise ValueInvalid(f"expected one {what}, found {shown}")
     rotation = rotations[0] if rotations else None
     if rotation is None and (half := _half_rotation(header, None)):
-        raise ValueInvalid(half.replace("choose with --columns", "leave it out").replace("columns", "keys"))
+        reason = half.partition(", or add --")[0]
+        raise ValueInvalid(reason.replace("choose with --columns", "leave it out").replace("columns", "keys"))
     position = positions[0] if positions and not (rotation and rotation.whole) else None
     if position is None and rotation and not rotation.whole:
-        position = _half_position(header, rotation)
+        position = _half_position(full if affixed else header, rotation)
     return PoseColumns(position, rotation)
 
 

@@ -69,6 +69,7 @@ NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTE
 KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
+SIX_NUMBERS = 6  # of a twist or a wrench
 QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
@@ -455,6 +456,8 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
             return _placed(found, path)
     rotations = _rotations(value)
     flat = _flat_pose(value, rotations)
+    if flat and flat.position and flat.position.kind:
+        return _six_members(value, flat.position, path, request)
     turned, there = rotations or (flat and flat.rotation), positions or (flat and flat.position)
     # the grammar of poses allows that several say the same thing twice
     if len(positions) > 1 and not (turned and POSITION_KEYS.keys() >= {*positions}):
@@ -481,7 +484,18 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     record = record._replace(others=(*rotations[1:], *positions[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
     record = record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
-    return _given_on_earth(record, request) if request.given_place else record
+    is_ecef = flat and flat.position and flat.position.prefix.lower().endswith("ecef_")
+    place = request.given_place or ("ecef" if is_ecef else "")
+    return _given_on_earth(record, request._replace(given_place=place)) if place else record
+
+
+def _six_members(value: dict[str, Any], columns: Columns, path: Path, request: Request) -> Record:
+    """Read a twist or a wrench whose numbers are members of the record itself."""
+    if not request.operation.moves:
+        raise Misfit(f"a {columns.kind} cannot be taken for a pose; apply moves it")
+    values = tuple(_number(value, name, None) for name in columns.names)
+    paths = tuple((*path, name) for name in columns.names)
+    return Record(path, Shape(columns.kind, None), paths, values, members=columns.names)
 
 
 def _given_on_earth(record: Record, request: Request) -> Record:
@@ -563,9 +577,14 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     if (rotations and position) or KNOWN.issuperset(value):
         return
     wanted = {*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)} - LISTED_WORDS
-    unknown = islice((key for key in value if key not in KNOWN), MOST_COMPARED)
+    unknown = islice((key for key in value if key not in KNOWN and not _is_number(value[key])), MOST_COMPARED)
     if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
+
+
+def _is_number(value: Any) -> bool:
+    """Return True for a number, which is no misspelt list of them."""
+    return type(value) is str and value[:1] in NUMBER_BEGINS and " " not in value
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record
@@ -597,17 +616,22 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
 
     None where there is neither.  Raises Misfit for half a rotation, for two of them, and for a unit that is not known.
     """
-    # the members that may be numbers of ours
-    names = [key for key, each in value.items() if type(each) not in (dict, list) and key not in NOTHING_BUT]
-    if not names:
+    scalars = [key for key, each in value.items() if type(each) not in (dict, list)]
+    others = NOTHING_BUT.difference(STALE) if "axis_x" in value else NOTHING_BUT
+    names = [key for key in scalars if key not in others]  # that may be numbers of ours
+    is_flat = not (rotations or any(key in POINT_KEYS for key in value))
+    if not (names or (is_flat and len(scalars) >= SIX_NUMBERS)):
         return None
-    from frametool.stream.header import Columns, PoseColumns, plain_pose
+    from frametool.stream.header import Columns, PoseColumns, find_six, has_pose_column, plain_pose
 
+    six = find_six(scalars, "") if is_flat else None
+    if six is not None and not has_pose_column(name for name in scalars if name not in six.names):
+        return PoseColumns(six, None)
     if not rotations and set(names) == set(QUATERNION) and len(names) == len(value):
         alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), degrees=(None,) * 4)
         return PoseColumns(None, alone)
     try:
-        found = plain_pose(names)
+        found = plain_pose(names, affixed=is_flat)
     except ValueInvalid as error:
         raise Misfit(str(error), key=True) from None
     if wrong := next((each.wrong for each in found if each is not None and each.wrong), ""):

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from flow import INVERT, MOVE, convert, flow
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 H = 0.7071067811865476
 
@@ -95,3 +100,38 @@ def test_units_in_names_count_as_written(count: int) -> None:
     found = flow(record.encode() * count, INVERT, "json")
     wanted = {"x_mm": 0.0, "y_mm": 1000.0, "z_mm": 0.0, "roll [deg]": 0.0, "pitch [deg]": 0.0, "yaw[deg]": -90.0}
     assert [json.loads(line) for line in found.text.splitlines()] == [wanted] * count
+
+
+ONE_GRAMMAR = [
+    "x,y,z", "px,py,pz", "pos_x,pos_y,pos_z", "x_mm,y_mm,z_mm", "X [m],Y [m],Z [m]", "x,y,theta", "x,y,z,rx,ry,rz",
+    "pose.position.x,pose.position.y,pose.position.z,pose.orientation.x,pose.orientation.y,pose.orientation.z,pose.orientation.w",
+    "orientation_x,orientation_y,orientation_z,orientation_w,position_x,position_y,position_z", "timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z",
+    "x,y,z,imu_qx,imu_qy,imu_qz,imu_qw", "axis_x,axis_y,axis_z,angle_deg", "rotvec_x,rotvec_y,rotvec_z", "lat,lon,alt", "ecef_x,ecef_y,ecef_z",
+    "linear_x,linear_y,linear_z,angular_x,angular_y,angular_z", "force.x,force.y,force.z,torque.x,torque.y,torque.z", "x,y,z,roll_rate,A,B",
+]  # fmt: skip
+
+
+TURNED = {"x": "0", "y": "0", "z": "0.6", "w": "0.8"}
+
+
+@pytest.mark.parametrize("names", ONE_GRAMMAR)
+def test_keys_mean_what_columns_of_the_same_names_mean(run: Callable[..., Any], names: str) -> None:
+    turned = [bool(re.search(r"q_?[wxyz]$|orientation", name)) for name in names.split(",")]
+    cells = [TURNED[name[-1]] if turn else str(at) for at, (name, turn) in enumerate(zip(names.split(","), turned, strict=True), 1)]
+    moved = ("apply", "--transform", "{xyz: [1, 2, 0], rpy_deg: [0, 0, 90]}")
+    table = run(*moved, stdin=f"{names}\n{','.join(cells)}\n")
+    record = ", ".join(f'"{name}": {cell}' for name, cell in zip(names.split(","), cells, strict=True))
+    keyed = run(*moved, stdin=f"{{{record}}}\n")
+    assert (table.status, keyed.status) == (0, 0)
+    number = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
+    assert number.findall(keyed.out) == number.findall(table.out.partition("\n")[2])
+
+
+def test_several_positions_under_affixes_are_an_error_that_names_them(run: Callable[..., Any]) -> None:
+    done = run("convert", stdin='{"a_x": 1, "a_y": 2, "a_z": 3, "b_x": 1, "b_y": 2, "b_z": 3}\n')
+    assert (done.status, done.err) == (1, "frametool: stdin:1:1: expected one position, found a_x a_y a_z and b_x b_y b_z\n")
+
+
+def test_what_names_its_position_keeps_other_numbers_as_they_are(run: Callable[..., Any]) -> None:
+    done = run("apply", "--transform", "{xyz: [1, 0, 0]}", stdin='{"point": [1, 2, 3], "box_x": 1, "box_y": 2, "box_z": 3}\n')
+    assert done.out == '{"point": [2.0, 2.0, 3.0], "box_x": 1, "box_y": 2, "box_z": 3}\n'
