@@ -53,7 +53,7 @@ def _relative(text: str, path: str, pages: Mapping[str, str]) -> str:
     """Return the text of a page with links as they are from there, in the place of those that begin at the top."""
 
     def moved(found: re.Match[str]) -> str:
-        if found[1][1:] not in pages and not found[1].endswith(".svg"):
+        if found[1][1:] not in pages and not found[1].endswith((".svg", ".png")):
             raise SystemExit(f"{path}: the link to {found[1]} leads to no page")
         return f"]({posixpath.relpath(found[1], f'/{posixpath.dirname(path)}')}"
 
@@ -104,7 +104,7 @@ def write(folder: Path, address: str = "") -> None:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{text.rstrip()}\n", "utf-8")
-    for picture in (ROOT / "examples").glob("*.svg"):
+    for picture in (ROOT / "examples").glob("*.[sp][vn]g"):
         shutil.copy(picture, folder / "examples")
 
 

@@ -132,7 +132,8 @@ class Stream:
         if holds_arrays(form):
             from frametool.text.lines import Pieces
 
-            self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(form, self.opened()))), "csv"
+            opened = self.opened()
+            self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(form, opened), opened)), "csv"
 
     def _rows_of_cloud(self, form: str, opened: BufferedReader) -> Iterator[bytes]:
         from frametool.cli.trees import answers

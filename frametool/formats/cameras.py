@@ -150,9 +150,9 @@ def _made(
             camera = camera.resampled((1.0, 1.0), (-0.5, -0.5), camera.size)
             warn(f"{source}: {CORNER}")
         if size is not None:
-            if camera.size not in (None, tuple(size)):
-                warn(f"{source}: K is scaled from {' x '.join(map(str, camera.size))} to {' x '.join(map(str, size))}")
-            camera = camera.scaled(size)
+            before, camera = camera.size, camera.scaled(size)
+            if before not in (None, camera.size):
+                warn(f"{source}: K is scaled from {' x '.join(map(str, before))} to {' x '.join(map(str, size))}")
     except ValueInvalid as error:
         raise FormatError(f"{name}: {error}" if name and not line else str(error), source=source, line=line) from None
     return camera

@@ -60,8 +60,13 @@ class Seen:
         """Count the rows without numbers."""
         return self.counts[BEHIND] + self.counts[BEYOND] + self.counts[HORIZON]
 
+    @property
+    def is_mostly_behind(self) -> bool:
+        """Return True if the camera may look another way than it was taken to."""
+        return 2 * self.counts[BEHIND] > self.counts[ALL]
+
     def summary(self) -> str:
-        """Return how many rows there were, and what became of them."""
+        """Return how many rows there were, and what became of them; "" where all have what they should."""
         angle = f" ({degrees(self.camera.end_angle):.1f} deg)"
         parts = [
             f"{self.counts[name]} {name}{angle * (name == BEYOND)}"
@@ -69,7 +74,7 @@ class Seen:
             if self.counts[name]
         ]
         rows = f"{self.counts[ALL]} {self.what}{'s' * (self.counts[ALL] != 1)}"
-        return f"{rows}: {', '.join(parts)}" if parts else rows
+        return f"{rows}: {', '.join(parts)}" if parts else ""
 
 
 class Projection(Seen):

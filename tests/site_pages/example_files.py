@@ -17,7 +17,7 @@ def section() -> Section:
 
 def _text(name: str) -> str:
     parts = [f"`frametool examples {name}` prints this file."]
-    if name.endswith(".svg"):
+    if name.endswith((".svg", ".png")):
         parts.append(f"![{name}]({name})")
     else:
         lines = (EXAMPLES / name).read_text("utf-8").splitlines()

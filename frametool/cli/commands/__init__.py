@@ -33,6 +33,8 @@ COMMANDS = {
     "interpolate": ("frametool.cli.commands.interpolate", "poses between A and B at fractions of the way"),
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
+    "project": ("frametool.cli.commands.project", "points into the picture of a camera: pixels, depths, overlays"),
+    "unproject": ("frametool.cli.commands.unproject", "pixels of a camera as rays, or as points in TARGET"),
     "compare": ("frametool.cli.commands.compare", "how far trajectories are from a reference"),
     "align": ("frametool.cli.commands.align", "the transform that brings a trajectory onto its reference"),
     "resample": ("frametool.cli.commands.resample", "a trajectory at other moments"),

@@ -1,0 +1,215 @@
+"""`frametool project`: points into the picture of a camera. What it shares with `unproject` stands here too."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING
+
+import click
+
+from frametool.cli.command import TEXT, Inputs, argument, command_named, option, together
+from frametool.cli.commands.apply import Way, begins_number, is_record, sources_of, way_by_tree
+from frametool.cli.options import (
+    TIME,
+    ColumnNames,
+    offset_option,
+    pose_options,
+    reading_options,
+    result_options,
+    rules_options,
+)
+from frametool.cli.output import Output
+from frametool.cli.poses import is_inline, values_of
+from frametool.cli.sink import writing
+from frametool.cli.stderr import say
+from frametool.cli.streaming import Stream, stream_options
+from frametool.cli.trees import FRAME
+from frametool.errors import ValueInvalid, shown
+from frametool.text.numbers import parse_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from contextlib import AbstractContextManager
+
+    from frametool.cli.sink import Write
+    from frametool.documents.source import Source
+    from frametool.frames.buffer import TransformBuffer
+    from frametool.frames.lookups import FrameTree
+    from frametool.geometry.camera import Camera
+    from frametool.stream.pixels import Seen
+    from frametool.stream.request import Formula, Request, Shown
+
+AXES = ("optical", "opengl", "flu")
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read W,H; raises ValueInvalid."""
+    width, _, height = (each.strip() for each in text.partition(","))
+    if not (width.isdecimal() and height.isdecimal()):
+        raise ValueInvalid(f"a size is W,H in pixels, found {shown(text)}")
+    return int(width), int(height)
+
+
+_AXES = option("--camera-axes AXES", "of CAMERA: optical, opengl or flu  [default: as TREE says]", AXES)
+camera_options = together(
+    option("--camera FILE[:NAME]", "intrinsics from here, or inline, not from TREE", TEXT),
+    option("--model NAME", "what the coefficients of --camera are", requires=("camera",)),
+    option("--size W,H", "of the picture, to which K is scaled", parse_size),
+    option("--rectified", "of the rectified picture: R, then P, no distortion"),
+    option("--from-first", "points are in the first camera's rectified frame", requires=("rectified",)),
+    option("--first-pixel C", "centre of the first pixel; 0.5: COLMAP", parse_number, default=0.0),
+    option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files"),
+    stream_options,
+    pose_options,
+    result_options("points"),
+    option("--time-column NAME", "column or key of each row's own time", ColumnNames(), excludes=("at",), under="Time"),
+    option("--at TIME", "all at this time  [default: latest]", TIME, under="Time"),
+    rules_options,
+    offset_option,
+    reading_options(streams=True, camera_axes=_AXES),
+)
+
+
+@command_named("project", own=("input_path", "output"))
+@argument("arguments", FRAME, nargs=-1, metavar="[TREE CAMERA [SOURCE]] [X Y Z | RECORD]..")
+@option("--range", "add range, the distance from the camera", name="ranged")
+@option("--image FILE", "draw over this picture: -o FILE.svg, .html, .png", requires=("output",))
+@option("--frame-column NAME", "column with each row's frame, without SOURCE", ColumnNames())
+@camera_options
+def command(inputs: Inputs) -> int:
+    """Add to points the pixels at which a camera sees them.
+
+    \b
+      frametool project cameras.yaml cam_front lidar -i yard.csv
+      frametool project --camera camchain.yaml:cam0 0.5 0.2 4
+
+    Rows stay and get u, v, depth (z in optical axes) and in_image; u and v are empty where no pixel is. Without
+    SOURCE a row names its frame; without TREE points are in the camera's own. With --image FILE -o FILE.svg they are
+    drawn over the picture. `frametool help cameras` says more.
+    """
+    from frametool.stream.pixels import Projection
+
+    task = CameraTask(inputs, "TREE CAMERA")
+    overlay = None
+    if inputs.image is not None:
+        from frametool.view.overlay import Overlay
+
+        overlay = Overlay(inputs.image, inputs.output)
+        task.scale(overlay.size)
+    task.camera = task.rectified()
+    if task.camera.size is None and not inputs.quiet:
+        say("note: the camera has no size, in_image is empty; --size W,H gives it one")
+    output = Output(inputs, "points", otherwise="yaml") if overlay is None else Undrawn(inputs, "points")
+    take = None if overlay is None else overlay.take
+    seen = Projection(task.camera, inputs.first_pixel, ranged=bool(inputs.ranged), take=take)
+    request = task.request(inputs.frame_column if task.is_stream else None, seen, seen.shown(task.name))
+    records = () if task.is_stream else [*sources_of(task.rest, None)]
+    status = task.run(request, output, records, seen)
+    if overlay is not None:
+        with writing(overlay.path, force=output.force) as write:
+            write(overlay.drawn())
+        say(overlay.summary())
+    return status
+
+
+class Undrawn(Output):
+    """The rows of an overlay, which are not written."""
+
+    def opened(self) -> AbstractContextManager[Write]:
+        """Open no place."""
+        return nullcontext(lambda _: None)
+
+
+class CameraTask:
+    """What the arguments and options of both commands say: the camera, how rows move, which records there are."""
+
+    def __init__(self, inputs: Inputs, named: str) -> None:
+        """Read tree and camera; named: the arguments that lead to the camera, if there is a tree."""
+        self.inputs = inputs
+        self.stream = Stream(inputs)
+        self.way: Way | None = None
+        self.rest: tuple[str, ...] = inputs.arguments
+        self.name = (inputs.camera or "").rpartition(":")[2] if not is_inline(inputs.camera or "") else ""
+        if inputs.camera is None or _names_tree(self.rest):
+            *before, _ = names = named.split()
+            if len(self.rest) < len(names):
+                raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
+            self.name = self.rest[len(before)]
+            self.way, self.rest = way_by_tree(inputs, numbers=True)
+        self.is_stream = self.rest in ((), ("-",))
+        self.camera = self._camera()
+
+    def _camera(self) -> Camera:
+        """Return the camera in the axes of its frame, as its pixels are wanted."""
+        inputs, tree = self.inputs, None if self.way is None else self.way.tree
+        if tree is not None and inputs.camera is None:
+            camera = tree.camera(self.name)
+        else:
+            from frametool.formats.cameras import load_camera
+
+            camera = load_camera(inputs.camera, model=inputs.model, size=inputs.size)
+            if not (is_inline(inputs.camera) and "axes" in inputs.camera):
+                camera = camera.changed(axes=self._axes_in(tree))  # those of a file are of its own frame
+        if inputs.camera_axes:
+            camera = camera.changed(axes=inputs.camera_axes)
+            inputs.forms_read = (*inputs.forms_read, ("", ("camera_axes",)))
+        return self._scaled(camera, inputs.size)
+
+    def _axes_in(self, tree: FrameTree | TransformBuffer | None) -> str:
+        """Return the axes of the camera's frame as the tree says, optical where it says nothing."""
+        if tree is None:
+            return "optical"
+        own = tree.cameras.get(self.name)
+        return tree.camera_axes.get(self.name, "optical" if own is None else own.axes)
+
+    def rectified(self) -> Camera:
+        """Return the camera of the rectified picture, if that is wanted."""
+        inputs = self.inputs
+        return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
+
+    def scale(self, size: tuple[int, int] | None) -> None:
+        """Take the picture in another size."""
+        self.camera = self._scaled(self.camera, size)
+
+    def _scaled(self, camera: Camera, size: tuple[int, int] | None) -> Camera:
+        before = camera.size
+        if size is None or before == size:
+            return camera
+        made = camera.scaled(size)
+        if before is not None and not self.inputs.quiet:
+            say(f"note: K is scaled from {before[0]} x {before[1]} to {size[0]} x {size[1]}")
+        return made
+
+    def request(self, frame_column: str | None, formula: Formula, shown: Shown) -> Request:
+        """Return what is done with rows."""
+        from frametool.stream.request import Operation, Request
+
+        inputs = self.inputs
+        asked = Request(Operation(moves=True))
+        if self.way is not None:
+            asked = self.way.request(frame_column, inputs.time_column if self.is_stream else None)
+        operation = asked.operation._replace(formula=formula, shown=shown)
+        inputs.ask("keep")
+        return asked._replace(operation=operation, rename=None, normalize=bool(inputs.normalize))
+
+    def run(self, request: Request, output: Output, records: Sequence[Source | str], seen: Seen) -> int:
+        """Write the rows of the stream, or the results of records; then say what became of them."""
+        if self.is_stream:
+            self.stream.read_clouds_as_rows()
+            status = self.stream.run(request, output)
+        elif self.stream.path is not None:
+            raise click.UsageError("-i FILE and arguments are two inputs; give one")
+        else:
+            status = 0
+            request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
+            output.values(values_of(records, request, output))
+        if not self.inputs.quiet and (self.is_stream or seen.lost) and (summary := seen.summary()):
+            is_odd = seen.is_mostly_behind and not self.inputs.camera_axes
+            say(f"{summary}{'; most are behind: --camera-axes flu or opengl?' * is_odd}")
+        return status
+
+
+def _names_tree(arguments: Sequence[str]) -> bool:
+    """Return True where the first argument is no number and no record, or is a tree that is written inline."""
+    inner = [each for each in arguments[:2] if not (is_record(each) or begins_number(each))]
+    return bool(arguments) and (inner[:1] == [arguments[0]] or (len(arguments) > 1 and inner == [arguments[1]]))
