@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames, FrameTree
     from frametool.grammar.pose import Pose
     from frametool.stream.record_results import Rows
+    from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
     from frametool.stream.row_poses import RowPoses
 
@@ -132,7 +133,7 @@ class Output:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
         self._refuse_place()
         if self._in_blocks:
-            self.pieces(self._blocks(iter(values)))
+            self.pieces(self._blocks(_batched(iter(values))))
             return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
@@ -156,7 +157,7 @@ class Output:
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self._refuse_place()
-        self.pieces(self._blocks(results) if self._in_blocks else self._batches(results))
+        self.pieces(self._blocks(_batched(results)) if self._in_blocks else self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
@@ -172,28 +173,31 @@ class Output:
             yield write_poses([begin[0], *batch], self.style)[known:]
             size = min(2 * size, BATCH)
 
-    def _blocks(self, values: Iterator[Result | dict[str, Any]]) -> Iterator[bytes]:
+    def _blocks(self, batches: Iterator[list[Value] | RowPoses]) -> Iterator[bytes]:
         """Yield a trajectory, columns of numbers or a recording, block after block of things of one kind."""
         from frametool.stream.block_writer import writer_for
 
-        batch = list(islice(values, BLOCK))
-        turns = [each for each in batch if isinstance(each, Result) and each.pose.position is None]
-        placed = not (self._holds_arrays and len(turns) == len(batch))
-        kind, block = self._block(batch, placed=placed)
-        writer = writer_for(self.style, kind, placed=placed)
-        while batch:
+        first = next(batches, [])
+        turns = [each for each in first if isinstance(each, Result) and each.pose.position is None]
+        placed = not (self._holds_arrays and len(turns) == len(first))
+        known, block = self._block(first, placed=placed)
+        writer = writer_for(self.style, known, placed=placed)
+        if len(block.numbers):
             yield writer.of_block(block)
-            if batch := list(islice(values, BLOCK)):
-                known, (kind, block) = kind, self._block(batch, placed=placed)
-                if kind != known:
-                    raise ValueInvalid(f"{self.style.form} holds things of one kind, found {known} and {kind}")
+        for batch in batches:
+            kind, block = self._block(batch, placed=placed)
+            if kind != known:
+                raise ValueInvalid(f"{self.style.form} holds things of one kind, found {known} and {kind}")
+            yield writer.of_block(block)
         yield from writer.end()
 
-    def _block(self, batch: list[Result | dict[str, Any]], *, placed: bool) -> tuple[str, RowPoses]:
+    def _block(self, batch: list[Value] | RowPoses, *, placed: bool) -> tuple[str, RowPoses]:
         """Return some results as a block, and what they are: poses, or points, vectors, .."""
         from frametool.stream.row_layout import POSE
         from frametool.stream.row_poses import block_of, block_of_points
 
+        if not isinstance(batch, list):
+            return POSE, batch if placed else batch._replace(numbers=batch.numbers[:, 3:])
         found = batch if self.is_trajectory else list(map(_as_point, batch))
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) == len(found):
@@ -212,11 +216,17 @@ class Output:
 
             self.pieces(CsvTable(self.style).pieces(good))
             return
-        values = chain.from_iterable(block.in_order() for block in good)
+        in_blocks = self._in_blocks
+        values: Iterator[Any] = chain.from_iterable(
+            _in_blocks(each) if in_blocks else each.in_order() for each in good
+        )
         first = list(islice(values, 1))
         if self._fault is not None and not first:
             raise self._fault
-        if self.style.form in ("yaml", "json"):
+        if in_blocks:
+            self._refuse_place()
+            self.pieces(self._blocks(chain(first, values)))
+        elif self.style.form in ("yaml", "json"):
             self.pieces(self._documents(chain(first, values)))
         else:
             self.values(chain(first, values))
@@ -277,7 +287,7 @@ class Output:
         if self.style.form in FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
         if self._in_blocks:
-            self.pieces(self._blocks(iter(found)))
+            self.pieces(self._blocks(_batched(iter(found))))
             return
         placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
         self._tell_dropped(key for each in placed for key in each)
@@ -348,6 +358,17 @@ def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:
         return value
     named = {"name": value.pose.name, "frame": value.pose.parent, "point": list(value.pose.position)}
     return {key: each for key, each in named.items() if each is not None} | value.extras
+
+
+def _batched(values: Iterator[Value]) -> Iterator[list[Value]]:
+    """Yield values, many together."""
+    return iter(lambda: list(islice(values, BLOCK)), [])
+
+
+def _in_blocks(rows: Rows) -> Iterator[list[Value] | RowPoses]:
+    """Yield the results of a block of records as one block of poses, or as values, many together."""
+    posed = rows.posed()
+    return _batched(rows.in_order()) if posed is None else iter([posed])
 
 
 def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:

@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
 from io import BufferedReader
+from itertools import groupby
 from json import JSONEncoder
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options, Tally
-    from frametool.recordings.read import Channel, RecordingReader
+    from frametool.recordings.alike import Layout
+    from frametool.recordings.made import MessageTypes
+    from frametool.recordings.read import Channel, Message, RecordingReader
 
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -182,8 +185,7 @@ def _completed(own: Any, outer: Any, has_stamps: bool) -> Any:  # noqa: FBT001 -
     return replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)
 
 
-
-MANY = 400  # lines
+MANY = 4000  # messages
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -217,7 +219,8 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
         reader = opened.enter_context(opened_recording(path, tally))
         reader.refuse_foreign(chosen)
         if channels := record_channels(reader, chosen):
-            return BufferedReader(Pieces(_pieces(reader, channels), opened.pop_all()))
+            pieces = filter(None, _pieces(reader, channels))  # an empty one would be the end
+            return BufferedReader(Pieces(pieces, opened.pop_all()))
         wanted = {topic.strip("/") for topic in chosen}
         clouds = [each.topic.strip("/") for each in reader.channels if each.type == CLOUD]
         if any(not wanted or topic in wanted for topic in clouds):
@@ -232,22 +235,65 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
 
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
     """Yield each message, or each pose of a list, as a line, many together; an error comes behind the lines before."""
-    held: list[str] = []
+    held: list[bytes] = []
     number = 1
+    layouts: dict[Any, Layout | None] = {}
     try:
-        for channel, _, data, *_ in reader.messages(channels):
-            held += map(_line, posed_messages(reader.types.read(channel, data), channel.type))
-            number += 1
-            if len(held) >= MANY:
-                yield "".join(held).encode()
-                held.clear()
+        for stretch in _stretches(reader.messages(channels)):
+            for (channel, _), run in groupby(stretch, lambda each: (each.channel, len(each.data))):
+                for text, count in _lines(reader.types, channel, [each.data for each in run], layouts):
+                    held.append(text)
+                    number += count
+            yield b"".join(held)
+            held.clear()
     except Exception as error:
-        yield "".join(held).encode()
+        yield b"".join(held)
         if isinstance(error, FormatError):
             raise
         what = f"message {number}: cannot be read ({type(error).__name__})"
         raise FormatError(what, source=reader.path) from None
-    yield "".join(held).encode()
+    yield b"".join(held)
+
+
+def _stretches(messages: Iterator[Message]) -> Iterator[list[Message]]:
+    """Yield messages many together; those before an error too."""
+    held: list[Message] = []
+    try:
+        for message in messages:
+            held.append(message)
+            if len(held) == MANY:
+                yield held
+                held = []
+    except Exception:
+        yield held
+        raise
+    yield held
+
+
+def _lines(
+    types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, Layout | None]
+) -> Iterator[tuple[bytes, int]]:
+    """Yield the lines of messages of one length, and of how many: all at once where they lie alike.
+
+    layouts: what was learned, by channel and length; None where no two messages lie alike
+    """
+    key = channel, len(messages[0])
+    known = layouts.get(key)
+    found = known and known.lines(messages)
+    if found is None and (known or key not in layouts):
+        from frametool.recordings.alike import layout_of
+
+        layouts[key] = known = layout_of(types, channel.type, messages[0], _text(types, channel, messages[0]))
+        found = known and known.lines(messages)
+    if found is None:
+        yield from ((_text(types, channel, each), 1) for each in messages)
+    else:
+        yield found, len(messages)
+
+
+def _text(types: MessageTypes, channel: Channel, data: bytes) -> bytes:
+    """Return the lines of one message."""
+    return "".join(map(_line, posed_messages(types.read(channel, data), channel.type))).encode()
 
 
 def _line(message: Any) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from io import BufferedReader, BytesIO, FileIO
 from operator import itemgetter
 from pathlib import Path, PurePath
+from struct import Struct
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -32,6 +33,7 @@ MOST = 1 << 28  # bytes of a chunk: one that promises more is not unpacked
 LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
 NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 RECORD_HEAD = 9  # bytes
+RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # what a record begins with, and a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
 
 
@@ -196,14 +198,30 @@ class McapFile:
 def _records_of(chunk: Any) -> list[Any]:
     """Return what is in a chunk; raises ValueError for one that is too large, before it is unpacked."""
     import zstandard
-    from mcap.stream_reader import breakup_chunk
+    from mcap import records
+    from mcap.data_stream import ReadDataStream
+    from mcap.opcode import Opcode
+    from mcap.stream_reader import get_chunk_data_stream
 
     size = chunk.uncompressed_size
     if chunk.compression == "zstd" and size <= MOST:
         size = max(size, zstandard.frame_content_size(chunk.data))
     if size > MOST:
         raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
-    return breakup_chunk(chunk, validate_crc=True)
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    data, end, found = stream.read(length), 0, list[Any]()
+    while end < length:
+        code, size = RECORD.unpack_from(data, end)
+        begin, end = end + RECORD_HEAD, end + RECORD_HEAD + size
+        if end > length:
+            raise ValueError("a record is longer than its chunk")
+        if code == Opcode.MESSAGE:
+            channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, begin)
+            found.append(records.Message(channel, log_ns, data[begin + MESSAGE.size : end], publish_ns, sequence))
+        elif code in (Opcode.SCHEMA, Opcode.CHANNEL):
+            kind = records.Schema if code == Opcode.SCHEMA else records.Channel
+            found.append(kind.read(ReadDataStream(BytesIO(data[begin:end]))))
+    return found
 
 
 class DatabaseFile:

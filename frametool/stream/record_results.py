@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from frametool.stream.record_rows import Batch, RecordRows
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
+    from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
 
 
@@ -38,6 +39,14 @@ class Rows(NamedTuple):
 
     batches: Sequence[Batch]
     values: list[tuple[int, Value]]
+
+    def posed(self) -> RowPoses | None:
+        """Return the rows as one block of poses; None where they are more, or others."""
+        if self.values or len(self.batches) != 1:
+            return None
+        from frametool.stream.record_rows import poses_of
+
+        return poses_of(self.batches[0])
 
     def in_order(self) -> Iterator[Value]:
         """Yield all results as values, in the order of their records."""

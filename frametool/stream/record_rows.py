@@ -34,7 +34,8 @@ from frametool.stream.record_values import (
     unit_of,
     values_of_unit,
 )
-from frametool.stream.row_layout import POSE, ROTATION, Target
+from frametool.stream.row_layout import AS_READ, POSE, ROTATION, Target
+from frametool.stream.row_poses import RowPoses, objects
 from frametool.stream.splitter import Part
 from frametool.stream.stamp_columns import read_stamps
 from frametool.text.spans import MARGIN, Spans, framed
@@ -363,3 +364,18 @@ def values_of(batch: Batch) -> Iterator[Value]:
             parent=filling.filled(pose.parent, row),
         )
         yield Result(own, filling.filled(value.extras, row))
+
+
+def poses_of(batch: Batch) -> RowPoses | None:
+    """Return the rows of a batch as a block of poses; None where they are points, or on the Earth."""
+    value, rows = batch.marked.value, range(len(batch.places))
+    if not isinstance(value, Result) or None in (value.pose.position, value.pose.rotation) or AS_READ in value.extras:
+        return None
+    filling = Filling(batch)
+    named = (filling.known.get(each or "") or [filling.filled(each, row) for row in rows] for each in value.pose[2:4])
+    names, parents = (each[:1] if len(set(each)) == 1 else each for each in named)
+    extras = {
+        key: objects(filling.filled(each, row) for row in rows)
+        for key, each in value.extras.items() if key != "stamp_ns"
+    }  # fmt: skip
+    return RowPoses(batch.results[:, :7] + 0.0, batch.stamps_ns, np.arange(len(rows)), parents, names, extras)

@@ -1,4 +1,4 @@
-"""Recordings written, whole processes beside a loop over the library: `python tests/benchmarks/bench_recordings.py [N]`.
+"""Recordings written and read, whole processes beside a loop over the library: `python tests/benchmarks/bench_recordings.py [N]`.
 
 N poses of a TUM file become an MCAP file and a ROS 1 bag.  The peer is the shortest script with rosbags: a line parted,
 a message made, serialised and written.  Least processor seconds of several runs, messages a second, peak memory.
@@ -66,6 +66,11 @@ def main(count: int) -> None:
             memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
             theirs = theirs or timed([sys.executable, "-c", PEER, "walk.tum", "peer{run}"], folder)
             print(f"{form:<8} {seconds:8.2f} {count / seconds:11.0f} {memory:5.0f}  {theirs / seconds:.2f} x")
+        print(f"\n{'read':<8} {'into':<5} {'seconds':>8} {'rows/s':>11}  goal 100000")
+        for suffix in ("mcap", "bag"):
+            for into in ("csv", "tum"):
+                seconds = timed([*TOOL, "convert", "-i", f"w0.{suffix}", "-o", f"{suffix}{{run}}.{into}", "--quiet"], folder)
+                print(f"{suffix:<8} {into:<5} {seconds:8.2f} {count / seconds:11.0f}")
 
 
 if __name__ == "__main__":

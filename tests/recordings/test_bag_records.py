@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
-from recorded import FORMS, START, Maker, Sent, write
+from recorded import FORMS, START, Maker, Sent, store, write
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from frametool.grammar.edges import Tally
-from frametool.recordings.messages import open_records
+from frametool.recordings.made import MessageTypes
+from frametool.recordings.messages import RECORDS, open_records
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,14 +53,14 @@ def messages(store: Any, *, ros1: bool) -> list[tuple[str, str, Any]]:
 @pytest.fixture(params=["bag1", "bag2"])
 def bag(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     ros1 = request.param == "bag1"
-    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    types = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     path = tmp_path / ("run.bag" if ros1 else "run")
     with Writer1(path) if ros1 else Writer2(path, version=9) as writer:
         topics: dict[str, Any] = {}
-        for at, (topic, kind, message) in enumerate(messages(store, ros1=ros1)):
+        for at, (topic, kind, message) in enumerate(messages(types, ros1=ros1)):
             if topic not in topics:
-                topics[topic] = writer.add_connection(topic, kind, typestore=store)
-            data = store.serialize_ros1(message, kind) if ros1 else store.serialize_cdr(message, kind)
+                topics[topic] = writer.add_connection(topic, kind, typestore=types)
+            data = types.serialize_ros1(message, kind) if ros1 else types.serialize_cdr(message, kind)
             writer.write(topics[topic], (10 + at) * 10**9, data)
     return path
 
@@ -210,3 +212,55 @@ def test_points_and_vectors_get_no_rotation(name: str, part: str, key: str, form
     assert rows == f"frame,x,y,z,stamp_ns\nmap,1.0,2.0,3.0,{START}\nmap,4.0,2.0,3.0,{START}\n"
     assert rows == run("convert", "-f", "csv", stdin=text).out
     assert "roll,pitch,yaw" in run("convert", "-i", bag, "-f", "csv", "--to", "rpy").out  # asked for
+
+
+def made_up(form: str, kind: str, random: np.random.Generator, text: str) -> Any:
+    """Make a message of a type of random numbers, with one text in all places that have some."""
+    def value(node: Nodetype, what: Any) -> Any:
+        if node == Nodetype.NAME:
+            return made_up(form, what, random, text)
+        if node == Nodetype.ARRAY:
+            return np.array([value(*what[0]) for _ in range(what[1])])
+        if what[0].startswith("float"):
+            return random.choice([0.0, -0.0, 1.0, 1e300, random.normal(), random.normal() * 10.0 ** random.integers(-30, 30)])
+        return text if what[0] == "string" else int(random.integers(0, 100))
+
+    return Maker(form).part(kind, *(value(*node) for _, node in store(form).fielddefs[kind][1]))
+
+
+@pytest.mark.parametrize("form", ["bag", "mcap"])
+@pytest.mark.parametrize("kind", sorted(RECORDS - {"nav_msgs/msg/Path", "geometry_msgs/msg/PoseArray"}))
+def test_messages_that_lie_alike_become_the_same_lines_at_once(
+    form: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    random, texts = np.random.default_rng(35), ['map "1" %r'] * 40 + ["odom", "östlich"] * 5 + ["map", "mop"] * 3
+    sent = [Sent("/it", kind, made_up(form, kind, random, text), START + at) for at, text in enumerate(texts)]
+    read, singly = MessageTypes.read, 0
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal singly
+        singly += 1
+        return read(*arguments)
+
+    def lines(some: list[Sent]) -> bytes:
+        bag = write(tmp_path / f"run{random.random()}.{form}", form, some)
+        stream = open_records(str(bag), (), Tally())
+        assert stream is not None
+        return stream.read()
+
+    monkeypatch.setattr(MessageTypes, "read", counted)
+    found = [lines(sent[:40])]
+    assert singly == 1
+    found.append(lines(sent))
+    monkeypatch.setattr("frametool.recordings.alike.layout_of", lambda *_: None)
+    assert [lines(sent[:40]), lines(sent)] == found
+    assert [json.loads(line)["header"]["frame_id"] for line in found[1].splitlines()] == texts
+
+
+def test_a_number_that_is_not_finite_has_its_name_among_messages_that_lie_alike(tmp_path: Path, run: Run) -> None:
+    made = Maker("mcap")
+    poses = [(float(at), 0.0, float("nan") if at == 5 else 1.0, 0.0, 0.0, 0.0, 1.0) for at in range(9)]
+    bag = write(tmp_path / "run", "mcap", [Sent("/it", *made.pose("map", START, each), START) for each in poses])
+    done = run("convert", "-i", str(bag), "-f", "csv", "--on-error", "skip")
+    assert [row.split(",")[1] for row in done.out.splitlines()[1:]] == ["0.0", "1.0", "2.0", "3.0", "4.0", "6.0", "7.0", "8.0"]
+    assert "'nan' is not finite" in done.err
