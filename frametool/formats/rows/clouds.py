@@ -13,16 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, shown
-from frametool.formats.rows.column_file import (
-    WHOLE,
-    Batch,
-    ColumnFile,
-    ColumnNumbers,
-    CountedWriter,
-    encode_records,
-    pieces,
-    record_batches,
-)
+from frametool.formats.rows import column_file
 from frametool.grammar.names import NORMALS
 from frametool.text.cells import split_blank
 from frametool.text.lines import read_blocks
@@ -50,7 +41,7 @@ _EXACT = 2.0**53
 _SINGLE = np.dtype(np.float32)
 
 
-class CloudFile(ColumnFile):
+class CloudFile(column_file.ColumnFile):
     """The points of a file whose header is read."""
 
     vectors = NORMALS
@@ -68,13 +59,13 @@ class CloudFile(ColumnFile):
         self.is_last = True  # nothing stands behind the points
         self.behind = b""
 
-    def batches(self) -> Iterator[Batch]:
+    def batches(self) -> Iterator[column_file.Batch]:
         """Yield the points; raises FormatError where the file ends too early, or holds more."""
         if self.text is not None:
             yield from self.text.batches()
             self.behind = self.text.check_end() if self.is_last else b""
             return
-        yield from record_batches(self.file, self.record, self.count)
+        yield from column_file.record_batches(self.file, self.record, self.count)
         self.behind = self.file.stream.read(self.record.itemsize) if self.is_last else b""
         if self.behind and len(self.behind) == self.record.itemsize:
             raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)
@@ -91,16 +82,16 @@ class CloudFile(ColumnFile):
         """Return the type of a point that has other columns; raises ValueInvalid for what the format cannot hold."""
         raise NotImplementedError
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> CountedWriter:
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> column_file.CountedWriter:
         """Return what writes a cloud of the same kind."""
         head, count = partial(self.header, columns), None if drops else self.count
         if self.text is None:
             kind = self.record if same_columns(columns, self.width) else self.record_with(columns)
-            return CountedWriter(partial(encode_records, columns, kind), head, count, self.rest)
+            return column_file.CountedWriter(partial(column_file.encode_records, columns, kind), head, count, self.rest)
         beyond = columns[self.width :]
         if not same_columns(columns[: self.width], self.width) or any(column.passed is not None for column in beyond):
             raise ValueInvalid("columns of an ascii cloud stay as they are; -f csv writes others")
-        return CountedWriter(partial(encode_text, columns, style), head, count, self.rest)
+        return column_file.CountedWriter(partial(encode_text, columns, style), head, count, self.rest)
 
 
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
@@ -200,7 +191,7 @@ class TextRows:
 
     def behind(self) -> Iterator[bytes]:
         """Yield what stands behind the last row."""
-        return chain((self._rest,), pieces(self.cloud.file.stream))
+        return chain((self._rest,), column_file.pieces(self.cloud.file.stream))
 
     def check_end(self) -> bytes:
         """Return the blanks behind the last row; raises FormatError where more rows stand there."""
@@ -213,7 +204,7 @@ class TextRows:
         return b"".join(blanks)
 
 
-class TextBatch(Batch):
+class TextBatch(column_file.Batch):
     """Some rows; a number that is not finite stands for no number."""
 
     def __init__(self, cells: Cells, table: TextRows) -> None:
@@ -227,7 +218,7 @@ class TextBatch(Batch):
         message = f"{self.table.cloud.names[place]}: {reason}"
         return self.table.problem(message, self.line + int(self.cells.rows[row]))
 
-    def numbers(self, place: int) -> ColumnNumbers:
+    def numbers(self, place: int) -> column_file.ColumnNumbers:
         """Return a column as floats; raises FormatError for a cell that is not a number."""
         column = self.cells.column(self.table.at[place])
         values, bad = parse_floats(column)
@@ -237,7 +228,7 @@ class TextBatch(Batch):
             if known is None:
                 raise self._problem(row, place, explain_number(text))
             values[row] = -known if text.startswith("-") else known
-        return ColumnNumbers(values)
+        return column_file.ColumnNumbers(values)
 
     def texts(self, place: int) -> list[str]:
         """Return a column as texts."""
@@ -247,7 +238,7 @@ class TextBatch(Batch):
     def column(self, place: int) -> Any:
         """Return a column as numbers of its kind; raises FormatError for a number that is not of this kind."""
         kind, values = self.table.cloud.record[place], self.numbers(place).values
-        if kind.kind not in WHOLE:
+        if kind.kind not in column_file.WHOLE:
             return values.astype(kind)
         try:
             return np.array([int(text) for text in self.texts(place)], kind)

@@ -15,18 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, warn
-from frametool.formats.rows.column_file import (
-    MOST_ROWS,
-    WHOLE,
-    XYZ,
-    ColumnFile,
-    StructuredBatch,
-    bytes_left,
-    check_declared,
-    pieces,
-    seekable,
-    temporary_file,
-)
+from frametool.formats.rows import column_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -40,6 +29,7 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
+XYZ, WHOLE = column_file.XYZ, column_file.WHOLE
 STORED = ("X", "Y", "Z")
 LIMITS = np.iinfo(np.int32)
 NEW_SCALE = 0.001  # metres, of a file that is made
@@ -105,7 +95,7 @@ class _Clipped:
         return data
 
 
-class LasBatch(StructuredBatch):
+class LasBatch(column_file.StructuredBatch):
     """Some points."""
 
     def __init__(self, points: Any, names: Sequence[str]) -> None:
@@ -118,7 +108,7 @@ class LasBatch(StructuredBatch):
         return np.array(self.points[self.names[place]])
 
 
-class LasFile(ColumnFile):
+class LasFile(column_file.ColumnFile):
     """A scan whose points are read one batch after the other."""
 
     vectors = (("x_t", "y_t", "z_t"),)  # directions of waveforms
@@ -128,8 +118,8 @@ class LasFile(ColumnFile):
         """Read the header; raises FormatError for a broken one, FileProblem where the extra is missing."""
         laspy = _laspy(file.name, packed=file.head()[PACKED_AT : PACKED_AT + 1] >= PACKED)
         self.file = file
-        file.stream = seekable(file, self)
-        whole = bytes_left(file.stream) or 0
+        file.stream = column_file.seekable(file, self)
+        whole = column_file.bytes_left(file.stream) or 0
         head = file.stream.read(LEAST_HEAD)
         file.stream.seek(0)
         for what, at, size in RECORDS[: 1 + (head[MINOR_AT : MINOR_AT + 1] >= b"\x04")]:
@@ -141,7 +131,7 @@ class LasFile(ColumnFile):
             if not header.are_points_compressed:
                 file.stream.seek(header.offset_to_point_data)
                 last = not (header.number_of_evlrs or header.start_of_waveform_data_packet_record)
-                check_declared(file, header.point_count, header.point_format.size, "points", last=last)
+                column_file.check_declared(file, header.point_count, header.point_format.size, "points", last=last)
             elif header.point_count > whole * MOST_PACKED:
                 raise FormatError(f"the header says {header.point_count} points, in {whole} bytes", source=file.name)
             self.names = (*XYZ, *(name for name in header.point_format.dimension_names if name not in STORED))
@@ -160,7 +150,7 @@ class LasFile(ColumnFile):
         """Yield the points; raises FormatError where the file ends too early."""
         count, done = self.header.point_count, 0
         while done < count:
-            wanted = min(MOST_ROWS, count - done)
+            wanted = min(column_file.MOST_ROWS, count - done)
             with _translated(self.file.name, BROKEN):
                 points = self.reader.read_points(wanted)
             done += len(points)
@@ -186,7 +176,7 @@ class LasWriter:
     def __init__(self, header: Any, columns: Sequence[OutColumn], *, packed: bool, name: str = "las") -> None:
         """Take a header, whose offsets are chosen when the first points come."""
         self.header, self.columns, self.packed, self.name = header, columns, packed, name
-        self.kept = temporary_file(self)
+        self.kept = column_file.temporary_file(self)
         self.writer: Any = None
         self.count = 0
         self.left_out = 0  # points without numbers
@@ -265,7 +255,7 @@ class LasWriter:
             rows = "1 point" if self.left_out == 1 else f"{self.left_out} points"
             warn(f"{self.name}: {rows} without numbers left out: las has no place for them")
         self.kept.seek(0)
-        yield from pieces(self.kept)
+        yield from column_file.pieces(self.kept)
 
 
 def open_columns(file: InputFile, _options: Options) -> LasFile:

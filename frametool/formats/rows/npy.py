@@ -14,19 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.column_file import (
-    MOST_ROWS,
-    PIECE,
-    XYZ,
-    ColumnFile,
-    CountedWriter,
-    StructuredBatch,
-    check_declared,
-    encode_records,
-    is_number,
-    record_batches,
-    record_of,
-)
+from frametool.formats.rows import column_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -76,7 +64,7 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
     return kind, shape, by_columns
 
 
-class NpyFile(ColumnFile):
+class NpyFile(column_file.ColumnFile):
     """An array whose rows are read one batch after the other."""
 
     gaps = True
@@ -94,36 +82,36 @@ class NpyFile(ColumnFile):
         if kind.names is not None and len(self.shape) > 1:
             raise FormatError(f"records in {len(self.shape)} axes; wanted is one row of them", source=file.name)
         if kind.names is None:
-            if not is_number(kind):
+            if not column_file.is_number(kind):
                 raise FormatError(f"it holds {kind}; wanted are numbers, or fields", source=file.name)
             columns = prod(self.shape[1:])
             if columns > MOST_COLUMNS:
                 raise FormatError(f"it has {columns} columns; at most {MOST_COLUMNS} are read", source=file.name)
-            self.record = record_of([kind] * columns)
+            self.record = column_file.record_of([kind] * columns)
         if self.record.itemsize > MOST_BYTES:
             raise FormatError(f"a row of {self.record.itemsize} bytes; at most {MOST_BYTES} are read", source=file.name)
         self.width = len(self.record.names or ())
         kinds = [self.record[place] for place in range(self.width)]
-        self.kinds = [kind if is_number(kind) else None for kind in kinds]
-        check_declared(file, self.count, self.record.itemsize, "rows", last=True)
+        self.kinds = [kind if column_file.is_number(kind) else None for kind in kinds]
+        column_file.check_declared(file, self.count, self.record.itemsize, "rows", last=True)
 
     def batches(self) -> Iterator[Batch]:
         """Yield the rows; raises FormatError where the file ends too early."""
         if self.by_columns and len(self.shape) > 1:
             return self._rows_of_columns()
-        return record_batches(self.file, self.record, self.count)
+        return column_file.record_batches(self.file, self.record, self.count)
 
     def _rows_of_columns(self) -> Iterator[Batch]:
         """Yield the rows of an array whose columns stand one after the other: all of it is read for that."""
         data, size = bytearray(), self.count * self.record.itemsize
-        while len(data) < size and (piece := self.file.stream.read(min(PIECE, size - len(data)))):
+        while len(data) < size and (piece := self.file.stream.read(min(column_file.PIECE, size - len(data)))):
             data += piece
         if len(data) < size:
             raise FormatError(f"the file ends after {len(data)} of {size} bytes", source=self.file.name)
         array = np.frombuffer(data, self.record[0]).reshape(self.shape, order="F")
-        for first in range(0, self.count, MOST_ROWS):
-            rows = np.ascontiguousarray(array[first : first + MOST_ROWS]).reshape(-1, self.width)
-            yield StructuredBatch(rows.view(self.record)[:, 0])
+        for first in range(0, self.count, column_file.MOST_ROWS):
+            rows = np.ascontiguousarray(array[first : first + column_file.MOST_ROWS]).reshape(-1, self.width)
+            yield column_file.StructuredBatch(rows.view(self.record)[:, 0])
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
         """Return what writes an array of the same kind, row after row."""
@@ -134,7 +122,7 @@ class NpyFile(ColumnFile):
 
 def _writer(
     columns: Sequence[OutColumn], given: Kind, count: int | None, shape: tuple[int, ...] | None
-) -> CountedWriter:
+) -> column_file.CountedWriter:
     """Return what writes an array: without fields where the input had none and all columns are of one type.
 
     given: the type of the input's records; shape: of a row that has no fields
@@ -155,7 +143,7 @@ def _writer(
         version = b"\x02\x00" if long else b"\x01\x00"
         return MAGIC + version + struct.pack("<I" if long else "<H", len(text)) + text.encode("latin-1")
 
-    return CountedWriter(partial(encode_records, columns, record), head, count)
+    return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
 
 
 def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
@@ -174,7 +162,7 @@ def open_columns(file: InputFile, _options: Options) -> NpyFile:
     return NpyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> CountedWriter:
+def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
     """Return what writes rows made elsewhere: n x 3 where there are points alone, else records with fields."""
     names = tuple(column.name for column in columns)
-    return _writer(columns, np.dtype([]), count, () if names == XYZ else None)
+    return _writer(columns, np.dtype([]), count, () if names == column_file.XYZ else None)

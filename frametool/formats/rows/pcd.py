@@ -29,15 +29,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
+from frametool.formats.rows import column_file
 from frametool.formats.rows.clouds import CloudFile, TextRows, count_in, head_lines, misfit_of, same_columns, type_in
-from frametool.formats.rows.column_file import (
-    CountedWriter,
-    StructuredBatch,
-    check_declared,
-    encode_records,
-    read_exactly,
-    rows_of_batch,
-)
 from frametool.geometry import floats, placed, quaternion
 from frametool.text.numbers import parse_number
 
@@ -306,7 +299,7 @@ class PcdFile(CloudFile):
         super().__init__(file, [column.name for column in self.columns], record_type(head.fields), head.points)
         self.viewpoint = ""
         if head.data == "binary":
-            check_declared(file, self.count, self.record.itemsize, self.what, last=True)
+            column_file.check_declared(file, self.count, self.record.itemsize, self.what, last=True)
         elif head.data == "ascii":
             every = sum(field.values for field in head.fields)
             self.text = TextRows(self, [column.cell for column in self.columns], every, head.text.count(b"\n") + 1)
@@ -331,24 +324,24 @@ class PcdFile(CloudFile):
         if self.head.data != "binary_compressed":
             yield from super().batches()
         elif self.count:
-            columns, step = self._unpacked(), rows_of_batch(self.record.itemsize)
+            columns, step = self._unpacked(), column_file.rows_of_batch(self.record.itemsize)
             for first in range(0, self.count, step):
                 rows = np.zeros(min(step, self.count - first), self.record)
                 for name, values in zip(self.record.names or (), columns, strict=True):
                     rows[name] = values[first : first + step]
-                yield StructuredBatch(rows)
+                yield column_file.StructuredBatch(rows)
 
     def _unpacked(self) -> list[Any]:
         """Return the packed columns, which follow one another field by field, padding perhaps among them."""
         file, points, fields = self.file, self.count, self.head.fields
-        packed_size, size = struct.unpack("<II", read_exactly(file, 8, "the sizes behind DATA"))
+        packed_size, size = struct.unpack("<II", column_file.read_exactly(file, 8, "the sizes behind DATA"))
         if size != points * self.record.itemsize:
             fields = tuple(field for field in fields if field.name != PADDING)
             plain = sum(field.size * field.values for field in fields)
             if size != points * plain:
                 said = f"the header says {points} points of {plain} bytes, the packed data says {size} bytes"
                 raise FormatError(said, source=file.name)
-        packed = read_exactly(file, packed_size, "the packed points")
+        packed = column_file.read_exactly(file, packed_size, "the packed points")
         if file.stream.read(1):
             raise FormatError("more bytes follow the packed points", source=file.name)
         try:
@@ -415,7 +408,7 @@ def open_columns(file: InputFile, _options: Options) -> PcdFile:
 def create(
     columns: Sequence[OutColumn], count: int | None, _style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
-) -> CountedWriter:  # fmt: skip
+) -> column_file.CountedWriter:  # fmt: skip
     """Return what writes points made elsewhere, with numbers of the types they have.
 
     grid: how many points there are in a row, and how many rows; sensor: its pose among the points
@@ -432,4 +425,4 @@ def create(
         lines = "".join(f"{key} {each}\n" for key, each in words.items())
         return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
 
-    return CountedWriter(partial(encode_records, named, record_type(fields)), head, count)
+    return column_file.CountedWriter(partial(column_file.encode_records, named, record_type(fields)), head, count)

@@ -27,24 +27,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, shown, warn
-from frametool.formats.rows.clouds import (
-    CloudFile,
-    TextRows,
-    count_in,
-    head_lines,
-    misfit_of,
-    same_columns,
-    type_in,
-)
-from frametool.formats.rows.column_file import (
-    CountedWriter,
-    bytes_left,
-    check_declared,
-    encode_records,
-    pieces,
-    read_exactly,
-    record_of,
-)
+from frametool.formats.rows import clouds, column_file
 from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.names import NORMALS
 
@@ -113,7 +96,7 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
     def fail(message: str) -> FormatError:
         return FormatError(message, source=source, line=len(text))
 
-    for words in head_lines(stream, text, fail, "`end_header`"):
+    for words in clouds.head_lines(stream, text, fail, "`end_header`"):
         match words[0]:
             case "comment" | "obj_info":
                 continue
@@ -143,7 +126,8 @@ def _element(words: Sequence[str], line: int, fail: Fail) -> PlyElement:
     """Read `element NAME COUNT`."""
     if len(words) != 3:
         raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
-    return PlyElement(words[1], count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail), line, {})
+    count = clouds.count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail)
+    return PlyElement(words[1], count, line, {})
 
 
 def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None:
@@ -229,7 +213,7 @@ def _alike(sizes: Sequence[tuple[int, int, bool]], ends: Ends, data: bytes, size
     return rows if same.all() else int(np.argmin(same))
 
 
-class PlyFile(CloudFile):
+class PlyFile(clouds.CloudFile):
     """A cloud, or the vertices of a mesh, read one batch after the other."""
 
     vectors = NORMALS[::-1]
@@ -245,27 +229,27 @@ class PlyFile(CloudFile):
         self.others = before + self.after
         _check_lists(before, vertex, self.order, file.name)
         self.codes = {name: code for name, (code, _) in vertex.properties.items()}
-        record = record_of((self.order or "<") + code for code in self.codes.values())
+        record = column_file.record_of((self.order or "<") + code for code in self.codes.values())
         super().__init__(file, tuple(self.codes), record, vertex.instances, "vertices")
         self.line = vertex.line
         self.is_last = not self.after
         self.turn: tuple[float, ...] | None = None
         if self.order:
             self.before = self._skipped(sum(each.instances * each.size for each in before))
-            check_declared(file, self.count, record.itemsize, self.what, last=self.is_last)
+            column_file.check_declared(file, self.count, record.itemsize, self.what, last=self.is_last)
         else:
             self.before = self._lines(sum(each.instances for each in before))
             if not self.width:
                 raise FormatError(f"the {self.count} vertices have no properties", source=file.name)
             line = (self.head + self.before).count(b"\n") + 1
-            self.text = TextRows(self, range(self.width), self.width, line)
+            self.text = clouds.TextRows(self, range(self.width), self.width, line)
 
     def _skipped(self, size: int) -> bytes:
         """Read the elements before the vertices."""
-        left = bytes_left(self.file.stream)
+        left = column_file.bytes_left(self.file.stream)
         if left is not None and left < size:
             raise FormatError(f"the file ends before its vertices, {size - left} bytes early", source=self.file.name)
-        return read_exactly(self.file, size, "the elements before the vertices")
+        return column_file.read_exactly(self.file, size, "the elements before the vertices")
 
     def _lines(self, count: int) -> bytes:
         """Read the lines of the elements before the vertices."""
@@ -319,9 +303,9 @@ class PlyFile(CloudFile):
         if self.text is not None:
             return self._counted(self.text)
         fail = partial(FormatError, source=self.file.name)
-        return _passing(self.after, self.order, pieces(self.file.stream), fail)
+        return _passing(self.after, self.order, column_file.pieces(self.file.stream), fail)
 
-    def _counted(self, text: TextRows) -> Iterator[bytes]:
+    def _counted(self, text: clouds.TextRows) -> Iterator[bytes]:
         """Yield the lines of the other elements; raises FormatError where there are not as many as the header says."""
         expected = sum(each.instances for each in self.after)
         lines, begun = 0, b""
@@ -336,7 +320,7 @@ class PlyFile(CloudFile):
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a vertex that has other columns."""
-        return record_of(self.order + TYPES[_type_of(column)] for column in columns)
+        return column_file.record_of(self.order + TYPES[_type_of(column)] for column in columns)
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with how many vertices there are and their properties, and what stands before them."""
@@ -346,7 +330,7 @@ class PlyFile(CloudFile):
                 names = ", ".join(shown(each.name) for each in self.others)
                 raise ValueInvalid(f"vertices cannot be left out: other elements count them ({names})")
             text = re.sub(rb"(?m)^(\s*element\s+vertex\s+)\d+", rb"\g<1>%d" % count, text, count=1)
-        if not same_columns(columns, self.width):
+        if not clouds.same_columns(columns, self.width):
             lines = text.splitlines(keepends=True)
             end = b"\r\n" if lines[0].endswith(b"\r\n") else b"\n"
             own = list(takewhile(lambda line: line.split()[:1] in OWN_LINES, lines[self.line :]))
@@ -369,7 +353,7 @@ def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, s
 
 def _type_of(column: OutColumn) -> str:
     """Return the type of a column as PLY calls it; raises ValueInvalid for what PLY cannot hold."""
-    return type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
+    return clouds.type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 
 def _property_line(column: OutColumn) -> bytes:
@@ -378,7 +362,7 @@ def _property_line(column: OutColumn) -> bytes:
 
 def misfit(column: OutColumn) -> str:
     """Say why PLY has no place for a column, "" where it has one."""
-    return misfit_of(NEW_NAMES, column)
+    return clouds.misfit_of(NEW_NAMES, column)
 
 
 def open_columns(file: InputFile, _options: Options) -> PlyFile:
@@ -386,12 +370,12 @@ def open_columns(file: InputFile, _options: Options) -> PlyFile:
     return PlyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> CountedWriter:
+def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
     """Return what writes points made elsewhere, with numbers of the types they have."""
-    record = record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
+    record = column_file.record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
     lines = b"".join(_property_line(column) + b"\n" for column in columns)
 
     def head(vertices: int) -> bytes:
         return b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n%send_header\n" % (vertices, lines)
 
-    return CountedWriter(partial(encode_records, columns, record), head, count)
+    return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
