@@ -56,7 +56,9 @@ def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[
     if kind == "none":
         return Fit(Transform.identity())
     if kind == "origin":
-        return _origin(ref, est)
+        if ref.xyzw is None or est.xyzw is None:
+            raise Unaligned("origin needs rotations of both; --align se3, yaw or none")
+        return Fit(ref.poses[0] @ est.poses[0].inverse())  # the first pose of the estimate on that of the reference
     if kind == "yaw":
         return _yaw(ref.xyz, est.xyz, up, names)
     for name, each in zip(names, (ref, est), strict=True):
@@ -108,13 +110,6 @@ def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str]) -> Fit:
     sine, cosine = (np.cross(across[1], across[0]) @ up).sum(), (across[1] * across[0]).sum()
     rotation = Rotation.from_axis_angle(up, atan2(sine, cosine))
     return Fit(Transform(rotation, ref_mean - rotation.apply(est_mean)))
-
-
-def _origin(ref: Trajectory, est: Trajectory) -> Fit:
-    """Put the first pose of the estimate onto that of the reference: ref_0 inv(est_0)."""
-    if ref.xyzw is None or est.xyzw is None:
-        raise Unaligned("origin needs rotations of both; --align se3, yaw or none")
-    return Fit(ref.poses[0] @ est.poses[0].inverse())
 
 
 ARM_STEPS = 50

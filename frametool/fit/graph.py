@@ -136,15 +136,12 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
                     if other not in number:
                         number[other], pose[other] = number[start], pose[name] @ edge
                         reached.append(other)
-                    _require_same(name, other, pose[name] @ edge, pose[other])
+                    metres, radians = (pose[name] @ edge).distance(pose[other])
+                    if metres > APART or radians > APART:
+                        off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg apart"
+                        twice = f"{shown(other)} is fixed in {shown(name)} in two ways"
+                        raise ValueInvalid(f"{twice}, {off}; fix one of them")
     return Bodies(root, frames, number, pose, _entries(fixed))
-
-
-def _require_same(name: str, other: str, one: Transform, two: Transform) -> None:
-    metres, radians = one.distance(two)
-    if metres > APART or radians > APART:
-        off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.1f} deg"
-        raise ValueInvalid(f"{shown(other)} is fixed in {shown(name)} in two ways, {off} apart; fix one of them")
 
 
 def _entries(fixed: Fixed) -> dict[str, str]:

@@ -331,7 +331,10 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
     for row, each in enumerate(measurements):
         if each.covariance is not None:
             covariance = np.array(each.covariance, float).reshape(6, 6)
-            _require_regular(covariance, place_of(measurements, row))
+            sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+            if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
+                what = "the covariance is exact in some direction; exact: --fix"
+                raise ValueInvalid(f"{place_of(measurements, row)}: {what}")
             information[row] = inverse(covariance)
     return TreeRows(
         np.array([bodies.number[name] for name in parents]), np.array([bodies.number[name] for name in children]),
@@ -339,12 +342,6 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
         _poses([m.transform for m in measurements]), np.array([m.covariance is not None for m in measurements]),
         information,
     )  # fmt: skip
-
-
-def _require_regular(covariance: Array, place: str) -> None:
-    sigmas = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    if not sigmas.all() or np.linalg.eigvalsh(covariance / np.outer(sigmas, sigmas))[0] < SINGULAR:
-        raise ValueInvalid(f"{place}: the covariance is exact in some direction; exact: --fix")
 
 
 def _poses(transforms: list[Transform]) -> PoseArrays:

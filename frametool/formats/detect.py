@@ -114,29 +114,19 @@ class Beginning:
 
     @cached_property
     def leaves(self) -> set[str]:
-        """Return the keys of YAML's maps with a number beside them, behind a slash for each key above them.
+        """Return the keys of the first map of YAML with a number beside them, behind a slash for each map around it.
 
         A list in between is a `[`.
         """
-        from frametool.documents.source import END, LEAF, LIST, MAP
-        from frametool.documents.yaml import yaml_events
-
-        found: set[str] = set()
-        outer: list[tuple[str, str | None]] = []
-        way, key = "", None  # what leads to the keys of a map; the key whose value comes next
-        for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
-            if kind == END:
-                way, key = outer.pop()
-            elif kind == LEAF and outer and not way.endswith("[") and key is None:
-                key = word
-            elif kind == LEAF:
-                if key is not None and re.match(r"[-+]?\.?\d", word):
+        found, inner = set[str](), [("", self.document)]
+        for way, mapping in inner:  # grows while it is walked
+            for key, each in mapping.items():
+                if isinstance(each, str) and re.match(r"[-+]?\.?\d", each):
                     found.add(way + key)
-                key = None
-            else:
-                outer.append((way, None))
-                way += "[" if kind == LIST else "/" if len(outer) > 1 and kind == MAP else ""
-                key = None
+                elif isinstance(each, dict):
+                    inner.append((f"{way}/", each))
+                elif isinstance(each, list):
+                    inner += [(f"{way}[/", entry) for entry in each if isinstance(entry, dict)]
         return found
 
     @cached_property

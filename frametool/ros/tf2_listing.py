@@ -36,12 +36,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         facts = dict(re.findall(r"(?m)^\s*(\w+):[ \t]*(.*?)\s*$", entry[2]))
         child, parent = (options.tally.names.bare(each.strip("'\"")) for each in (entry[1], facts.get("parent", "")))
         if parent:
-            options.tally.drawn[child] = listed_motion(*(_number(facts.get(name, "")) for name in _FACTS))
+            numbers = (facts.get(name, "") for name in _FACTS)
+            numbers = (float(each) if re.fullmatch(r"\d+(?:\.\d*)?", each) else 0.0 for each in numbers)
+            options.tally.drawn[child] = listed_motion(*numbers)
             yield Edge(parent, child, IDENTITY, line=1 + file.text.count("\n", 0, entry.start()))
-
-
-def _number(text: str) -> float:
-    return float(text) if re.fullmatch(r"\d+(?:\.\d*)?", text) else 0.0
 
 
 def write_tree(tree: Frames, style: Style) -> str:  # noqa: ARG001 - tf2 has no say in it

@@ -128,7 +128,8 @@ def write_solution(found: Solution) -> str:
     """Write the summary, the frames, and what was left out."""
     lines = [_first(found)]
     if found.sigma is not None and found.dof > 0:
-        lines.append(f"noise of one axis{_noise(found)}, estimated")
+        place, turn = found.sigma
+        lines.append(f"noise of one axis {_mm(place)}{'' if turn is None else f' {_deg(turn)}'}, estimated")
     if found.turns is not None:
         first, second = map(math.degrees, found.turns)
         lines.append(f"turns seen: {first:.1f} deg rms about the main axis, {second:.1f} deg about the second")
@@ -152,11 +153,6 @@ def _first(found: Solution) -> str:
         return f"{_pair(found.frames[-1], None)} from {count} matched points; {rms}"
     noise = f"noise at the {found.noise_at}; " if found.noise_at else ""
     return f"hand-eye from {count} samples; {noise}{rms}"
-
-
-def _noise(found: Solution) -> str:
-    place, turn = found.sigma or (0.0, None)
-    return f" {_mm(place)}" + ("" if turn is None else f" {_deg(turn)}")
 
 
 def _mm(metres: float) -> str:
@@ -372,9 +368,9 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     marked = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[form]
     shown = []
     for row in rows:
-        texts = map(_cell, row)
+        texts = [*map(_cell, row)]
         if form == "latex":
-            texts = map(_in_latex, texts)
+            texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
         is_best = (at in RANKED and cell is not None and cell == best[at] for at, cell in enumerate(row))
         shown.append([marked.format(text) if best else text for text, best in zip(texts, is_best, strict=True)])
     if form == "markdown":
@@ -400,7 +396,3 @@ def _cell(cell: Any) -> str:
 
 _LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 _LATEX |= {letter: "\\" + letter for letter in "_%&#${}"}
-
-
-def _in_latex(text: str) -> str:
-    return "".join(_LATEX.get(letter, letter) for letter in text)

@@ -326,7 +326,9 @@ class Projection:
         self.poses = {name: pose for name, pose in scene.poses().items() if can_be_drawn(pose[:3])}
         self.trails = scene.trails
         self.links = [(parent, name) for name in self.poses if (parent := scene.parent(name)) in self.poses and parent]
-        usual = self._usual_link()
+        lengths = sorted(math.dist(self.poses[parent][:3], self.poses[name][:3]) for parent, name in self.links)
+        lengths = [length for length in lengths if length > LEAST]
+        usual = lengths[len(lengths) // 2] if lengths else USUAL_LINK
         self.low, self.high = _bounds(self._points())
         flat = [self.turned(point) for point in self._points()]
         (left, down, _), (right, up, _) = _bounds(flat)
@@ -347,11 +349,6 @@ class Projection:
         for trail in self.trails:
             for stretch in trail.stretches:
                 yield from stretch
-
-    def _usual_link(self) -> float:
-        lengths = sorted(math.dist(self.poses[parent][:3], self.poses[name][:3]) for parent, name in self.links)
-        lengths = [length for length in lengths if length > LEAST]
-        return lengths[len(lengths) // 2] if lengths else USUAL_LINK
 
     def turned(self, point: Sequence[float]) -> Point:
         """Return metres to the right, up, and toward the eye."""

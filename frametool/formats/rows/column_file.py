@@ -369,19 +369,14 @@ def encode_records(
         if column.passed is None:
             values = next(new).values
             if records.dtype[name].kind == "U":
-                _check_lengths(values, records.dtype[name], column.name)
+                most = records.dtype[name].itemsize // np.dtype("U1").itemsize
+                if len(longest := max(values, key=len, default="")) > most:  # numpy would cut it
+                    found = f"{shown(longest)} has {len(longest)}"
+                    raise ValueInvalid(f"column {column.name} holds {most} characters, {found}")
             records[name] = values
         elif given is not None and records is not given.rows:
             records[name] = given.column(column.passed)
     return memoryview(records.view(np.uint8)) if records.size else b""  # type: ignore[arg-type]
-
-
-def _check_lengths(texts: Sequence[str], kind: Kind, name: str) -> None:
-    """Refuse texts that numpy would cut; raises ValueInvalid."""
-    most = kind.itemsize // np.dtype("U1").itemsize
-    longest = max(texts, key=len, default="")
-    if len(longest) > most:
-        raise ValueInvalid(f"column {name} holds {most} characters, {shown(longest)} has {len(longest)}")
 
 
 class Collected:

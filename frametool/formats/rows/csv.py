@@ -16,7 +16,7 @@ from frametool.grammar.result import NoResult, Result, carries_position, in_colu
 from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from frametool.grammar.result import Style
 
@@ -28,7 +28,11 @@ HALVES = ("linear", "angular", "force", "torque")
 
 def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
     """Return a header and one row a result; a point's coordinates are x, y, z."""
-    return _table([cells_of(each, style) for each in results], style)
+    rows = [cells_of(each, style) for each in results]
+    if not rows:
+        return ""
+    columns = list(dict.fromkeys(name for each in rows for name in each))
+    return row(columns, style) + "".join(row([each.get(column, "") for column in columns], style) for each in rows)
 
 
 write_points = write_poses
@@ -85,14 +89,6 @@ def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
     """Return the cells of a result by column name."""
     return _pose_cells(value, style) if isinstance(value, Result) else dict(_record_cells(value))
-
-
-def _table(rows: Sequence[dict[str, Any]], style: Style) -> str:
-    """Write rows under the columns of all of them."""
-    if not rows:
-        return ""
-    columns = list(dict.fromkeys(name for each in rows for name in each))
-    return row(columns, style) + "".join(row([each.get(column, "") for column in columns], style) for each in rows)
 
 
 def row(cells: Iterable[Any], style: Style) -> str:

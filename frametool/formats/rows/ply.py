@@ -107,7 +107,10 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
                     raise fail(f"{shown(' '.join(words))}: expected one format: {', '.join(FORMS)}, and 1.0")
                 form = words[1]
             case "element":
-                element = _element(words, len(text), fail)
+                if len(words) != 3:
+                    raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
+                count = clouds.count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail)
+                element = PlyElement(words[1], count, len(text), {})
                 if elements.setdefault(element.name, element) is not element:
                     raise fail(f"element {shown(element.name)} stands twice")
             case "property":
@@ -120,14 +123,6 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
     if not form:
         raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
     return b"".join(text), FORMS[form], list(elements.values())
-
-
-def _element(words: Sequence[str], line: int, fail: Fail) -> PlyElement:
-    """Read `element NAME COUNT`."""
-    if len(words) != 3:
-        raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
-    count = clouds.count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail)
-    return PlyElement(words[1], count, line, {})
 
 
 def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None:
