@@ -170,7 +170,7 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
     calls = [match[2] for match in _ARGS.finditer(text)]
     is_bare = not calls
     if is_bare:
-        lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
+        lines = [line for line in re.sub(r"\\\r?\n", " ", text).splitlines() if line.strip()]
         calls = [line for line in lines if CALL in line or re.match(_ARGUMENTS_ALONE, line)]
         if len(calls) < len(lines):
             return []

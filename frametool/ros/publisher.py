@@ -137,7 +137,8 @@ def read_call(line: str, reading: Reading) -> Pose:
     """
     from shlex import split
 
-    line = re.sub(r"\\(?:\n|\Z)|(?<!\S)\\\s+(?=--|\Z)", " ", line)  # XML and YAML make a blank of the line's end
+    # XML and YAML make a blank of the line's end
+    line = re.sub(r"""('[^']*'|"[^"]*")|\\(?:\r?\n|\Z)|(?<!\S)\\\s+""", lambda found: found[1] or " ", line)
     try:
         words = split(line, comments=re.search(r"(?:^|\s)#", line) is not None)  # in a word it is part of it
     except ValueError as error:

@@ -17,7 +17,10 @@ from frametool.grammar.result import Result, Style
 from frametool.ros.publisher import read_call, write_poses
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import Outcome
 
 TURN = Rotation.from_rpy([0.2, 0.1, 1.5])
 POSE = Pose((0.1, 0.0, -0.2), TURN.components, "camera:é", "base")
@@ -127,3 +130,13 @@ def test_a_call_goes_on_behind_a_backslash_at_the_end_of_a_line(call: str, end: 
 
 def test_a_blank_of_a_name_behind_a_backslash_stays() -> None:
     assert read(r"0 0 0 0 0 0 'a \ b' c").parent == r"a \ b"
+    assert read(r"0 0 0 0 0 0 a\ b c").parent == "a b"
+
+
+@pytest.mark.parametrize("call", ["1 2 3 \\ 0 0 0 a b", "1 2 3 0 0 0 \\ a b", "1 2 3 \\\n 0 0 0 a b", "1 2 3 \\\r\n\t0 0 0 a b \\"])
+def test_the_end_of_a_line_behind_a_backslash_is_a_blank_wherever_a_call_is_pasted(call: str, run: Callable[..., Outcome]) -> None:
+    assert (read(call).position, read(call).parent, read(call).name) == ((1.0, 2.0, 3.0), "a", "b")
+    node = f'<launch><node pkg="tf" type="static_transform_publisher" name="n" args="{call} 100"/></launch>'.replace("\\ 100", "100")
+    for command in (["static", call], ["convert", f"static_transform_publisher {call}"], ["lookup", "a.launch", "a", "b"]):
+        found = run(*command, "-f", "json", files={"a.launch": node})
+        assert '"xyz": [1.0, 2.0, 3.0]' in found.out, found.err

@@ -49,7 +49,7 @@ def command(inputs: Inputs) -> None:
     flags = {name: value for name in FLAGS if (value := getattr(inputs, name.replace("-", "_"))) is not None}
     arguments = inputs.arguments
     if len(arguments) == 1 and re.match(r"\s*[-+.\d]+\s", arguments[0]) and not os.path.exists(arguments[0]):
-        arguments = arguments[0].split()  # in quotes
+        arguments = re.sub(r"\\\s", " ", arguments[0]).split()  # in quotes
     if not flags and len(arguments) == 1:
         output = Output(inputs, "tree", otherwise="static2")
         tree = load_tree(arguments[0])
