@@ -300,6 +300,7 @@ FORMATS = {
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
             ("json path", "*/T_BS/data"),
             ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
+            ("text", r'(?m)^(?:\{\s*|[ \t]+)"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+)":\s*\['),
             ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
         ),
         conventions="target<-source as each key says; metres; intrinsics are not kept",

@@ -113,6 +113,7 @@ BEGINNINGS: dict[str, tuple[bytes, str, str]] = {
     "echo in UTF-16": ("transforms:\n- header:\n".encode("utf-16"), "tree", "echo"),
     "echo in flow style": (b"transforms: [{header: ..", "tree", "echo"),
     "lines of messages": (b'{"op": "publish", "msg": {}}\n', "tree", "jsonl"),
+    "a matrix of JSON row by row": (b'{"T_cam_lidar": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]}\n', "tree", "camchain"),
     "rostopic echo -p": (b"%time,field.header.seq\n", "tree", "csv1"),
     "ros2 topic echo --csv": (b"12,5,map,base,0.0,0.0\n", "tree", "csv2"),
     "calls with flags": (b"# c\nros2 run tf2_ros static_transform_publisher --x 1\n", "tree", "calls"),
