@@ -44,7 +44,8 @@ RECORDS = readers("records")
 _of_rows = partial(option, under="Rows")
 _ROWS = (
     option("--from REP", "what unnamed numbers are", Notations(), name="given", under="Rotations"),
-    _of_rows("--columns NAME,..", "our columns, by name or number; once for each pose", ColumnNames(), multiple=True),
+    _of_rows("--columns NAME,..", "our columns, by name or number, once for each pose; one key of records, a.b",
+             ColumnNames(), multiple=True),
     _of_rows("--keep", "add the result's columns, leave ours"),
     _of_rows("--prefix TEXT", "begin the names of the result's columns so", UTF8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
@@ -365,8 +366,9 @@ class Stream:
             request = request._replace(prefix=told.prefix)
         if request.poses:
             told.ask("given")
-        if request.poses and form not in RECORDS:
             request = request._replace(columns=told.columns)
+        several = form in RECORDS and "," in ",".join(request.columns)
+        refuse(several, "--columns names one key of records, as detections.pose")
         if not has_no_text(output.told or form):
             told.ask("precision")
         return request._replace(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import MOST_COMPARED, ValueInvalid, did_you_mean, first_of, shown
+from frametool.errors import MOST_COMPARED, ValueInvalid, alternatives, did_you_mean, first_of, shown
 from frametool.geometry.representations import ROTATIONS, notation
 from frametool.grammar.names import (
     EARTH_FRAMES,
@@ -61,7 +61,8 @@ if TYPE_CHECKING:
     from frametool.stream.request import Formula, Request
 
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # with metres a unit
-INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message")
+INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message",
+         "detections")  # fmt: skip
 LISTS = ("markers", "polygon", "points")  # of messages that hold nothing else
 COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 # a mapping with no other keys may be the identity
@@ -140,7 +141,8 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     """
     formula = request.operation.formula
     try:
-        found = list(_search(document, (), (), request)) if request.poses else []
+        search = _search_under if request.columns else _search
+        found = list(search(document, (), (), request)) if request.poses else []
         is_bare = request.poses and not request.operation.moves
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
@@ -156,6 +158,19 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
         raise Misfit("a record holds one pose; name A or B, or compare it with the one before by --consecutive", path)
     for place in found:
         yield _record(document, place, request, reading, path)
+
+
+def _search_under(document: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
+    """Search what stands under the key `detections.pose`, which --columns names; a list stands for its items."""
+    found = [(document, path, outer)]
+    for key in request.columns[0].split("."):
+        items = [(value_at(each, at), (*above, *at), around) for each, above, around in found for at in _mappings(each)]
+        found = [(each[key], (*above, key), (*around, above)) for each, above, around in items if key in each]
+        if not found:
+            keys = dict.fromkeys(each for item, *_ in items for each in item)
+            raise Misfit(f"no key {shown(key)} for --columns{alternatives(key, keys, 'keys')}")
+    for each in found:
+        yield from _search(*each, request)
 
 
 def _mappings(document: Any) -> list[Path]:

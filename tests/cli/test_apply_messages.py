@@ -65,3 +65,29 @@ def test_a_message_without_data_at_its_time_is_a_bad_one(run: Run) -> None:
     stopped = run("apply", "tf.txt", "map", stdin=LINE + late + LINE, files={"tf.txt": tree})
     assert (stopped.status != 0, stopped.out.count("\n")) == (True, 1)
     assert "stdin:2:header" in stopped.err
+
+
+POSE = '{"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}'
+HEADER = '"header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "a"}'
+SEEN = f'{{"id": [3], "size": [0.1], "pose": {{{HEADER}, "pose": {{"pose": {POSE}, "covariance": {[0.0] * 36}}}}}}}'
+TAGS = f'{{{HEADER}, "detections": [{SEEN}, {SEEN}]}}\n'
+BUNDLES = TAGS.replace("[3]", "[3, 4]").replace("[0.1]", "[0.1, 0.2]")
+
+
+@pytest.mark.parametrize(("text", "option"), [(TAGS, ()), (BUNDLES, ()), (BUNDLES, ("--columns", "detections.pose"))])
+def test_poses_of_tags_move_with_their_frames_named(run: Run, text: str, option: tuple[str, ...]) -> None:
+    found = run(*SHIFT, *option, stdin=text * 2)
+    assert (found.status, found.err, found.out) == (0, "", text.replace('"x": 1.0, "y": 2.0, "z": 3.0', '"x": 2.0, "y": 4.0, "z": 6.0') * 2)
+    rows = run(*SHIFT, *option, "-f", "csv", stdin=text).out.splitlines()
+    assert [row.split(",")[1:4] for row in rows] == [["x", "y", "z"], *[["2.0", "4.0", "6.0"]] * 2]
+
+
+@pytest.mark.parametrize(("key", "status", "said"), [
+    ("a", 1, "no key 'a' for --columns; keys: id, result"),
+    ("result.pos", 1, "no key 'pos' for --columns; did you mean 'pose'? keys: pose"),
+    ("result,id", 2, "--columns names one key of records, as detections.pose"),
+    ("id", 1, "expected a point"),
+])  # fmt: skip
+def test_a_key_that_holds_no_pose_is_told_with_those_there_are(run: Run, key: str, status: int, said: str) -> None:
+    found = run("convert", "--to", "rpy", "--columns", key, stdin='{"id": 1, "result": {"pose": {"xyz": [1, 2, 3]}}}\n')
+    assert (found.status, said in found.err) == (status, True), found.err
