@@ -37,7 +37,7 @@ AXES = {  # optical axes from those that a camera's frame may have
     "opengl": (1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0),
     "flu": (0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0),
 }
-RANGES = {"xi": (-1.0, inf), "alpha": (0.0, 1.0), "beta": (TINY, inf), "w": (TINY, 3.14)}
+RANGES = {"xi": (-0.999999, inf), "alpha": (0.0, 1.0), "beta": (TINY, inf), "w": (TINY, 3.14)}
 
 
 class Lens(NamedTuple):
@@ -218,7 +218,7 @@ def _to_sphere(x: N, y: N, z: N, lens: Lens, xp: Functions[N]) -> Seen[N]:
     s = lens.beta * (x * x + y * y)
     n = xp.sqrt(s + z * z)
     d, seen = lens.xi * n + z, z > -_sphere_limit(lens) * n
-    d = xp.where(seen, lens.alpha * xp.sqrt(s + d * d) + (1.0 - lens.alpha) * d, 1.0)
+    d = _divisor(xp.where(seen, lens.alpha * xp.sqrt(s + d * d) + (1.0 - lens.alpha) * d, 1.0), xp)
     return x / d, y / d, seen
 
 
@@ -233,7 +233,7 @@ def _from_sphere(a: N, b: N, lens: Lens, xp: Functions[N]) -> Found[N]:
 
 def _sphere_limit(lens: Lens) -> float:
     limit = min(lens.alpha, 1.0 - lens.alpha) / max(lens.alpha, 1.0 - lens.alpha)
-    return (limit + lens.xi) / sqrt(2.0 * limit * lens.xi + lens.xi * lens.xi + 1.0)
+    return min((limit + lens.xi) / sqrt(2.0 * limit * lens.xi + lens.xi * lens.xi + 1.0), 1.0)
 
 
 def _sphere_angle(lens: Lens) -> float:
@@ -563,7 +563,7 @@ def _numbers(value: Any, what: str, *counts: int) -> tuple[float, ...]:
     flat = [value]
     while any(isinstance(each, (list, tuple)) for each in flat):
         flat = [one for each in flat for one in (each if isinstance(each, (list, tuple)) else [each])]
-    if wrong := [each for each in flat if type(each) not in (int, float) or not isfinite(each)]:
+    if wrong := [each for each in flat if not (hasattr(each, "__float__") and isfinite(each))]:
         raise ValueInvalid(f"{what}: {shown(wrong[0])} is not a finite number")
     if counts and len(flat) not in counts:
         raise ValueInvalid(f"{what} is {' or '.join(map(str, counts))} number{'s' * (counts != (1,))}, not {len(flat)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import pickle
@@ -147,6 +148,29 @@ def test_one_point_and_many_give_the_same_bits(name: str) -> None:
     order = DRAWN.permutation(300)
     np.testing.assert_array_equal(camera.project(given[order])[0], pixels[order])
     np.testing.assert_array_equal(camera.unproject(pixels[order]), rays[order])
+
+
+ODD = (0.0, -0.0, 5e-324, 1e-200, 1e-9, 1.0, -1.0, 2.0, 1e160, -1e300, math.inf, math.nan)
+EXTREME = (
+    Camera("rational_polynomial", [1, 1, 0, 0], [0, 0, 0, 0, 0, -1, 0, 0]),  # a pole at r = 1
+    Camera("plumb_bob", [1, 1, 0, 0], [30.0, -20.0, 10.0, 10.0]),
+    Camera("thin_prism", [1, 1, 0, 0], [1e8] * 12),
+    Camera("omni", [1, 1, 0, 0], xi=0.0),
+    Camera("omni", [1, 1, 0, 0], xi=1.0),
+    *(Camera("ds", [1, 1, 0, 0], xi=xi, alpha=alpha) for xi in (-0.99999, 0.0, 1.0, 10.0) for alpha in (0.0, 0.5, 1.0)),
+    *(Camera("eucm", [1, 1, 0, 0], alpha=alpha, beta=beta) for beta in (1e-3, 100.0) for alpha in (0.0, 0.5, 1.0)),
+    *(Camera("fov", [1, 1, 0, 0], w=w) for w in (1e-6, 3.1)),
+)
+
+
+@pytest.mark.parametrize("camera", [*CAMERAS.values(), *EXTREME], ids=lambda camera: camera.model)
+def test_no_number_stops_a_kernel_and_floats_and_arrays_agree(camera: Camera) -> None:
+    given, places = [*itertools.product(ODD, repeat=3)], [*itertools.product((*ODD, 320.0, -5e3), repeat=2)]
+    alone = [camera.pixels_of(*map(float, point))[:2] for point in given]
+    np.testing.assert_array_equal(alone, camera.project(given)[0])
+    np.testing.assert_array_equal([camera.rays_of(*place) for place in places], camera.unproject(places))
+    back = [camera.points_of(u, v, 2.0) for u, v in places]
+    np.testing.assert_array_equal(back, camera.unproject(places, depth=2.0))
 
 
 def test_blocks_change_nothing() -> None:
@@ -303,6 +327,8 @@ K = [1.0, 1.0, 0.0, 0.0]
         ({"model": "pinhole", "K": [1, 2, 3]}, "K is 4 or 9 numbers, not 3"),
         ({"model": "pinhole", "K": [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}, "K is no matrix of a camera: its rows are fx skew cx, 0 fy cy and 0 0 1"),
         ({"model": "ds", "xi": 0.1, "alpha": 1.5}, "alpha 1.5 is beyond 0 .. 1"),
+        ({"model": "ds", "xi": -1.0, "alpha": 0.5}, "xi -1 is beyond -0.999999 .. inf"),
+        ({"model": "omni", "xi": -0.1}, "xi -0.1 is beyond 0 .. inf"),
         ({"model": "ds", "xi": 0.1}, "ds has xi and alpha, not xi"),
         ({"model": "pinhole", "xi": 0.1}, "pinhole has no parameters beside D, not xi"),
         ({"model": "thin_prism", "D": [0.0] * 12 + [0.1, 0.0]}, "D is of a tilted sensor, tau 0.1 0, which is not read"),
