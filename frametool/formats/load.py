@@ -107,12 +107,12 @@ class FrameFile(InputFile):
 
     @property
     def described(self) -> str:
-        """Say what the file was taken for."""
+        """Return what the file was taken for."""
         return f"{self.name}: {FORMATS[self.form].summary}"
 
     @property
     def known(self) -> str:
-        """Say what the file was taken for, and by what it was known, unless that was told."""
+        """Return what the file was taken for, and by what it was known, unless that was told."""
         return f"{self.described}{f', known by {self.known_by}' if self.known_by else ''}"
 
     @property
@@ -196,7 +196,7 @@ def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
 
 
 def _about_folder(path: str) -> str:
-    """Say why a folder is not read, and which of its files would be."""
+    """Return why a folder is not read, and which of its files would be."""
     bags = tuple(suffix for row in FORMATS.values() if row.reader == BAG for suffix in row.suffixes)
     files = sorted(name for name in os.listdir(path) if name.endswith(bags))[:5]
     return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"
@@ -259,7 +259,7 @@ class TreeBuilder:
         (self.tree if self.buffer is None else self.buffer).add_root(frame)
 
     def renames(self, *names: str | None) -> bool:
-        """Tell whether the Earth's frame is among names by that of its two that did not come first."""
+        """Return True if the Earth's frame is among names by that of its two that did not come first."""
         if not self.earth:
             self.earth = next((name for name in names if name and name in EARTH_FRAMES), "")
         return any(name in EARTH_FRAMES and name != self.earth for name in names)
@@ -350,12 +350,12 @@ class TreeBuilder:
                 self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
-        """Tell whether a frame is known to move, now in this parent."""
+        """Return True if a frame is known to move, now in this parent."""
         track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
         return track is not None and not track.is_static and track.parent == parent
 
     def _takes_whole(self, samples: Samples) -> bool:
-        """Tell whether samples can only follow what is known: of a frame that is new or moves in the same parent."""
+        """Return True if samples can only follow what is known: of a frame that is new or moves in the same parent."""
         if self.rules.keep_ns is not None or len(samples.stamps_ns) == 1 or samples.child in self.covariances:
             return False
         track = None if self.buffer is None else self.buffer.track(samples.child)

@@ -64,7 +64,7 @@ class Format(NamedTuple):
 
     @property
     def is_table(self) -> bool:
-        """Tell whether its lines are rows of cells."""
+        """Return True if its lines are rows of cells."""
         return self.delimiter is not None
 
 
@@ -411,27 +411,27 @@ def writers(*what: str) -> tuple[str, ...]:
 
 
 def is_trajectory(name: str) -> bool:
-    """Tell whether a form is that of the poses of one frame over time, and of nothing else."""
+    """Return True if a form is that of the poses of one frame over time, and of nothing else."""
     return name in FORMATS and "trajectory" in FORMATS[name].reads
 
 
 def holds_arrays(name: str) -> bool:
-    """Tell whether a form holds columns of numbers and no text."""
+    """Return True if a form holds columns of numbers and no text."""
     return name in FORMATS and "arrays" in (*FORMATS[name].reads, *FORMATS[name].writes)
 
 
 def is_recording(name: str) -> bool:
-    """Tell whether a form is written as a recording of messages."""
+    """Return True if a form is written as a recording of messages."""
     return name in FORMATS and "recording" in FORMATS[name].writes
 
 
 def has_no_text(name: str) -> bool:
-    """Tell whether a form holds numbers, in columns or messages, and nothing of how its input was written."""
+    """Return True if a form holds numbers, in columns or messages, and nothing of how its input was written."""
     return holds_arrays(name) or is_recording(name)
 
 
 def is_folder(name: str) -> bool:
-    """Tell whether a form is written as a folder of files."""
+    """Return True if a form is written as a folder of files."""
     return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].magic)
 
 

@@ -26,7 +26,7 @@ class Unsupported(NamedTuple):
     was_written: bool = False
 
     def __str__(self) -> str:
-        """Say what it is and what to do, in one line."""
+        """Return what it is and what to do, in one line."""
         return f"{self.summary}: {self.remedy}"
 
 

@@ -55,7 +55,7 @@ class RecordedEdge:
 
     @property
     def moves(self) -> bool:
-        """Tell whether the frame moves."""
+        """Return True if the frame moves."""
         return self.varies and not self.is_static
 
 
@@ -165,7 +165,7 @@ class RecordedEdges:
             raise static_and_moving(edge.child, f": {both}")
 
     def _others(self, edges: list[AddedEdge], tree: str) -> str:
-        """Say which edges have other values, and how far off they are."""
+        """Return which edges have other values, and how far off they are."""
         told = []
         for edge in edges:
             known = self.known[edge.child]
@@ -184,7 +184,7 @@ class RecordedEdges:
 
 
 def is_same(a: Rigid, b: Rigid) -> bool:
-    """Tell whether two transforms are one, whatever the sign of their quaternions; zeros are no rotation."""
+    """Return True if two transforms are one, whatever the sign of their quaternions; zeros are no rotation."""
     if not (any(a[3:]) and any(b[3:])):
         return a == b
     metres, radians = rigid.distance(*_unit(*a), *_unit(*b), xp=floats)

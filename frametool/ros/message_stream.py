@@ -217,7 +217,7 @@ def line_texts(stream: BinaryIO, name: str, tally: Tally) -> Iterator[tuple[int,
 
 
 def _is_data(line: str, number: int, tally: Tally) -> bool:
-    """Tell whether a line is neither blank nor noise; count what is noise."""
+    """Return True if a line is neither blank nor noise; count what is noise."""
     if NOISE(line):
         tally.noise.append((number, line.strip()))
         return False

@@ -58,12 +58,12 @@ _DATE = (
 
 
 def is_message(value: dict[str, Any]) -> bool:
-    """Tell whether a mapping is a TransformStamped, a list of them, or either in rosbridge's envelope."""
+    """Return True if a mapping is a TransformStamped, a list of them, or either in rosbridge's envelope."""
     return (not MARKS.isdisjoint(value) and "frame_id" not in value) or is_envelope(value)
 
 
 def is_envelope(value: dict[str, Any]) -> bool:
-    """Tell whether a mapping is what rosbridge puts around a message."""
+    """Return True if a mapping is what rosbridge puts around a message."""
     return value.get("op") == "publish" and type(value.get("msg")) is dict
 
 
@@ -128,7 +128,7 @@ POSES = frozenset((  # over time
 
 
 def is_pose(value: Any) -> bool:
-    """Tell whether a message has a header and a pose."""
+    """Return True if a message has a header and a pose."""
     return type(value) is dict and "header" in value and type(value.get("pose")) is dict
 
 
@@ -269,7 +269,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf
 
 
 def is_joint_state(value: dict[str, Any]) -> bool:
-    """Tell whether a mapping is a JointState: it names joints in a list."""
+    """Return True if a mapping is a JointState: it names joints in a list."""
     return type(value.get("name")) is list or ("position" in value and "velocity" in value and "name" in value)
 
 

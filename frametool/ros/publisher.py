@@ -61,7 +61,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 
 def moving_frames(names: Iterable[str]) -> str:
-    """Say that frames have more than one pose."""
+    """Return the sentence that frames have more than one pose."""
     return f"frames move and cannot be published as static: {', '.join(names)}"
 
 

@@ -124,7 +124,7 @@ def _place_lines(entry: dict[str, Any]) -> Iterator[NumberLine]:
 
 
 def _heading(result: Result) -> str:
-    """Say in words which frame is seen from which, and when."""
+    """Return in words which frame is seen from which, and when."""
     pose = result.pose
     at, source_at, fixed = (result.extras.get(key) for key in TIMES)
     if pose.name is None or pose.parent is None:
@@ -195,7 +195,7 @@ def _sigmas(key: str, value: Any) -> list[str]:
 
 
 def largest_sigmas(entries: Sequence[float]) -> str:
-    """Say how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
+    """Return how uncertain a pose is along its worst axis, and about its worst: `±10 mm 1.0 deg`."""
     roots = [math.sqrt(max(entry, 0.0)) for entry in entries[::7]]
     return f"±{_length(max(roots[:3]))} {_angle(max(roots[3:]))}"
 

@@ -108,7 +108,7 @@ def _extend(points: list[Point], place: Point) -> None:
 
 
 def _is_straight(begin: Point, middle: Point, end: Point) -> bool:
-    """Tell whether the middle lies between both ends, and so near to the line through them that nobody sees it."""
+    """Return True if the middle lies between both ends, and so near to the line through them that nobody sees it."""
     ahead_x, ahead_y = middle[0] - begin[0], middle[1] - begin[1]
     on_x, on_y = end[0] - middle[0], end[1] - middle[1]
     if ahead_x * on_x + ahead_y * on_y <= 0.0:

@@ -224,7 +224,7 @@ class FrameScene:
 
 
 def can_be_drawn(point: Sequence[float]) -> bool:
-    """Tell whether a point is near enough to be drawn."""
+    """Return True if a point is near enough to be drawn."""
     return all(abs(value) < FURTHEST for value in point)
 
 
@@ -463,7 +463,7 @@ class TakenBoxes:
             self._cells.setdefault(cell, []).append(box)
 
     def meets(self, box: Box) -> bool:
-        """Tell whether a rectangle lies over one that is taken."""
+        """Return True if a rectangle lies over one that is taken."""
         left, top, right, bottom = box
         return any(
             left < other[2] and right > other[0] and top < other[3] and bottom > other[1]

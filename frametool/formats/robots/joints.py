@@ -243,7 +243,7 @@ class JointState:
                 tally.note(f"{far}; poses between go the shorter way", joint.line)
 
     def _about(self) -> str:
-        """Say how many joints stand where nobody said."""
+        """Return how many joints stand where nobody said."""
         free = [joint for joint in self.joints.values() if joint.name not in self.told]
         if not free:
             return ""
@@ -253,7 +253,7 @@ class JointState:
 
 
 def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:
-    """Say that values of a joint lie beyond its limits."""
+    """Return the sentence that values of a joint lie beyond its limits."""
     unit = "rad" if joint.kind in TURNING else "m"
     limits = f"its limits {joint.lower:g} .. {joint.upper:g} {unit}"
     samples = f" in {len(beyond)} of {count} samples, first" if count > 1 else ","
@@ -520,7 +520,7 @@ def _refused(message: Message, path: Path, problem: str, below: Path) -> FormatE
 
 
 def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:
-    """Say that a robot has no such joint, or that it does not move."""
+    """Return the sentence that a robot has no such joint, or that it does not move."""
     if joint in fixed:
         return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(joints)}"
     return f"no joint {shown(joint)}{alternatives(joint, joints, 'joints')}"

@@ -97,7 +97,7 @@ class Joint(NamedTuple):
 
     @property
     def posed(self) -> bool:
-        """Tell whether its value is a pose."""
+        """Return True if its value is a pose."""
         return self.kind in POSED
 
     @property
@@ -343,7 +343,7 @@ class Chain:
         self.needs = self._deciding(())
 
     def uses(self, joint: str) -> bool:
-        """Tell whether a joint moves anything on the way, by itself or through those that follow it."""
+        """Return True if a joint moves anything on the way, by itself or through those that follow it."""
         return any(joint in self._followed(name, ()) for name in self._between)
 
     def missing(self, told: Collection[str]) -> list[str]:

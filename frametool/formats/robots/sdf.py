@@ -207,7 +207,7 @@ class SdfFrames:
         return bool(lost)
 
     def _is_gone(self, frame: SdfFrame) -> bool:
-        """Tell whether a frame, or a scope around it, was left out."""
+        """Return True if a frame, or a scope around it, was left out."""
         return any(each.name in self.gone for each in (frame, *frame.below(self.top)))
 
     def _read(self, frame: SdfFrame) -> None:
@@ -257,7 +257,7 @@ class SdfFrames:
         raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
 
     def _is_left_out(self, name: str, full: str, scope: SdfFrame) -> bool:
-        """Tell whether a name is one that was left out, or begins with that of an included model."""
+        """Return True if a name is one that was left out, or begins with that of an included model."""
         if any(full == gone or full.startswith(f"{gone}::") for gone in self.gone):
             return True
         for include in scope.holder.all("include"):

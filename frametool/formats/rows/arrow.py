@@ -67,7 +67,7 @@ def kind_of(arrow_type: Any) -> Kind | None:
 
 
 def is_floating(arrow_type: Any) -> bool:
-    """Tell whether a type of Arrow is one of floating point."""
+    """Return True if a type of Arrow is one of floating point."""
     kind = kind_of(arrow_type)
     return kind is not None and kind.kind in FLOATS
 
@@ -529,7 +529,7 @@ class ParquetFile(ArrowFile):
 
 
 def _repeats(column: Any) -> bool:
-    """Tell whether a dictionary of the values of a column made it shorter; for others trying costs time."""
+    """Return True if a dictionary of the values of a column made it shorter; for others trying costs time."""
     plain = SIZES.get(column.physical_type, 0) * column.num_values
     return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
 

@@ -95,7 +95,7 @@ class CloudFile(column_file.ColumnFile):
 
 
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
-    """Tell whether the columns of an output are those of the input, each in its place."""
+    """Return True if the columns of an output are those of the input, each in its place."""
     return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
 
 
@@ -126,7 +126,7 @@ def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
 
 
 def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] = ()) -> str:
-    """Say why a format has no place for a column, "" where it has one.
+    """Return why a format has no place for a column, "" where it has one.
 
     codes: the types that it has as numpy calls them, without their byte order; taken: names that have a meaning
     """

@@ -201,7 +201,7 @@ def record_of(kinds: Iterable[Any]) -> Kind:
 
 
 def is_number(kind: Kind | None) -> bool:
-    """Tell whether a column of this kind holds numbers."""
+    """Return True if a column of this kind holds numbers."""
     return kind is not None and kind.kind in FLOATS + WHOLE
 
 

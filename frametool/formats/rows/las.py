@@ -264,7 +264,7 @@ def open_columns(file: InputFile, _options: Options) -> LasFile:
 
 
 def misfit(column: OutColumn) -> str:
-    """Say why LAS has no place for a column, "" where it has one."""
+    """Return why LAS has no place for a column, "" where it has one."""
     if column.name in STORED or len(column.name.encode()) > LONGEST_NAME:
         return f"its names have at most {LONGEST_NAME} bytes, and {', '.join(STORED)} have a meaning"
     kind = None if column.kind is None else column.kind.str[1:]

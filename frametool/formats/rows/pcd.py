@@ -396,7 +396,7 @@ def _new_field(column: OutColumn) -> PcdField:
 
 
 def misfit(column: OutColumn) -> str:
-    """Say why PCD has no place for a column, "" where it has one."""
+    """Return why PCD has no place for a column, "" where it has one."""
     return misfit_of(CODES, column, PADDING)
 
 

@@ -356,7 +356,7 @@ def _property_line(column: OutColumn) -> bytes:
 
 
 def misfit(column: OutColumn) -> str:
-    """Say why PLY has no place for a column, "" where it has one."""
+    """Return why PLY has no place for a column, "" where it has one."""
     return clouds.misfit_of(NEW_NAMES, column)
 
 

@@ -117,7 +117,7 @@ def turned(style: Style, pose: Components) -> Components:
 
 
 def is_turned(style: Style) -> bool:
-    """Tell whether the axes of a camera are not those of the form it is written in."""
+    """Return True if the axes of a camera are not those of the form it is written in."""
     axes = FORMATS[style.form].poses.axes if style.form in FORMATS else ""
     return bool(axes and style.axes and axes != style.axes)
 

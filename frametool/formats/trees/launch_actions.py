@@ -45,5 +45,5 @@ COMPOSED = Action.not_read("it is a composable node, whose transform stands in i
 
 
 def runs_publisher(words: Sequence[str]) -> bool:
-    """Tell whether a command line starts the publisher."""
+    """Return True if a command line starts the publisher."""
     return any(word.rsplit("/", 1)[-1] == CALL for word in words)

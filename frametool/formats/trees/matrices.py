@@ -182,11 +182,11 @@ class Grid(NamedTuple):
 
     @property
     def size(self) -> str:
-        """Say how large it is."""
+        """Return how large it is."""
         return f"{self.rows} x {self.columns}" if self.columns else f"{self.rows} rows of different lengths"
 
     def holds(self, count: int) -> bool:
-        """Tell whether it is a row or a column of so many numbers."""
+        """Return True if it is a row or a column of so many numbers."""
         return 1 in (self.rows, self.columns) and len(self.texts) == count
 
 
