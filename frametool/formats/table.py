@@ -161,7 +161,7 @@ _ARROW = _arrays("", "frametool.formats.rows.arrow", texts=True)
 FORMATS = {
     "yaml": Format(
         "YAML: trees, poses, documents parted by ---", suffixes=(".yaml", ".yml"), reads=("tree", "records"),
-        reader=_TREE, writes=("poses", "points", "tree", "report"), writer="frametool.formats.trees.yaml_json",
+        reader=_TREE, writes=("poses", "points", "tree", "report"), writer="frametool.formats.trees.written_poses",
         magic=(
             ("own key", "frames|children"),
             ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
@@ -172,7 +172,7 @@ FORMATS = {
     "json": Format(
         "JSON: trees, one object a line, or an array", suffixes=(".json", ".jsonl", ".ndjson"),
         reads=("tree", "records"), reader=_TREE, writes=("poses", "points", "tree", "report"),
-        writer="frametool.formats.trees.yaml_json",
+        writer="frametool.formats.trees.written_poses",
         magic=(("json key", "frames"), ("begin", r"""\s*(?:\{\s*["}]|\[\s*(?:[\[{"\]]|-?\d|$))""")),
     ),
     "csv": Format(

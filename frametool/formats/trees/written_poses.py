@@ -1,16 +1,19 @@
-"""Poses as the numbers of other forms: angles and matrices that read back to the same rotation where such ones exist.
+"""Poses and trees written: in YAML and JSON, in the grammar they are read in; and as the numbers of other formats.
 
-A quaternion has more bits than three angles or nine entries give back.  What then differs is told, once and how much.
+A document or a line a result; metres, radians unless the key says degrees; numbers as Python's repr.  Angles and
+matrices are those that read back to the same rotation where such ones exist: a quaternion has more bits than three
+angles or nine entries give back.  What then differs is told, once and how much.
 """
 
 from __future__ import annotations
 
 from itertools import product
 from math import copysign, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.geometry import euler, floats, matrix, quaternion, rigid
+from frametool.grammar.result import Result, Style, tree_entries
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,7 +21,35 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid, Three
     from frametool.grammar.readers import Quaternion
-    from frametool.grammar.result import Style
+
+
+def write_poses(results: Iterable[Result], style: Style) -> str:
+    """Return a document or a line a result."""
+    return write_points((result.mapping(style) for result in results), style)
+
+
+def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
+    """Return one line a record in JSON, else the records as documents parted by `---`."""
+    if style.form == "json":
+        from frametool.documents import json
+
+        return "".join(f"{json.dump(record, style.number)}\n" for record in records)
+    from frametool.documents import yaml_writer
+
+    return "---\n".join(yaml_writer.dump(record, style.number) for record in records)
+
+
+def write_tree(tree: Frames, style: Style) -> str:
+    """Return the tree in the list form, roots first; JSON on one line."""
+    if style.form == "json":
+        from frametool.documents import json
+
+        return f"{json.dump({'frames': list(tree_entries(tree, style))}, style.number)}\n"
+    from frametool.documents.yaml_writer import flow
+
+    entries = "".join(f"  - {flow(entry, style.number)}\n" for entry in tree_entries(tree, style))
+    return f"frames:\n{entries}"
+
 
 MOST_DECIMALS = 17
 
