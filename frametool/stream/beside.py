@@ -69,7 +69,7 @@ def with_covariances(
         return record
     if operation.formula is not None or (not operation.moves and there not in ([], [COVARIANCE])):
         what = "the covariance would be wrong afterwards; leave it out, or move the message with apply"
-        raise Misfit(what, (*around, there[0]))
+        raise Misfit(what, (*around, [*there, SIGMA][0]))
     if has_sigma:
         return _with_sigmas(record, holder, path, reading, flat)
     sizes = (36,) if shape.kind in PARTS else (36, 9)[: 1 + operation.moves] if shape.kind == POSE else (9,)

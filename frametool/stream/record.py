@@ -10,6 +10,7 @@ Arguments, files, streams and messages are read by this one definition; keys tha
 from __future__ import annotations
 
 from itertools import chain, islice
+from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import MOST_COMPARED, ValueInvalid, alternatives, did_you_mean, first_of, shown
@@ -383,7 +384,10 @@ def _only_asked(value: dict[str, Any], path: Path, request: Request) -> Record:
         return record._replace(parent=parent)
     if there := next((key for key in value if key in (*POSITION_KEYS, *ROTATION_KEYS)), None):
         raise Misfit(f"key {shown(there)} is there already, where the result would stand", (there,), key=True)
-    return Record(path, Shape("", None))
+    record = Record(path, Shape("", None))
+    if request.operation.shown is None or type(value.get("header")) is not dict:
+        return record
+    return _with_stamp(record, value["header"], ("header", "stamp"), path)
 
 
 def _for_formula(record: Record, value: dict[str, Any], formula: Formula) -> Record:
@@ -410,6 +414,9 @@ def _with_asked(record: Record, document: Any, path: Path, above: Path, request:
         return record
     numbers, values = record.numbers, record.values
     for name in request.operation.columns:
+        if request.operation.shown and value_at(document, path).get(name.partition(".")[0], "") is None:
+            numbers, values = (*numbers, None), (*values, nan)  # no pixel
+            continue
         found = key_path(document, path, name, "a number")
         text = value_at(document, found)
         try:

@@ -212,7 +212,7 @@ class Operation(NamedTuple):
     @property
     def keeps_frames(self) -> bool:
         """Tell whether records stay in the frames they name."""
-        return self.changes_nothing and (self.formula is None or self.formula.adds)
+        return self.shown is not None or (self.changes_nothing and (self.formula is None or self.formula.adds))
 
     @property
     def keeps_position(self) -> bool:

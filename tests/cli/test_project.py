@@ -274,3 +274,30 @@ def test_a_point_loads_no_numpy() -> None:
     code = "import sys; from frametool.cli import run; run(sys.argv[1:]); sys.exit('numpy' in sys.modules)"
     for arguments in (["project", "--camera", PINHOLE, "0", "0", "1"], ["unproject", RIG, "map", "cam_front", "100", "200"]):
         assert subprocess.run([sys.executable, "-c", code, *arguments], check=False, capture_output=True).returncode == 0
+
+
+def test_pixels_of_messages_are_seen_at_the_stamps_of_their_headers(run: Run) -> None:
+    line = '{{"header": {{"stamp": {{"sec": {}, "nanosec": 0}}, "frame_id": "cam"}}, "pixel": [31.5, 23.5]}}\n'.format
+    way = ["unproject", "move.yaml", "map", "cam", "--camera", PINHOLE, "--ground", "map"]
+    found = run(*way, stdin=line(3) + line(7) * 40, files={"move.yaml": MOVING}).out.splitlines()
+    assert [json.loads(row)["point"][0] for row in found] == pytest.approx([3.0, *[7.0] * 40])
+
+
+def test_what_has_no_pixel_has_no_ray(run: Run) -> None:
+    points = '{"point": [0, 0, -1], "id": 1}\n{"point": [0, 0, 1], "id": 2}\n'
+    projected = run("project", "--camera", PINHOLE, stdin=points).out
+    back = [json.loads(row) for row in run("unproject", "--camera", PINHOLE, "--prefix", "b_", stdin=projected).out.splitlines()]
+    assert [row["b_point"] for row in back] == [None, [0.0, 0.0, 1.0]]
+
+
+def test_what_a_record_says_beside_its_point_stays(run: Run) -> None:
+    sure = '{"point": [0, 0, 1], "sigma": {"xyz": 0.1}}\n'
+    assert run("project", "--camera", PINHOLE, stdin=sure).out.startswith(sure[:-2])
+    for form in ("text", "yaml"):
+        assert run("project", "--camera", PINHOLE, "0", "0", "1", "-f", form).out.splitlines()[1] == "pixel: [31.5, 23.5]"
+
+
+def test_the_shell_is_offered_the_cameras_of_a_file(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_FRAMETOOL_COMPLETE", "words")
+    offered = run(f"frametool project --camera {EXAMPLES}/camchain.yaml:").out.splitlines()
+    assert [row.split("\t")[1].rpartition(":")[2] for row in offered] == ["cam0", "cam1"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import TEXT, Inputs, argument, command_named, option, together
+from frametool.cli.command import Inputs, Text, argument, command_named, option, together
 from frametool.cli.commands.apply import Way, begins_number, is_record, sources_of, way_by_tree
 from frametool.cli.options import (
     TIME,
@@ -24,11 +24,11 @@ from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME
-from frametool.errors import ValueInvalid, shown
+from frametool.errors import FrametoolError, ValueInvalid, shown
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
 
     from frametool.cli.sink import Write
@@ -42,6 +42,23 @@ if TYPE_CHECKING:
 AXES = ("optical", "opengl", "flu")
 
 
+class CameraFile(Text):
+    """A file, and behind a colon which of its cameras is meant; or a camera written inline."""
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
+        """Offer the names of the cameras in a file that is there."""
+        path, colon, _ = incomplete.rpartition(":")
+        if not colon:
+            return None
+        from frametool.documents.source import InputFile
+        from frametool.formats.cameras import cameras_of
+
+        try:
+            return {f"{path}:{name}": "" for name in cameras_of(InputFile(path)) if name}
+        except FrametoolError:
+            return {}  # a completion must not print
+
+
 def parse_size(text: str) -> tuple[int, int]:
     """Read W,H; raises ValueInvalid."""
     width, _, height = (each.strip() for each in text.partition(","))
@@ -52,7 +69,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 _AXES = option("--camera-axes AXES", "of CAMERA: optical, opengl or flu  [default: as TREE says]", AXES)
 camera_options = together(
-    option("--camera FILE[:NAME]", "intrinsics from here, or inline, not from TREE", TEXT),
+    option("--camera FILE[:NAME]", "intrinsics from here, or inline, not from TREE", CameraFile()),
     option("--model NAME", "what the coefficients of --camera are", requires=("camera",)),
     option("--size W,H", "of the picture, to which K is scaled", parse_size),
     option("--rectified", "of the rectified picture: R, then P, no distortion"),
@@ -201,6 +218,8 @@ class CameraTask:
             raise click.UsageError("-i FILE and arguments are two inputs; give one")
         else:
             status = 0
+            if output.style.form == "text":
+                output.style = output.style.in_form("yaml")
             request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
             output.values(values_of(records, request, output))
         if not self.inputs.quiet and (self.is_stream or seen.lost) and (summary := seen.summary()):
