@@ -28,6 +28,7 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, alternatives, listing, shown, warn
 from frametool.formats.detect import of_folder
 from frametool.formats.trees.matrices import TAGS, made_ordinary
+from frametool.formats.trees.tree_reader import CAMERA_KEYS, camera_fields, numbers_of
 from frametool.geometry.camera import CAMERA_MODELS, Camera
 from frametool.grammar.edges import Answers, Options, Tally, Topics
 from frametool.text.numbers import parse_number
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     Makers = dict[str, Callable[..., Camera]]
 
 INFO = "sensor_msgs/msg/CameraInfo"
-OURS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
 # what Camera takes -> keys that files have for it; OpenCV's may end in a number
 KEYS = {
     "K": "K|k|camera_matrix|cameraMatrix|M|camera_intrinsic",
@@ -119,7 +119,7 @@ def cameras_of_tree(tree: Frames, files: Sequence[FrameFile]) -> Makers:
             again.beside = file.beside
         with closing(again):
             known = cameras_of(again)
-        for name, make in known.items():
+        for name, make in ((name.removeprefix("/"), make) for name, make in known.items()):
             like = rf"cam(?:era)?_?{name}" if name.isdigit() else "" if name else r"cam\w*"
             own = () if name else file.tally.axes
             frames = [each for each in tree.frames if re.fullmatch(like, each) or each in own]
@@ -139,7 +139,7 @@ def _made(
         if "colmap" in fields:
             given |= _of_colmap(fields["colmap"], fields["numbers"])
         left, top, width, height, *binning = fields.get("roi", (0, 0, 0, 0, 1, 1))
-        given = {key: each for key, each in given.items() if key in OURS}
+        given = {key: each for key, each in given.items() if key in (*CAMERA_KEYS, "shift")}
         camera = Camera(**(given if model is None else {**given, "model": model}))
         if "roi" in fields:
             inside = zip((width, height), camera.size or (0, 0), binning, strict=True)
@@ -196,14 +196,14 @@ def _in_document(value: Any, file: InputFile) -> Found:
         return
     elif "fl_x" in value or "camera_angle_x" in value:
         yield "", _nerf(value)
-    elif value.keys() <= {*OURS}:
-        yield "", _own(value)
+    elif value.keys() <= {*CAMERA_KEYS}:
+        yield "", camera_fields(value)
     elif "frames" in value or "camera" in value:
         yield from _ours(value, "")
     elif chain := {name: each for name, each in {"": value, **value}.items() if "intrinsics" in (each or ())}:
         yield from ((name, _kalibr(each)) for name, each in chain.items() if isinstance(each, dict))
     else:
-        numbers = [match[1] for key in value if (match := re.fullmatch(rf"(?:{KEYS['K']})_?(\d+)", key))]
+        numbers = [match[1] for key in value if (match := re.fullmatch(r"(?:K|M|camera_?[mM]atrix)_?(\d+)", key))]
         name = (value.get("header") or {}).get("frame_id") or value.get("camera_name") or ""
         yield from ((end or str(name), fields) for end in numbers or [""] if (fields := _by_keys(value, end)))
 
@@ -212,24 +212,10 @@ def _ours(value: Any, name: str) -> Found:
     """Yield what stands under `camera:` in a file or in a tree, nested or as a list."""
     for key, each in value.items() if isinstance(value, dict) else enumerate(value):
         if key == "camera" and isinstance(each, dict) and "K" in each:
-            yield str(value.get("name", value.get("child_frame_id", name))), _own(each)
+            frame = value.get("name", value.get("child_frame_id", name))
+            yield frame.removeprefix("/"), camera_fields(each)
         elif isinstance(each, (dict, list)):
             yield from _ours(each, str(key) if isinstance(value, dict) and key not in ("frames", "children") else name)
-
-
-def _own(value: dict[str, Any]) -> dict[str, Any]:
-    if unknown := [key for key in value if key not in OURS]:
-        raise ValueInvalid(f"camera: unknown key {shown(unknown[0])}{alternatives(unknown[0], OURS, 'keys')}")
-    return {key: each if key in ("model", "axes") else _numbers(each) for key, each in value.items()}
-
-
-def _numbers(value: Any) -> Any:
-    """Return the numbers of a text, of lists of such, and of matrices that say their rows."""
-    if isinstance(value, dict):
-        return _numbers(value.get("data", []))
-    if isinstance(value, list):
-        return [_numbers(each) for each in value]
-    return parse_number(value) if isinstance(value, str) else value
 
 
 # ---------------------------------------------------------------- CameraInfo, OpenCV
@@ -241,16 +227,16 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
     for taken, keys in KEYS.items():
         for key, each in value.items():
             if re.fullmatch(rf"(?:{keys})_?{end}", key) and each not in (None, "", []):
-                found.setdefault(taken, str(each) if taken == "model" else _numbers(each))
+                found.setdefault(taken, str(each) if taken == "model" else numbers_of(each))
     for key in ("P", "R"):
         if "P" not in found or not any(found.get(key, ())):
             found.pop(key, None)
     for sides in SIZES:
         if all(side in value for side in sides):
-            found["size"] = [_numbers(value[side]) for side in sides]
+            found["size"] = [numbers_of(value[side]) for side in sides]
     region = value.get("roi") or {}
-    roi = [int(_numbers(region.get(key, 0))) for key in ("x_offset", "y_offset", "width", "height")]
-    binning = [int(_numbers(value.get(key) or 1)) or 1 for key in ("binning_x", "binning_y")]
+    roi = [int(numbers_of(region.get(key, 0))) for key in ("x_offset", "y_offset", "width", "height")]
+    binning = [int(numbers_of(value.get(key) or 1)) or 1 for key in ("binning_x", "binning_y")]
     if any(roi) or binning != [1, 1]:
         found["roi"] = *roi, *binning
     return found if "K" in found else {}
@@ -274,12 +260,12 @@ def _in_bag(file: InputFile) -> Found:
 def _kalibr(value: dict[str, Any]) -> dict[str, Any]:
     """Return a camera of a camchain, or of a sensor.yaml of EuRoC: the model's own parameters come first."""
     lens, warp = value.get("camera_model", "pinhole"), value.get("distortion_model", "none")
-    numbers = _numbers(value["intrinsics"])
-    d = _numbers(value.get("distortion_coeffs") or value.get("distortion_coefficients") or [])
+    numbers = numbers_of(value["intrinsics"])
+    d = numbers_of(value.get("distortion_coeffs") or value.get("distortion_coefficients") or [])
     own = dict(zip(CAMERA_MODELS[lens].parameters, numbers, strict=False)) if lens in CAMERA_MODELS else {}
     if warp == "fov":
         own, d = {"w": d[0]}, []
-    size = {"size": _numbers(value["resolution"])} if "resolution" in value else {}
+    size = {"size": numbers_of(value["resolution"])} if "resolution" in value else {}
     return {"model": warp if lens == "pinhole" else lens, "K": numbers[-4:], "D": d, **own, **size}
 
 
@@ -334,10 +320,14 @@ def _kitti(file: InputFile) -> Found:
         said = {key: each for key, line in raw if (each := numbers.get(f"{line}_0{at}"))}
         if "K" in said:
             yield read.named(camera), {"model": "plumb_bob", **said}
-        size = {"size": each} if (each := numbers.get(f"S_rect_0{at}")) else {}
+        more = {"size": each} if (each := numbers.get(f"S_rect_0{at}")) else {}
         for name, p in ((f"{camera}{rect}", numbers.get(f"P{at}")), (f"{camera}_rect", said.get("P"))):
+            fields: dict[str, Any] = {"model": "pinhole", "K": p and [p[0:3], p[4:7], p[8:11]], "P": p, **more}
+            if p and "R" in said and (t := numbers.get(f"T_0{at}")):  # what P says beyond the pose of the frame
+                turn, centre = said["R"], Camera(**fields).rectified(from_first=True).fields["shift"]
+                fields["shift"] = [c - sum(turn[3 * i + k] * t[k] for k in range(3)) for i, c in enumerate(centre)]
             if p:
-                yield read.named(name), {"model": "pinhole", "K": [p[0:3], p[4:7], p[8:11]], "P": p, **size}
+                yield read.named(name), fields
 
 
 def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
@@ -347,7 +337,7 @@ def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
     for edge in read(file, _options(file)):
         record = records[edge.path[-1]] if edge.parent is not None else {}  # type: ignore[index]
         if record.get("camera_intrinsic"):
-            yield edge.child, {"model": "pinhole", "K": _numbers(record["camera_intrinsic"])}
+            yield edge.child, {"model": "pinhole", "K": numbers_of(record["camera_intrinsic"])}
 
 
 def _options(file: InputFile) -> Options:

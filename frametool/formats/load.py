@@ -15,6 +15,7 @@ from io import BytesIO
 from itertools import islice
 from operator import lt
 from os import PathLike
+from types import MappingProxyType
 from typing import Any, BinaryIO, NamedTuple
 
 from frametool.documents.document import format_error, locate, locate_many
@@ -51,8 +52,13 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Report
 
 
+OWN = ("yaml", "json")
+
+
 class FrameFile(InputFile):
     """A file of frames and its form."""
+
+    cameras: Mapping[str, Camera] = MappingProxyType({})  # in a tree of ours, by their frames
 
     def __init__(
         self,
@@ -149,10 +155,18 @@ class FrameFile(InputFile):
             yield from found
         finally:
             self.close()
+        if self.form in OWN and re.search(r"""\bcamera["']?:""", self.text):
+            self._take_cameras()
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
         if tell:
             self.tell()
+
+    def _take_cameras(self) -> None:
+        """Keep the cameras of a tree of ours, which was read without a fault."""
+        from frametool.formats.cameras import cameras_of
+
+        self.cameras = {name: make() for name, make in cameras_of(self).items()}
 
     def tell(self) -> None:
         """Warn of what was odd in the file, once it was read."""
@@ -554,26 +568,20 @@ def load_sources(
     return tree
 
 
-OWN = ("yaml", "json")
 CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "nerf")  # and recordings
 
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
-    """Give a tree the cameras of its files: those in trees of ours at once, others when one is asked for."""
-    ours = [file for file in files if file.form in OWN]
-    others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
-    if ours:
-        from frametool.formats.cameras import cameras_of
-
-        tree.cameras = {name: make() for file in ours for name, make in cameras_of(file).items()}
+    """Give a tree the cameras of its files: those in trees of ours, others when one is asked for."""
 
     def read_cameras() -> dict[str, Callable[[], Camera]]:
         from frametool.formats.cameras import cameras_of_tree
 
+        others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
         return cameras_of_tree(tree, others)
 
-    if others:
-        tree.read_cameras = read_cameras
+    tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
+    tree.read_cameras = read_cameras
     return tree
 
 
@@ -602,4 +610,4 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
         raise FormatError("no frames in it", source=file.name)
     builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
     builder.drawn |= file.tally.drawn
-    builder.has_cameras |= file.form not in OWN or re.search(r"""\bcamera["']?:""", file.text) is not None
+    builder.has_cameras |= file.form not in OWN or bool(file.cameras)

@@ -240,6 +240,18 @@ def test_cameras_of_kitti_by_each_of_their_names(tmp_path: Path) -> None:
     assert tree.camera("left").numbers[0] == 708.2104
 
 
+def test_what_p_of_kitti_says_beyond_its_frame_shifts_the_points(tmp_path: Path) -> None:
+    text = FORMS["KITTI raw cam1_rect"]["files"]["calib_cam_to_cam.txt"]
+    p = [708.2104, 0.0, 602.9078, -330.09, 0.0, 708.2104, 183.9479, 2.5, 0.0, 0.0, 1.0, 0.004]
+    lines = ["P_rect_01: " + " ".join(map(str, p)) if line.startswith("P_rect_01") else line for line in text.splitlines()]
+    put(tmp_path, {"calib_cam_to_cam.txt": "\n".join(lines) + "\n"})
+    tree = frametool.load(tmp_path / "calib_cam_to_cam.txt")
+    point = np.array([-1.4, 0.1, 15.7])
+    u, v, w = np.array(p).reshape(3, 4) @ [*point, 1.0]
+    found, depth = tree.camera("cam1_rect").project(tree.lookup("cam1_rect", "cam0_rect").apply(point))
+    np.testing.assert_allclose([*found, depth], [u / w, v / w, w], rtol=0, atol=PIXEL)
+
+
 def test_axes_of_a_nerf_camera_come_with_its_tree(tmp_path: Path) -> None:
     put(tmp_path, FORMS["transforms.json OPENCV"]["files"])
     with quiet():
@@ -281,7 +293,7 @@ MODELS = (
 REFUSED = {
     "fish.yml: 4 coefficients: --model plumb_bob or --model equidistant": ("fish.yml", FORMS["OpenCV YAML, 4 coefficients"]["files"]["fish.yml"]),
     "cam.yaml: plumb_bob has 4 or 5 coefficients in D, not 3": ("cam.yaml", json.dumps({"camera": {**OURS, "D": [0.1, 0.1, 0.1]}})),
-    "cam.yaml: camera: unknown key 'sise'; did you mean 'size'? keys: D, K, P, R, alpha, axes, beta, model, size, skew, w, xi":
+    "cam.yaml: unknown key 'sise'; did you mean 'size'? keys: D, K, P, R, alpha, axes, beta, model, size, skew, w, xi":
         ("cam.yaml", json.dumps({"camera": {**OURS, "sise": [1, 1]}})),
     "cam.yaml: 'x' is not a number": ("cam.yaml", json.dumps({"camera": {**OURS, "K": ["x", 1, 1, 1]}})),
     f"cameras.txt:2: THIN_PRISM_FISHEYE is not read; models: {MODELS}": ("cameras.txt", "# Camera list\n12 THIN_PRISM_FISHEYE 640 480 1 1 1 1 0 0 0 0\n"),
@@ -316,4 +328,20 @@ def test_names_that_are_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_camera_of_a_tree_that_cannot_be_is_refused_with_its_frame(run: Run) -> None:
     text = LISTED.replace('"D": [-0.3, 0.1, 0.0, 0.0]', '"D": [0.1]')
     done = run("tree", "robot.yaml", files={"robot.yaml": text})
-    assert (done.status, done.err) == (1, "frametool: robot.yaml: cam: plumb_bob has 4 or 5 coefficients in D, not 1\n")
+    assert (done.status, done.err.splitlines()[0]) == (1, "frametool: robot.yaml:3:99: plumb_bob has 4 or 5 coefficients in D, not 1")
+    done = run("check", "robot.yaml")
+    assert (done.status, "robot.yaml:3:99: error: plumb_bob has 4 or 5 coefficients in D, not 1" in done.out) == (1, True)
+
+
+def test_a_camera_without_k_is_refused_where_it_stands(run: Run) -> None:
+    text = LISTED.replace('"K": [502.82, 528.2, 316.62, 234.22], ', "")
+    done = run("tree", "robot.yaml", files={"robot.yaml": text})
+    assert done.status == 1
+    assert "robot.yaml:3:99: a camera without K; it is {model: .., K: [fx, fy, cx, cy], D: [..], size: [w, h]}" in done.err
+
+
+def test_names_with_a_slash_and_numbers_that_are_null(tmp_path: Path) -> None:
+    text = LISTED.replace("name: cam,", "name: /cam,").replace("[640, 480]", "null")
+    put(tmp_path, {"robot.yaml": text})
+    with pytest.warns(FrametoolWarning, match="/cam"):
+        assert frametool.load(tmp_path / "robot.yaml").camera("cam").size is None

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import InputFile, Source, pointer
-from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, bare, shown
+from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, alternatives, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
@@ -25,6 +25,7 @@ from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
 from frametool.ros import messages
+from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -40,6 +41,7 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
+CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
 CHILDREN = frozenset(("children", *TIMED))
 
 
@@ -193,7 +195,39 @@ def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pos
     """Read the pose of an entry; axes beside samples are what these are given in."""
     if AXES_KEY in entry and "samples" in entry:
         entry = {key: value for key, value in entry.items() if key != AXES_KEY}
+    if "camera" in entry:
+        within(("camera",), _check_camera, entry["camera"])
     return read_pose(entry, reading, also)
+
+
+def _check_camera(value: Any) -> None:
+    from frametool.geometry.camera import Camera
+
+    try:
+        Camera(**{"model": None, **camera_fields(value)})
+    except ValueInvalid as error:
+        raise error if isinstance(error, Misfit) else Misfit(str(error)) from None
+
+
+def camera_fields(value: Any) -> dict[str, Any]:
+    """Return what `Camera` takes of `camera: {..}`; raises Misfit."""
+    known = as_mapping(value, "a camera as {K: [fx, fy, cx, cy], ..}")
+    for key in known:
+        if key not in CAMERA_KEYS:
+            raise Misfit(f"unknown key {shown(key)}{alternatives(key, CAMERA_KEYS, 'keys')}", (key,), key=True)
+    if "K" not in known:
+        raise Misfit("a camera without K; it is {model: .., K: [fx, fy, cx, cy], D: [..], size: [w, h]}")
+    texts = ("model", "axes")
+    return {key: each if key in texts else numbers_of(each) for key, each in known.items() if each is not None}
+
+
+def numbers_of(value: Any) -> Any:
+    """Return the numbers of a text, of lists of such, and of matrices that say their rows."""
+    if isinstance(value, dict):
+        return numbers_of(value.get("data", []))
+    if isinstance(value, list):
+        return [numbers_of(each) for each in value]
+    return parse_number(value) if isinstance(value, str) else value
 
 
 def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
