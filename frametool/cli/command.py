@@ -29,6 +29,7 @@ NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translat
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 EVERYTHING = "frametool.everything"  # a key in a context's `meta`
 INPUTS = "frametool.inputs"  # the key in a context's `meta`
+TOLD = "frametool.told"  # the same: the options on the command line
 # what stands for an option of several values in a command without it
 WITHOUT = {"input_forms": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options that any way may ignore: they are about what is said, not about what is done
@@ -50,12 +51,6 @@ class Inputs:
         self.forms_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
         self.reads_trees = False
         self.earth: Earth | None = None
-
-    @classmethod
-    def of(cls, context: click.Context) -> Inputs:
-        """Return what a context has parsed."""
-        idle = {name: called for name, called in told_options(context).items() if name not in OF_MESSAGES}
-        return cls(context.params, idle)
 
     def __getattr__(self, name: str) -> Any:
         """Return the value of an argument or option, which counts as asked for; None where the command has none."""
@@ -106,28 +101,18 @@ class Option(click.Option):
         self.excludes, self.requires, self.under = excludes, requires, under
 
 
-def told_options(context: click.Context) -> dict[str, str]:
-    """Return the options that stand on the command line, by their parameters, each as it is called."""
-    told = click.core.ParameterSource.COMMANDLINE
-    return {
-        each.name or "": each.opts[-1] for each in context.command.params
-        if isinstance(each, click.Option) and context.get_parameter_source(each.name or "") is told
-    }  # fmt: skip
-
-
-def check_together(context: click.Context) -> None:
+def _check_together(context: click.Context, told: Sequence[Option]) -> None:
     """Raise a usage error for options that do not belong together."""
-    told = told_options(context)
-    known = {each.name: each for each in context.command.params if isinstance(each, Option)}
-    for name, called in told.items():
-        if name not in known:
-            continue
-        if other := next((told[each] for each in known[name].excludes if each in told), ""):
-            raise click.UsageError(f"{called} and {other} exclude each other", context)
-        needed = known[name].requires
-        if needed and told.keys().isdisjoint(needed):
-            choices = " or ".join(known[each].opts[-1] for each in needed if each in known)
-            raise click.UsageError(f"{called} needs {choices}", context)
+    called = {each.name: each.opts[-1] for each in told}
+    for each in told:
+        name = each.opts[-1]
+        if others := called.keys() & {*each.excludes}:
+            first = min(others, key=each.excludes.index)
+            raise click.UsageError(f"{name} and {called[first]} exclude each other", context)
+        if each.requires and called.keys().isdisjoint(each.requires):
+            known = {each.name: each.opts[-1] for each in context.command.params}
+            choices = " or ".join(known[needed] for needed in each.requires if needed in known)
+            raise click.UsageError(f"{name} needs {choices}", context)
 
 
 def refuse(holds: object, message: str) -> None:
@@ -380,19 +365,19 @@ class Command(WithHelp):
     """
 
     def make_parser(self, ctx: click.Context) -> Any:
-        """Make click's parser; of an option of one value that stands there twice, the first would not be used."""
+        """Make click's parser, which notes the options that are given; of one value twice, one would not be used."""
         parser: Any = super().make_parser(ctx)
         parse = parser.parse_args
 
-        def parse_once(args: list[str]) -> Any:
+        def parse_noting(args: list[str]) -> Any:
             found = parse(args=args)
-            told = [] if ctx.resilient_parsing else found[2]
+            told = ctx.meta[TOLD] = [each for each in found[2] if isinstance(each, Option)]
             for each in told:
-                if isinstance(each, click.Option) and not (each.multiple or each.is_flag) and told.count(each) > 1:
+                if told.count(each) > 1 and not (each.multiple or each.is_flag or ctx.resilient_parsing):
                     raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
             return found
 
-        parser.parse_args = parse_once
+        parser.parse_args = parse_noting
         return parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -406,12 +391,13 @@ class Command(WithHelp):
             args = _with_value(args, name, *OPTIONAL[name])
         rest = super().parse_args(ctx, args)
         if not ctx.resilient_parsing:
-            check_together(ctx)
+            _check_together(ctx, ctx.meta[TOLD])
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
-        given = ctx.meta[INPUTS] = Inputs.of(ctx)
+        idle = {each.name: each.opts[-1] for each in ctx.meta[TOLD] if each.name not in OF_MESSAGES}
+        given = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
         try:
             with checked_by(given.refuse_idle):
                 result = ctx.invoke(self.callback or (lambda _: 0), given)
@@ -469,9 +455,9 @@ def _with_value(args: list[str], option: str, *values: str) -> list[str]:
 
 def _say_not_needed(given: Inputs) -> None:
     """Say on stderr which options change nothing, where only what was read or is written shows whether they do."""
-    forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
     for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
         if chosen and not given.quiet and not any(ask in asks for _, asks in given.forms_read):
+            forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
             why = f": {forms} does not leave that open" if forms else " here"
             say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
 

@@ -36,7 +36,9 @@ class Utf8(Text):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse bytes that are no text."""
-        if any("\ud800" <= each <= "\udfff" for each in str(value)):
+        try:
+            str(value).encode()
+        except UnicodeEncodeError:
             self.fail(f"{shown(value)} is not UTF-8 text", param, ctx)
         return super().convert(value, param, ctx)
 

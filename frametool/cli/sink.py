@@ -38,26 +38,16 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     of a pipe is gone; what a check finds wrong.
     """
     if path is None or path == "-":
-        yield _checked(writer_into(sys.stdout.buffer, "standard output"))
+        yield writer_into(sys.stdout.buffer, "standard output")
     elif (number := _own_stream(path)) is not None or is_special(path):
         with problems_of(path):
             special = open(path if number is None else os.dup(number), "wb", buffering=0)  # noqa: SIM115 - closed below
         with special:
-            yield _checked(writer_into(special, path))
+            yield writer_into(special, path)
     else:
         with _replacing(path, force=force) as part:
-            yield _checked(writer_into(part, path))
+            yield writer_into(part, path)
             check()
-
-
-def _checked(write: Write) -> Write:
-    """Return what writes only where nothing is wrong with the call."""
-
-    def write_checked(piece: str | bytes | memoryview) -> None:
-        check()
-        write(piece)
-
-    return write_checked
 
 
 @contextmanager
@@ -94,9 +84,10 @@ def _own_stream(path: str) -> int | None:
 
 
 def writer_into(stream: BinaryIO, name: str) -> Write:
-    """Return what writes pieces into an open stream, which messages call by a name."""
+    """Return what checks the call and writes pieces into an open stream, which messages call by a name."""
 
     def write(piece: str | bytes | memoryview) -> None:
+        check()
         view = memoryview(_encoded(piece) if isinstance(piece, str) else piece)
         with problems_of(name), whole_lines():
             while view:  # an unbuffered stream may take a part
