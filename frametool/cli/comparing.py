@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from math import inf
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +13,7 @@ from frametool.cli.command import inputs as running
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
 from frametool.errors import ValueInvalid, shown, warn
+from frametool.frames.stamps import parse_stamp, parse_time
 from frametool.stream.faults import MOST, STOP, BadRows
 
 if TYPE_CHECKING:
@@ -23,23 +23,12 @@ if TYPE_CHECKING:
     from frametool.fit.comparison import Comparison, Delta, Settings
     from frametool.frames.trajectory import Trajectory
 
-LONGEST = 2.0**62  # nanoseconds
-NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9, "": 1e9}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-def read_time(text: str) -> int:
-    """Read `10ms`, `0.25`, `-3s` as nanoseconds."""
-    found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(ns|us|ms|s|)", text.strip())
-    nanoseconds = float(found[1]) * NANOSECONDS[found[2]] if found else inf
-    if abs(nanoseconds) >= LONGEST:
-        raise ValueInvalid(f"{shown(text)} is not a time; write seconds, or a number with ms, us or ns")
-    return round(nanoseconds)
 
 
 def read_span(text: str) -> int:
     """Read a time that is not negative."""
-    found = read_time(text)
+    found = parse_time(text)
     if found < 0:
         raise ValueInvalid(f"{shown(text)} is less than 0")
     return found
@@ -57,8 +46,8 @@ def _read_share(text: str) -> float:
 def _read_offset(text: str) -> tuple[int | str, float | None]:
     word, colon, limit = text.partition(":")
     if word != "auto":
-        return read_time(text), None
-    seconds = read_time(limit) / 1e9 if colon else None
+        return parse_time(text), None
+    seconds = parse_time(limit) / 1e9 if colon else None
     if seconds is not None and seconds <= 0:
         raise ValueInvalid(f"{shown(text)}: how far is looked behind auto: is more than 0 s")
     return "auto", seconds
@@ -68,8 +57,6 @@ def _read_limit(text: str) -> tuple[bool, int]:
     """Read `12.5` on the reference's clock, or `+5s` after the first pair."""
     if text.startswith("+"):
         return True, read_span(text[1:])
-    from frametool.frames.stamps import parse_stamp
-
     return False, parse_stamp(text)
 
 
@@ -142,7 +129,6 @@ def trajectory(
     """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
     from os.path import basename
 
-    from frametool.stream.faults import BadRows
     from frametool.stream.trajectories import read_trajectory, split_name
 
     made: list[BadRows] = []

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, Text, inputs, option, refuse, together
+from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, together
 from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -330,7 +330,6 @@ def pose_result_options(*what: str) -> Adds:
 # --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
-MOST_TIMES = 100_000_000
 MOST_TOLD = 10  # times without a result
 
 
@@ -393,19 +392,12 @@ class Time(Text):
         text = super().convert(value, param, ctx)
         if not isinstance(text, str) or (self.latest and text == LATEST):
             return text
-        from frametool.frames.stamps import NotATime
+        from frametool.frames.stamps import NotATime, parse_time  # few calls say a time
 
         try:
-            return _stamp_ns(text)
+            return parse_time(text)
         except ValueInvalid as error:
             self.fail(f"{error}{', or latest' if self.latest and isinstance(error, NotATime) else ''}", param, ctx)
-
-
-def _stamp_ns(text: str) -> int:
-    """Read a time in seconds, or in nanoseconds with `ns`."""
-    from frametool.frames.stamps import parse_stamp, whole_stamp  # few calls say a time
-
-    return whole_stamp(parse_stamp(text))
 
 
 class Offset(Time):
@@ -476,32 +468,13 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
     report: takes the errors of lines that are no time.
     """
-    if text.count(":") == 2:
-        return _range(text)
-    if re.match(r"[-+]?\.?\d", text) and not os.path.exists(text):
-        return _listed(text)
+    if text.count(":") == 2 or (re.match(r"[-+]?\.?\d", text) and not os.path.exists(text)):
+        from frametool.frames.stamps import parse_times
+
+        with misuse(f"--times {text}: "):
+            return parse_times(text)
     from frametool.stream.trajectories import read_stamps
 
     if text == "-" and sys.stdin is not None and sys.stdin.isatty():
         raise click.UsageError("standard input is a terminal; pipe something in")
     return read_stamps(text, report)
-
-
-def _listed(text: str) -> list[int]:
-    """Read times between commas."""
-    try:
-        return [_stamp_ns(part.strip()) for part in text.split(",")]
-    except ValueInvalid as error:
-        hint = "times are T,T,.. in seconds, START:STOP:STEP, or a file"
-        raise click.UsageError(f"--times {shown(text)}: {error}; {hint}") from None
-
-
-def _range(text: str) -> range:
-    """Read START:STOP:STEP."""
-    try:
-        start, stop, step = map(_stamp_ns, text.split(":"))
-    except ValueInvalid as error:
-        raise click.UsageError(f"--times {text}: {error}; a range is START:STOP:STEP in seconds") from None
-    refuse(step <= 0 or stop < start, f"--times {text}: STEP must be positive and STOP not before START")
-    refuse((stop - start) // step >= MOST_TIMES, f"--times {text} has more than {MOST_TIMES} times")
-    return range(start, stop + 1, step)

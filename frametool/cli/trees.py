@@ -22,7 +22,7 @@ from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
 from frametool.grammar.names import EARTH_FRAMES
-from frametool.grammar.pose_algebra import looked_up
+from frametool.grammar.pose_algebra import Lookups
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from frametool.formats.robots.model import Robot
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
-    from frametool.geometry.types import Components
-    from frametool.grammar.result import Result
 
     Value = TypeVar("Value")
 
@@ -137,77 +135,17 @@ def _loaded(
     return tree
 
 
-class Lookups:
-    """Look-ups of a tree as a command has them, with the covariances of its edges if wanted; what is told of these.
+def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
+    """Return the look-ups of a command; tell of covariances that are not wanted."""
+    if tree.covariances and not carried and not inputs().quiet:
+        say(f"sigmas of {bare(tree.name)} not used (--covariance)")
+    return Lookups(tree, carried=carried)
 
-    Edges with covariances that are not wanted are told at once, what was taken for granted of carried ones at the end.
-    """
 
-    def __init__(self, tree: Frames, *, carried: bool) -> None:
-        """Begin before the first result."""
-        self.tree, self.carried = tree, carried
-        self.edges: set[str] = set()  # by their children
-        self.widest: Sequence[float] = ()
-        self.width = 0.0
-        if tree.covariances and not carried and not inputs().quiet:
-            say(f"sigmas of {bare(tree.name)} not used (--covariance)")
-
-    def result(self, target: str, source: str, at_ns: int | None) -> Result:
-        """Return the pose of a frame in another, as a result."""
-        return self.noted(looked_up(self.tree, target, source, at_ns, covariance=self.carried))
-
-    def one(self, target: str, source: str, at_ns: int | None) -> Components:
-        """Return the components of a pose, with those of its covariance."""
-        if not self.carried:
-            return self.tree.lookup(target, source, at_ns).components
-        found = self.result(target, source, at_ns)
-        return *found.pose.components, *found.extras["covariance"]
-
-    def many(self, target: str, source: str, times_ns: Any) -> Components:
-        """Return the same at times, as columns; nan where there are no data."""
-        found = self.tree.lookup_many(target, source, times_ns, missing="nan").components
-        return self._beside(found, target, source, times_ns) if self.carried else found
-
-    def noted(self, result: Result) -> Result:
-        """Take a result of a lookup in."""
-        if not self.carried:
-            return result
-        from frametool.geometry.uncertainty import widest_turn
-
-        target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
-        new = {track.child for track in self.tree.way(target, source, result.extras.get("stamp_ns"))} - self.edges
-        self.edges |= new
-        for each in (found, *(self.tree.covariances.get(edge, ()) for edge in new)):
-            if (width := widest_turn(each)) > self.width:
-                self.widest, self.width = each, width
-        return result
-
-    def _beside(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
-        """Return columns of poses with those of their covariance."""
-        import numpy as np
-
-        from frametool.frames.lookup_many import carried_many
-
-        times = np.asarray(times_ns)
-        there = np.flatnonzero(~np.isnan(poses[0]))
-        entries = np.full((len(times), 36), np.nan)
-        if len(there):
-            entries[there] = carried_many(self.tree, target, source, times[there])
-            self.edges |= {track.child for track in self.tree.way(target, source, int(times[there[0]]))}
-        return (*poses, *entries.T)
-
-    def tell(self) -> None:
-        """Say what was taken for granted, and warn of turns too wide for the first order."""
-        if not self.carried:
-            return
-        from frametool.geometry.uncertainty import warn_if_wide
-
-        warn_if_wide([self.widest])
-        exact = len(self.edges - self.tree.covariances.keys())
-        count = f"{exact} of {len(self.edges)}"
-        none = f"{count} has no sigma and counts" if exact == 1 else f"{count} have no sigma and count"
-        if self.edges and not inputs().quiet:
-            say(f"edges count as independent{f'; {none} as exact' * bool(exact)}")
+def tell_granted(lookups: Lookups) -> None:
+    """Say what look-ups have taken for granted."""
+    if (granted := lookups.granted()) and not inputs().quiet:
+        say(granted)
 
 
 def refuse_idle(files: Sequence[FrameFile]) -> None:

@@ -9,6 +9,7 @@ from frametool.errors import ValueInvalid, shown, warn
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
 BILLION = 1_000_000_000
@@ -21,6 +22,7 @@ SUFFIXES = {BILLION: "s", 10**6: "ms", 10**3: "us", 1: "ns"}
 _OLDEST_NS, _NEWEST_NS = 946_684_800 * BILLION, 4_102_444_800 * BILLION  # the years 2000 and 2100
 
 
+MOST_TIMES = 100_000_000  # of a range
 FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the year 2116
 
 
@@ -68,6 +70,30 @@ def parse_stamp(text: str) -> int:
         shift = 0
     stamp_ns = digits * int(10**shift)
     return -stamp_ns if sign == "-" else stamp_ns
+
+
+def parse_time(text: str) -> int:
+    """Read a time as `parse_stamp` does, within the years that stamps may be of."""
+    return whole_stamp(parse_stamp(text.strip()))
+
+
+def parse_times(text: str) -> Sequence[int]:
+    """Read START:STOP:STEP, where STOP counts if a step meets it, or T,T,..; raises ValueInvalid."""
+    is_range = text.count(":") == 2
+    try:
+        times = list(map(parse_time, text.split(":" if is_range else ",")))
+    except ValueInvalid as error:
+        hint = "times are T,T,.. in seconds, START:STOP:STEP, or a file"
+        hint = "a range is START:STOP:STEP in seconds" if is_range else hint
+        raise ValueInvalid(f"{error}; {hint}") from None
+    if not is_range:
+        return times
+    start, stop, step = times
+    if step <= 0 or stop < start:
+        raise ValueInvalid("STEP must be positive and STOP not before START")
+    if (stop - start) // step >= MOST_TIMES:
+        raise ValueInvalid(f"more than {MOST_TIMES} times")
+    return range(start, stop + 1, step)
 
 
 def _date_ns(match: re.Match[str]) -> int:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from frametool.frames.lookups import Frames
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Vector
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
@@ -205,3 +205,70 @@ def sample_stamps(frames: Frames, target: str, source: str) -> list[int]:
     if not stamps:
         frames.lookup_components(target, source, first)  # raises: the samples of two edges never overlap
     return sorted(stamps)
+
+
+class Lookups:
+    """Look-ups of a tree, with the covariances of its edges if these are carried, and what is to be said of them."""
+
+    def __init__(self, tree: Frames, *, carried: bool) -> None:
+        """Begin before the first result."""
+        self.tree, self.carried = tree, carried
+        self.edges: set[str] = set()  # by their children
+        self.widest: Sequence[float] = ()
+        self.width = 0.0
+
+    def result(self, target: str, source: str, at_ns: int | None) -> Result:
+        """Return the pose of a frame in another, as a result."""
+        return self.noted(looked_up(self.tree, target, source, at_ns, covariance=self.carried))
+
+    def one(self, target: str, source: str, at_ns: int | None) -> Components:
+        """Return the components of a pose, with those of its covariance."""
+        if not self.carried:
+            return self.tree.lookup(target, source, at_ns).components
+        found = self.result(target, source, at_ns)
+        return *found.pose.components, *found.extras["covariance"]
+
+    def many(self, target: str, source: str, times_ns: Any) -> Components:
+        """Return the same at times, as columns; nan where there are no data."""
+        found = self.tree.lookup_many(target, source, times_ns, missing="nan").components
+        return self._beside(found, target, source, times_ns) if self.carried else found
+
+    def noted(self, result: Result) -> Result:
+        """Take a result of a lookup in."""
+        if not self.carried:
+            return result
+        from frametool.geometry.uncertainty import widest_turn
+
+        target, source, found = result.pose.parent or "", result.pose.name or "", result.extras["covariance"]
+        new = {track.child for track in self.tree.way(target, source, result.extras.get("stamp_ns"))} - self.edges
+        self.edges |= new
+        for each in (found, *(self.tree.covariances.get(edge, ()) for edge in new)):
+            if (width := widest_turn(each)) > self.width:
+                self.widest, self.width = each, width
+        return result
+
+    def _beside(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
+        """Return columns of poses with those of their covariance."""
+        import numpy as np
+
+        from frametool.frames.lookup_many import carried_many
+
+        times = np.asarray(times_ns)
+        there = np.flatnonzero(~np.isnan(poses[0]))
+        entries = np.full((len(times), 36), np.nan)
+        if len(there):
+            entries[there] = carried_many(self.tree, target, source, times[there])
+            self.edges |= {track.child for track in self.tree.way(target, source, int(times[there[0]]))}
+        return (*poses, *entries.T)
+
+    def granted(self) -> str:
+        """Return what was taken for granted, "" for nothing; warn of turns too wide for the first order."""
+        if not self.edges:
+            return ""
+        from frametool.geometry.uncertainty import warn_if_wide
+
+        warn_if_wide([self.widest])
+        exact = len(self.edges - self.tree.covariances.keys())
+        count = f"{exact} of {len(self.edges)}"
+        none = f"{count} has no sigma and counts" if exact == 1 else f"{count} have no sigma and count"
+        return f"edges count as independent{f'; {none} as exact' * bool(exact)}"

@@ -24,7 +24,7 @@ from frametool.cli.options import (
 )
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
 from frametool.cli.streaming import SEVERAL, stream_options
-from frametool.cli.trees import FRAME, Lookups, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, tell_granted
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -190,7 +190,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
     named = arguments[2:3] if is_named else ()
     rest = arguments[2 + len(named) :]
     tree = load_tree(arguments[0], inputs.more, rules(inputs), streams=rest in ((), ("-",)))
-    lookups = Lookups(tree, carried=uncertain)
+    lookups = lookups_in(tree, carried=uncertain)
     target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
     source = next(iter(sources), None)
 
@@ -223,7 +223,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
 
         return ByTree(tree, target, source, at_ns(chosen))
 
-    has_source, tell = source is not None, lookups.tell
+    has_source, tell = source is not None, partial(tell_granted, lookups)
     return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell, tree), rest
 
 

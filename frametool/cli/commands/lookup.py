@@ -24,13 +24,13 @@ from frametool.cli.options import (
     window_of,
 )
 from frametool.cli.streaming import stream_options
-from frametool.cli.trees import FRAME, Lookups, frame_name, load_tree
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, tell_granted
 from frametool.errors import NoDataAt, UnknownFrame
 from frametool.formats.table import holds_arrays
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import EXACT, UNCERTAIN
 from frametool.grammar.edges import stop
-from frametool.grammar.pose_algebra import looked_up_across, looked_up_many, sample_stamps, why_missing
+from frametool.grammar.pose_algebra import Lookups, looked_up_across, looked_up_many, sample_stamps, why_missing
 from frametool.stream.faults import NULL, SKIP
 
 if TYPE_CHECKING:
@@ -90,10 +90,10 @@ def command(inputs: Inputs) -> int:
     if covariance:
         _check_covariance(output, by_row=by_row)
     tree = load_tree(inputs.tree, inputs.more, rules(inputs), streams=by_row)
-    lookups, at = Lookups(tree, carried=covariance), at_ns(inputs.at)
+    lookups, at = lookups_in(tree, carried=covariance), at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source, window)
-        lookups.tell()
+        tell_granted(lookups)
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
     source_at, fixed = at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
@@ -109,7 +109,7 @@ def command(inputs: Inputs) -> int:
         output.values([looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
         output.values([lookups.result(target, source, at)])
-    lookups.tell()
+    tell_granted(lookups)
     return status
 
 
