@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,7 +16,7 @@ from frametool.cli.command import Text, inputs, refuse
 from frametool.cli.options import input_forms
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
-from frametool.documents.source import FileState, noting_files, states_of
+from frametool.documents.source import ReadCache
 from frametool.errors import FrametoolError, bare, listing, shown, warn
 from frametool.formats.table import FORMATS, ORDERS
 from frametool.grammar.edges import Answers
@@ -25,7 +24,7 @@ from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose_algebra import Lookups
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frametool.formats.load import EdgePlace, FrameFile, Rules
     from frametool.formats.robots.model import Robot
@@ -38,47 +37,6 @@ if TYPE_CHECKING:
 ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name != "time_offset"}
 ANSWERED |= {"frames": ("named_frames",), "order": ("order", "given")}
 OF_FILES = (*Answers._fields, "named_frames", "given", "input_forms", "topics", "quiet", "verbose")
-MOST = 32  # values
-MOST_BYTES = 1 << 28  # of the files and texts they were read from
-SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
-
-
-class TreeCache:
-    """What the lines of a batch have read last, mostly trees; its context keeps one.
-
-    Each value stands with the states of its files as it was read, and their size; its key is all that says how.
-    """
-
-    def __init__(self) -> None:
-        """Create an empty cache."""
-        self._values: dict[Hashable, tuple[Any, dict[str, list[FileState]], int]] = {}
-
-    def read(self, arguments: Sequence[str], options: Hashable, read: Callable[[], Value]) -> Value:
-        """Return what `read` makes of some arguments: as it did before, or anew where a file has changed."""
-        key = (tuple(arguments), options)
-        found = self._values.pop(key, None)
-        if found is None or not _are_current(found[1]):
-            texts = [argument for argument in arguments if is_inline(argument)]
-            with noting_files() as files:
-                files |= {each: states_of(each) for each in arguments if each not in texts and os.path.exists(each)}
-                value = read()
-            states = [state for each in files.values() for state in each]
-            plain = all(os.path.isfile(path) or os.path.isdir(path) for path in files)  # which can be read again
-            if not plain or max((each.ctime_ns for each in states), default=0) >= time.time_ns() - SETTLED_NS:
-                return value
-            found = value, files, sum(map(len, texts)) + sum(each.size for each in states)
-        self._values[key] = found  # as the youngest
-        while len(self._values) > MOST or sum(size for *_, size in self._values.values()) > MOST_BYTES:
-            del self._values[next(iter(self._values))]
-        return found[0]
-
-
-def _are_current(files: dict[str, list[FileState]]) -> bool:
-    """Return True if all files still are what was read."""
-    try:
-        return all(states_of(path) == states for path, states in files.items())
-    except OSError:
-        return False
 
 
 def load_tree(
@@ -161,7 +119,7 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     options: what says how, as well as the settings
     """
     context = click.get_current_context(silent=True)
-    cache = None if context is None else context.find_object(TreeCache)
+    cache = None if context is None else context.find_object(ReadCache)
     if context is None or cache is None:
         return read()
     given = inputs()
@@ -172,8 +130,9 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     def read_all() -> tuple[Value, Any, Any]:
         return read(), given.forms_read[len(before) :], idle - given.idle()
 
-    key = [given.peek(name) for name in OF_FILES]
-    value, forms, asked = cache.read(named, f"{options} {key}", read_all)
+    key = tuple(named), f"{options} {[given.peek(name) for name in OF_FILES]}"
+    files = [each for each in named if not is_inline(each) and os.path.exists(each)]
+    value, forms, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
     given.forms_read = (*before, *forms)
     given.ask(*asked)
     return value

@@ -13,19 +13,21 @@ import gc
 import os
 import re
 import sys
+import time
 from bisect import bisect_right
 from contextlib import contextmanager
 from functools import cached_property
 from io import BufferedReader, BytesIO
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, cells, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
     from os import PathLike
-    from typing import BinaryIO, TypeAlias
+    from typing import BinaryIO, TypeAlias, TypeVar
 
+    Value = TypeVar("Value")
     Path: TypeAlias = tuple[str | int, ...]
     # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
     Event: TypeAlias = tuple[int, str, int, int, str, int]
@@ -37,6 +39,8 @@ MOST_CHARACTERS = 1 << 30
 MOST_CONTAINERS = 10_000_000
 # commas and line ends in one text: the value between two takes 60 bytes; a million messages in lines have 4e7
 MOST_VALUES = 50_000_000
+MOST_KEPT, MOST_KEPT_BYTES = 32, 1 << 28  # values, and bytes of the files and texts they were read from
+SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
 
 
 def size_problem(text: str) -> str:
@@ -145,6 +149,46 @@ def noting_files() -> Iterator[dict[str, list[FileState]]]:
         yield found
     finally:
         _noted.pop()
+
+
+class ReadCache:
+    """What was read last from files, for as long as these stay as they were.
+
+    Each value stands with the states of its files as it was read, and their size.
+    """
+
+    def __init__(self) -> None:
+        """Create an empty cache."""
+        self._values: dict[Hashable, tuple[Any, dict[str, list[FileState]], int]] = {}
+
+    def read(self, key: Hashable, files: Iterable[str], size: int, read: Callable[[], Value]) -> Value:
+        """Return what `read` makes of files, and of others that it opens: as it did before, or anew where one changed.
+
+        key: all that says what is read, and how
+        size: of texts that are read beside files
+        """
+        found = self._values.pop(key, None)
+        if found is None or not _are_current(found[1]):
+            with noting_files() as noted:
+                noted |= {path: states_of(path) for path in files}
+                value = read()
+            states = [state for each in noted.values() for state in each]
+            plain = all(os.path.isfile(path) or os.path.isdir(path) for path in noted)  # which can be read again
+            if not plain or max((each.ctime_ns for each in states), default=0) >= time.time_ns() - SETTLED_NS:
+                return value
+            found = value, noted, size + sum(each.size for each in states)
+        self._values[key] = found  # as the youngest
+        while len(self._values) > MOST_KEPT or sum(size for *_, size in self._values.values()) > MOST_KEPT_BYTES:
+            del self._values[next(iter(self._values))]
+        return found[0]
+
+
+def _are_current(files: dict[str, list[FileState]]) -> bool:
+    """Return True if all files still are what was read."""
+    try:
+        return all(states_of(path) == states for path, states in files.items())
+    except OSError:
+        return False
 
 
 def _instead_of_a_file(name: str) -> str:

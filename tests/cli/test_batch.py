@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import shell
 
-from frametool.cli import trees
+from frametool.documents import source
 from frametool.formats.load import load
 
 if TYPE_CHECKING:
@@ -271,7 +271,7 @@ def test_a_file_of_frames_is_read_once_until_it_changes(run: Run, monkeypatch: p
         return before(sources, *rest)
 
     monkeypatch.setattr(loading, "load_sources", counted)
-    monkeypatch.setattr(trees, "SETTLED_NS", 0)
+    monkeypatch.setattr(source, "SETTLED_NS", 0)
     lines = [
         "tree robot.yaml -o own.yaml", "lookup own.yaml map lidar", "lookup own.yaml map tool", "lookup own.yaml map tool --normalize",
         "tree arm.urdf -o own.yaml --force", "lookup own.yaml arm_base tool", "lookup own.yaml map tool",

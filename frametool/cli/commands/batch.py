@@ -20,8 +20,7 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.shell_words import NAME, goes_on, has_words, split
 from frametool.cli.stderr import TROUBLES, BatchLine, say, say_error, telling_of, wants_json, words_of
-from frametool.cli.trees import TreeCache
-from frametool.documents.source import MOST_CHARACTERS, UTF16, decode, opened
+from frametool.documents.source import MOST_CHARACTERS, UTF16, ReadCache, decode, opened
 from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives
 from frametool.grammar.rotation_spelling import ROTATION_KEYS
 from frametool.ros.messages import LISTS
@@ -175,7 +174,7 @@ class CommandBatch:
         self.source = source
         self.skips = skips
         self.results = KeptResults()
-        self.context = click.Context(group, info_name="frametool", obj=TreeCache())
+        self.context = click.Context(group, info_name="frametool", obj=ReadCache())
         self.count = self.failed = self.status = 0
         self.in_json = True  # as all lines that failed wanted their errors
 
