@@ -5,10 +5,10 @@ Functions of numbers: sines and their kin, roots; angles in degrees keep right a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc import rules
-from frametool.calc.parser import METRE, RADIAN, CalcError
+from frametool.calc.parser import METRE, RADIAN, CalcError, frame_text
 from frametool.calc.values import (
     ANGLES,
     LIST,
@@ -28,6 +28,7 @@ from frametool.geometry import euler, floats, quaternion, rigid
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.calc.evaluate import Scope
     from frametool.calc.values import Kernel
     from frametool.geometry.types import Components, Namespace, Number
 
@@ -276,3 +277,40 @@ FUNCTIONS = {
     "atan": Builtin(1, 1, "number", "angle of a tangent", arc(arctangent, None)),
     "sqrt": Builtin(1, 1, "number", "square root", sqrt),
 }
+
+
+BETWEEN_WORDS = " \t()[]{},*^@+="
+WORDS = ("row", "pi", "ans", "as ", "in ")
+
+
+class Completer:
+    """Completes frames on both sides of an arrow, names, and functions with their bracket."""
+
+    def __init__(self, scope: Scope, line: Any) -> None:
+        """Take what there is to name, and readline, which knows the line."""
+        self.scope = scope
+        self.line = line
+        self.found: list[str] = []
+
+    def __call__(self, text: str, state: int) -> str | None:
+        """Return one completion after the other."""
+        if state == 0:
+            self.found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
+        return self.found[state] if state < len(self.found) else None
+
+    def completions(self, text: str, before: str) -> list[str]:
+        """Return all completions of a word behind the rest of a line."""
+        asked = self._tree_before(before)
+        tree = asked or self.scope.tree
+        frames = sorted(map(frame_text, tree.frames)) if tree else []
+        head, arrow, tail = text.partition("<-")
+        if arrow:
+            return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
+        words = () if asked else (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
+        return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
+
+    def _tree_before(self, before: str) -> Any:
+        """Return the tree whose bracket is open right before a word."""
+        name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
+        term = self.scope.names.get(name.lstrip("()[]{},*^@+=-/"))
+        return None if term is None else term.tree

@@ -17,8 +17,8 @@ import click
 
 from frametool.calc.api import line_of_value, plain_result
 from frametool.calc.evaluate import PLACED, Scope, evaluate_line, literal, read_line, term_of_pose
-from frametool.calc.functions import FUNCTIONS
-from frametool.calc.parser import LONGEST, CalcError, frame_text
+from frametool.calc.functions import BETWEEN_WORDS, Completer
+from frametool.calc.parser import LONGEST, CalcError
 from frametool.calc.rules import wanted
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
 from frametool.cli.command import Text, refuse
@@ -114,10 +114,6 @@ def _values(source: Source, scope: Scope) -> Term | None:
     return items[0] if len(items) == 1 else Term(Type(LIST), (), items=items)
 
 
-BETWEEN_WORDS = " \t()[]{},*^@+="
-WORDS = ("row", "pi", "ans", "as ", "in ")
-
-
 class Expression(Text):
     """An expression, completed from --tree and from the files that were named before it."""
 
@@ -136,39 +132,6 @@ class Expression(Text):
         cut = max(incomplete.rfind(mark) for mark in BETWEEN_WORDS) + 1
         before, word = incomplete[:cut], incomplete[cut:]
         return [CompletionItem(before + each) for each in Completer(scope, None).completions(word, before)]
-
-
-class Completer:
-    """Completes frames on both sides of an arrow, names, and functions with their bracket."""
-
-    def __init__(self, scope: Scope, line: Any) -> None:
-        """Take what there is to name, and readline, which knows the line."""
-        self.scope = scope
-        self.line = line
-        self.found: list[str] = []
-
-    def __call__(self, text: str, state: int) -> str | None:
-        """Return one completion after the other."""
-        if state == 0:
-            self.found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
-        return self.found[state] if state < len(self.found) else None
-
-    def completions(self, text: str, before: str) -> list[str]:
-        """Return all completions of a word behind the rest of a line."""
-        asked = self._tree_before(before)
-        tree = asked or self.scope.tree
-        frames = sorted(map(frame_text, tree.frames)) if tree else []
-        head, arrow, tail = text.partition("<-")
-        if arrow:
-            return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
-        words = () if asked else (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
-        return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
-
-    def _tree_before(self, before: str) -> Any:
-        """Return the tree whose bracket is open right before a word."""
-        name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
-        term = self.scope.names.get(name.lstrip("()[]{},*^@+=-/"))
-        return None if term is None else term.tree
 
 
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from frametool.cli.trees import answers
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames.stamps import parse_stamp, parse_time
 from frametool.stream.faults import MOST, STOP, BadRows
+from frametool.text.numbers import parse_lengths, parse_share
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,15 +32,6 @@ def read_span(text: str) -> int:
     if found < 0:
         raise ValueInvalid(f"{shown(text)} is less than 0")
     return found
-
-
-def _read_share(text: str) -> float:
-    """Read `10%`, or a part of 1."""
-    found = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(%?)", text.strip())
-    share = float(found[1]) / (100 if found[2] else 1) if found else 2.0
-    if share > 1.0:
-        raise ValueInvalid(f"{shown(text)} is no share; write 10%, or 0.1")
-    return share
 
 
 def _read_offset(text: str) -> tuple[int | str, float | None]:
@@ -87,22 +78,12 @@ def _read_first(text: str) -> Delta:
     return parse_delta(f"{text}frames" if text.isdigit() else text, ("frames", "s", "m"))
 
 
-def _read_lengths(text: str) -> tuple[float, ...]:
-    try:
-        lengths = tuple(float(each.strip().removesuffix("m")) for each in text.split(","))
-    except ValueError:
-        lengths = ()
-    if not lengths or min(lengths) <= 0:
-        raise ValueInvalid(f"{shown(text)} are no lengths; write metres with commas: 100,200,400")
-    return lengths
-
-
 ALIGN = ("se3", "sim3", "yaw", "origin", "none")
 pairing_options = together(
     option("--match HOW", "interpolate or nearest  [default: interpolate]", ("interpolate", "nearest")),
     option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span, name="max_gap_ns"),
     option("--max-diff TIME", "of nearest stamps  [default: 10ms]", read_span, name="max_diff_ns"),
-    option("--min-match SHARE", "fewer partners are an error  [default: 10%]", _read_share),
+    option("--min-match SHARE", "fewer partners are an error  [default: 10%]", parse_share),
     option("--start TIME", "first pair, a stamp of REF; +5s is after the first", _read_limit, under="Time"),
     option("--end TIME", "last pair", _read_limit),
     option("--offset TIME|auto", "what EST's clock is behind; auto:LIMIT finds it", _read_offset),
@@ -114,9 +95,9 @@ pairing_options = together(
 error_options = together(
     option("--delta 1m,5deg,..", "of rpe: m, s, deg, frames  [default: 1m,10m,100m]", _read_deltas, name="deltas"),
     option("--all-pairs", "rpe from every pose, not in a chain"),
-    option("--tolerance SHARE", "of the delta of all pairs  [default: 10%]", _read_share, requires=("all_pairs",)),
+    option("--tolerance SHARE", "of the delta of all pairs  [default: 10%]", parse_share, requires=("all_pairs",)),
     option("--pairs-from WHICH", "reference or estimate  [default: reference]", ("reference", "estimate")),
-    option("--segments 100,200,..", "of kitti, metres  [default: 100,200,..,800]", _read_lengths),
+    option("--segments 100,200,..", "of kitti, metres  [default: 100,200,..,800]", parse_lengths),
     option("--segment-step N", "one from every N-th pair  [default: 10]", click.IntRange(1)),
     option("--as", "what evo does where nothing else is said", ("evo",), name="like"),
 )  # fmt: skip

@@ -37,10 +37,6 @@ LONGEST_REMEMBERED = 4096  # characters
 # the grammar's own, or a header; compiled when first needed
 _PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
 _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*):\s*\["  # of a table; the last: GTSAM, Gazebo
-_NO_JSON = r"\d\.(?=[\s,\]])|;"
-
-_ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"
-_LISTED_ROWS = rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)"
 
 
 def is_inline(text: str) -> bool:
@@ -104,10 +100,15 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
     if re.match(_PLAIN, head) and not re.match(_NO_HEADER, head):
         return None, stream
-    from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar
+    from frametool.grammar.pasted import begins_freely
+    from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar, may_be_pasted
 
-    given = None if request.operation.moves else request.given
-    if not _is_free(head, given, request):
+    moves, alone = request.operation.moves, request.poses == 1 and request.operation.keeps_position
+    given = None if moves else request.given
+    is_free = may_be_pasted(head) and begins_freely(head, given, moves=moves, alone=alone)
+    if is_free is None:
+        raise Misused("three rows of three numbers may be a rotation or positions; give --from matrix, or --in columns")
+    if not is_free:
         return None, stream
     data = stream.read(MOST_PASTED + 1)
     if len(data) > MOST_PASTED:
@@ -115,60 +116,6 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     source = Source(name, decode(data, name))
     found = in_grammar(source, given, normalize=request.normalize, points=request.operation.moves)
     return found, BufferedReader(BytesIO(data))
-
-
-def _is_free(head: str, given: Notation | None, request: Request) -> bool:
-    """Tell whether a beginning is none of a stream of rows or records that has a result."""
-    from frametool.ros.pasted_blocks import may_be_pasted
-
-    if not may_be_pasted(head):
-        return False
-    lines = [line.strip() for line in head.splitlines() if line.strip()]
-    first = lines[0]
-    if first[0] in "[({" and re.match(r"[\[\s]*[-+.\d]\S*\s*,", first):
-        return not request.operation.moves and (given is not None or _is_long(head) or bool(re.search(_NO_JSON, head)))
-    cells = first.split()
-    if not all(re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", cell) for cell in cells):
-        return True
-    if request.operation.moves:
-        return False
-    if _is_counted([line.split() for line in lines[:2]]):
-        return True
-    matrix = given is None or given.representation.whole is not None
-    if (len(cells), len(lines)) == (3, 3) and matrix:
-        return given is not None or _only_a_matrix(lines, request)
-    if matrix:
-        return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file of one pose
-    return len(cells) == 1 and len(lines) > 1
-
-
-def _is_counted(rows: list[list[str]]) -> bool:
-    """Tell the heading of a print of pandas, which counts its columns, before a row that begins with its own count."""
-    counts = [str(at) for at in range(len(rows[0]))]
-    return len(rows) > 1 and rows[0] == counts and rows[1][0] == "0" and len(rows[1]) == len(counts) + 1
-
-
-def _is_long(head: str) -> bool:
-    """Tell a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other from other lists."""
-    from frametool.grammar.pasted import ABB
-
-    found = re.match(r"\s*\[([^\[\]]*)\]", head)
-    is_long = found is not None and found[1].count(",") in (8, 11, 15)
-    return is_long or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None
-
-
-def _only_a_matrix(lines: list[str], request: Request) -> bool:
-    """Tell whether three rows of three numbers are a matrix, where positions alone would have no result.
-
-    Raises Misused where they may be either.
-    """
-    if request.poses == 1 and request.operation.keeps_position:
-        return True
-    from frametool.grammar.pasted import is_rotation
-
-    if not is_rotation([line.split() for line in lines]):
-        return False
-    raise Misused("three rows of three numbers may be a rotation or positions; give --from matrix, or --in columns")
 
 
 ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix

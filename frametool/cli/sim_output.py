@@ -21,13 +21,13 @@ from frametool.cli.options import FULL, Digits, file_with, suffix_of
 from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.documents.source import Source, decode, read_text
-from frametool.errors import FileProblem, FormatError, alternatives, shown
+from frametool.documents.source import Source, read_text
+from frametool.errors import FileProblem, alternatives, shown
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
 from frametool.grammar.result import Style
 from frametool.sim.drivers import LAWS, LEADERS, TARGETS, Mailbox, built_in, scripted
-from frametool.sim.readers import parse_seconds, parse_spawn, read_commands, read_script
+from frametool.sim.readers import lines_as_they_come, parse_seconds, parse_spawn, read_commands, read_script
 from frametool.sim.simulate import RunSummary, SimulationStep, simulate
 from frametool.sim.step_writer import EMITS, FORMS, StepWriter
 from frametool.sim.turtle import VARIANTS
@@ -229,34 +229,7 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
         raise FileProblem("standard input is closed")
     refuse(sys.stdin.isatty(), "standard input is a terminal; pipe commands in, or see frametool sim teleop")
     if not paced:
-        return scripted(read_commands(stdin_lines(), "stdin"))
+        return scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
     mailbox = Mailbox()
-    mailbox.fill_from(read_commands(stdin_lines(), "stdin", period_ns=0))
+    mailbox.fill_from(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin", period_ns=0))
     return lambda: mailbox
-
-
-def stdin_lines() -> Iterator[str]:
-    """Yield the lines of standard input as they arrive.
-
-    Raises FormatError for bytes that are no text.
-    """
-    stdin: Any = sys.stdin.buffer
-    for number, data in enumerate(_lines(stdin.raw)):
-        try:
-            yield decode(data, "stdin")
-        except FormatError as error:
-            error.line += number
-            raise
-
-
-def _lines(stream: Any) -> Iterator[bytes]:
-    """Read lines past the buffer of standard input: Python aborts when it ends while a thread waits inside that."""
-    begun: list[bytes] = []
-    while block := stream.read(1 << 16):
-        *whole, rest = block.split(b"\n")
-        for end in whole:
-            yield b"".join((*begun, end, b"\n"))
-            begun = []
-        begun.append(rest)
-    if any(begun):
-        yield b"".join(begun)

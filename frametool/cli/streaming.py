@@ -269,7 +269,8 @@ class Stream:
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
         no_room |= output.is_trajectory and output.style.place is not None
-        no_room |= not output.notations and is_turned(output.style.in_form(output.told or form))
+        turns = bool(output.style.axes) and not output.notations
+        no_room |= turns and is_turned(output.style.in_form(output.told or form))
         return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
 
     def _as_columns(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:

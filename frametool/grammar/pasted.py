@@ -44,6 +44,10 @@ _UNSUPPORTED: Sequence[tuple[str, str]] = (  # how prints begin that are recogni
     (r"\$*\s*\\(?:begin|left)\b", "LaTeX"),
     (r"[⎡⎛]|\w+\(\[\[(?:Float|Integer)\(", "SymPy"),
 )
+_NO_JSON = r"\d\.(?=[\s,\]])|;"
+
+_ROW = r"\[(?:[^\[\],]*,){%s}[^\[\],]*\]\s*,?\s*"
+_LISTED_ROWS = rf"\s*(?:\[\s*(?:{_ROW % 3}){{3}}\]|(?:{_ROW % '2,3'}){{3,4}}\Z)"
 _COLUMNS = r"(?m)^[ \t]*Columns? \d+(?: (?:through|and|to) \d+)?:?[ \t]*$"
 _DECORATIONS: Sequence[tuple[str, str]] = (
     (r"\x1b\[[\d;]*m", ""),  # colours of a terminal
@@ -441,3 +445,41 @@ def _entry(cells: Sequence[str], form: Notation) -> dict[str, Any]:
     form.bound_axes()
     entry = {f"{row.name}{unit}": spelled(form, list(cells[-size:]))}  # type: ignore[arg-type]
     return {"xyz": list(cells[:-size]), **entry} if len(cells) > size else entry
+
+
+def begins_freely(head: str, given: Notation | None, *, moves: bool, alone: bool) -> bool | None:
+    """Return True if a beginning is none of a stream of rows or records that has a result, None if it may be either.
+
+    moves: points are meant
+    alone: three numbers a row would have no result
+    """
+    lines = [line.strip() for line in head.splitlines() if line.strip()]
+    first = lines[0]
+    if first[0] in "[({" and re.match(r"[\[\s]*[-+.\d]\S*\s*,", first):
+        return not moves and (given is not None or _is_long(head) or bool(re.search(_NO_JSON, head)))
+    cells = first.split()
+    if not all(re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", cell) for cell in cells):
+        return True
+    if moves:
+        return False
+    if _is_counted([line.split() for line in lines[:2]]):
+        return True
+    matrix = given is None or given.representation.whole is not None
+    if (len(cells), len(lines)) == (3, 3) and matrix:
+        return given is not None or alone or (None if is_rotation([line.split() for line in lines]) else False)
+    if matrix:
+        return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file of one pose
+    return len(cells) == 1 and len(lines) > 1
+
+
+def _is_counted(rows: list[list[str]]) -> bool:
+    """Return True for a heading of pandas, which counts its columns, before a row that begins with its own count."""
+    counts = [str(at) for at in range(len(rows[0]))]
+    return len(rows) > 1 and rows[0] == counts and rows[1][0] == "0" and len(rows[1]) == len(counts) + 1
+
+
+def _is_long(head: str) -> bool:
+    """Return True for a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other."""
+    found = re.match(r"\s*\[([^\[\]]*)\]", head)
+    is_long = found is not None and found[1].count(",") in (8, 11, 15)
+    return is_long or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None

@@ -16,7 +16,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, parse_documents
-from frametool.documents.source import Source, error_at
+from frametool.documents.source import Source, decode, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
@@ -344,3 +344,26 @@ def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
         return read_number(value), 0.0
     numbers = read_numbers(value, AXES, partial=True)
     return numbers[first], numbers[second]
+
+
+def lines_as_they_come(stream: Any, name: str) -> Iterator[str]:
+    """Yield the lines of a stream as they arrive; raises FormatError for bytes that are no text."""
+    for number, data in enumerate(_lines(stream.raw)):
+        try:
+            yield decode(data, name)
+        except FormatError as error:
+            error.line += number
+            raise
+
+
+def _lines(stream: Any) -> Iterator[bytes]:
+    """Read lines past the buffer of standard input: Python aborts when it ends while a thread waits inside that."""
+    begun: list[bytes] = []
+    while block := stream.read(1 << 16):
+        *whole, rest = block.split(b"\n")
+        for end in whole:
+            yield b"".join((*begun, end, b"\n"))
+            begun = []
+        begun.append(rest)
+    if any(begun):
+        yield b"".join(begun)

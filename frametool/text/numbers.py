@@ -36,6 +36,7 @@ _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _BARE_STAR = r"[-+]? ?\*"
 _UNITS = {"deg": "deg", "°": "deg", "rad": "rad"}
 _LENGTH = rf"([-+]?{_DECIMAL}) ?(m|cm|mm|um)"
+MOST_FRACTIONS = 1_000_000  # of a range
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 
 
@@ -87,6 +88,44 @@ def parse_length(text: str) -> float:
     if not any(map(str.isdigit, text)):
         raise _refusal(text, explain_number(text))
     raise _refusal(text, f"{shown(text)} {_NO_LENGTH if reason in {_UNKNOWN, _UNIT, _ANGLE} else reason}")
+
+
+def parse_share(text: str) -> float:
+    """Read `10%`, or a part of 1."""
+    found = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(%?)", text.strip())
+    share = float(found[1]) / (100 if found[2] else 1) if found else 2.0
+    if share > 1.0:
+        raise ValueInvalid(f"{shown(text)} is no share; write 10%, or 0.1")
+    return share
+
+
+def parse_lengths(text: str) -> tuple[float, ...]:
+    """Read lengths in metres, with commas between them."""
+    try:
+        lengths = tuple(float(each.strip().removesuffix("m")) for each in text.split(","))
+    except ValueError:
+        lengths = ()
+    if not lengths or min(lengths) <= 0:
+        raise ValueInvalid(f"{shown(text)} are no lengths; write metres with commas: 100,200,400")
+    return lengths
+
+
+def parse_fractions(text: str) -> list[float]:
+    """Read a fraction, several between commas, or START:STOP:STEP, whose steps are those of decimals."""
+    if ":" not in text:
+        return [parse_number(each.strip()) for each in text.split(",")]
+    from decimal import Decimal
+
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise ValueInvalid(f"{shown(text)} is no range; a range is START:STOP:STEP, as 0:1:0.25")
+    start, stop, step = (Decimal(repr(parse_number(each.strip()))) for each in parts)
+    if step <= 0 or stop < start:
+        raise ValueInvalid(f"{shown(text)}: STEP must be positive and STOP not before START")
+    count = int((stop - start) / step) + 1
+    if count > MOST_FRACTIONS:
+        raise ValueInvalid(f"{shown(text)} has more than {MOST_FRACTIONS} fractions")
+    return [float(start + at * step) for at in range(count)]
 
 
 def number_or_none(text: str) -> float:

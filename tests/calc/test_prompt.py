@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from frametool.calc.evaluate import Scope
+from frametool.calc.functions import Completer
 from frametool.calc.values import TREE, Term, Type
-from frametool.cli.calc_input import Completer
 from frametool.formats.load import load
 
 if TYPE_CHECKING:

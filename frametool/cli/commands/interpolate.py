@@ -6,38 +6,17 @@ from frametool.cli.command import Inputs, argument, command_named, refuse
 from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.options import pose_result_options
 from frametool.cli.poses import combinations
-from frametool.errors import ValueInvalid, shown, warn
+from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.pose_algebra import interpolated, shared_stamp
 from frametool.grammar.result import Result
-from frametool.text.numbers import parse_number
-
-MOST = 1_000_000  # fractions of a range
-
-
-
-def fractions_of(text: str) -> list[float]:
-    """Read a fraction, several between commas, or START:STOP:STEP, whose steps are those of decimals."""
-    if ":" not in text:
-        return [parse_number(each.strip()) for each in text.split(",")]
-    from decimal import Decimal
-
-    parts = text.split(":")
-    if len(parts) != 3:
-        raise ValueInvalid(f"{shown(text)} is no range; a range is START:STOP:STEP, as 0:1:0.25")
-    start, stop, step = (Decimal(repr(parse_number(each.strip()))) for each in parts)
-    if step <= 0 or stop < start:
-        raise ValueInvalid(f"{shown(text)}: STEP must be positive and STOP not before START")
-    count = int((stop - start) / step) + 1
-    if count > MOST:
-        raise ValueInvalid(f"{shown(text)} has more than {MOST} fractions")
-    return [float(start + at * step) for at in range(count)]
+from frametool.text.numbers import parse_fractions
 
 
 @command_named("interpolate", own=("notations",))
 @argument("a")
 @argument("b")
-@argument("fractions", fractions_of, nargs=-1, required=True, metavar="FRACTION..")
+@argument("fractions", parse_fractions, nargs=-1, required=True, metavar="FRACTION..")
 @pose_result_options("poses")
 @EXPLAIN
 def command(inputs: Inputs) -> int:
