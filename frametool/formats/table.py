@@ -33,7 +33,8 @@ class Format(NamedTuple):
         holds one frame that moves; a `drawing`: who hangs under whom without poses, by `read`, for `tree` alone
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
         `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
-        are written alike, `ROWS` of `writer` (a RowForm) says how, in the place of `write_poses`; as messages of a
+        are written alike, `ROWS` of `writer` (a RowForm, or one for each format) says how, in the place of
+        `write_poses`; as messages of a
         `recording`, whose trees `tree_pieces` of `writer` yields
     magic: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
     conventions: what its numbers mean (which frame in which, units, order), told when such a file was read
@@ -110,6 +111,7 @@ _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
+_POSE_ROWS = "frametool.formats.rows.pose_rows"
 BAG = "frametool.recordings.messages"
 _RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -194,7 +196,7 @@ FORMATS = {
         magic=(("header", r"#|\s*\S+\s+\S"),), delimiter="",
     ),
     "tum": _trajectory(
-        "trajectory: t x y z qx qy qz qw", "frametool.formats.rows.tum", suffixes=(".tum",), reader=_TABLE,
+        "trajectory: t x y z qx qy qz qw", _POSE_ROWS, suffixes=(".tum",), reader=_TABLE,
         magic=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
         conventions="world<-body, seconds, metres, quaternion x y z w", required_options=("frames",), delimiter="",
         columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"), poses=Poses("xyzw", counted=""),
@@ -250,7 +252,7 @@ FORMATS = {
     ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(
-        "EuRoC ground truth", "frametool.formats.rows.euroc", reader=_TABLE,
+        "EuRoC ground truth", _POSE_ROWS, reader=_TABLE,
         magic=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
             ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
@@ -273,7 +275,7 @@ FORMATS = {
         magic=(("json path", "frames/transform_matrix"),), conventions="world<-camera; opengl (y up, z back)",
     ),
     "kitti": _trajectory(
-        "KITTI poses", "frametool.formats.rows.kitti", reader=_TABLE,
+        "KITTI poses", _POSE_ROWS, reader=_TABLE,
         magic=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),), conventions="world<-cam0, metres", delimiter="",
         columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"), widths=(12,),
         poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),

@@ -13,7 +13,7 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FormatError, ValueInvalid, warn
-from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, describe
+from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, describe, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
@@ -180,7 +180,7 @@ class FormatConverter:
 
     def _held(self, stamps_ns: Any, form: Poses) -> Any:
         """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""
-        rows = getattr(import_module(FORMATS[self.style.form].writer), "ROWS", None)
+        rows = rows_of(self.style.form)
         counts = bool(form.counted) and self.stamps is None
         has_room = not is_recording(self.style.form) and "stamps" in getattr(rows, "holds", ("stamps",))
         return stamps_ns if has_room or not counts else None

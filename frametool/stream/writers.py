@@ -26,6 +26,7 @@ from frametool.formats.rows.pose_rows import (
     field,
     image_name,
     is_turned,
+    rows_of,
     turned,
 )
 from frametool.formats.table import FORMATS
@@ -95,7 +96,7 @@ class TextWriter:
         self.style = style
         self.kind = kind
         module: Any = import_module(FORMATS[style.form].writer)
-        self.fixed: RowForm | None = getattr(module, "ROWS", None)
+        self.fixed = rows_of(style.form)
         name = "write_poses" if kind == POSE else "write_points"
         self.write: Callable[[Sequence[Any], Style], str] = getattr(module, name, _no_text)
         self.dropped_fields = None if self.fixed is None else DroppedFields(self.fixed, style)

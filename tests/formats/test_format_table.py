@@ -14,7 +14,7 @@ import yaml
 from frametool.errors import FormatError
 from frametool.formats.detect import by_sign, detect, of_folder
 from frametool.formats.load import load
-from frametool.formats.rows.pose_rows import RowForm
+from frametool.formats.rows.pose_rows import RowForm, rows_of
 from frametool.formats.table import FORMATS, Format, by_suffix, readers, writers
 from frametool.formats.unsupported import UNSUPPORTED
 
@@ -97,7 +97,7 @@ def test_a_row_names_modules_that_do_what_it_says(name: str) -> None:
         functions |= {"poses": "create", "points": "create"}
     for what in row.writes:
         module = import_module(row.writer)
-        by_rows = functions[what] == "write_poses" and isinstance(getattr(module, "ROWS", None), RowForm)
+        by_rows = functions[what] == "write_poses" and isinstance(rows_of(name), RowForm)
         assert by_rows or hasattr(module, functions[what])
     assert "arrays" not in row.reads or hasattr(import_module(row.reader), "open_columns")
     assert "tree" not in row.reads or hasattr(import_module(row.reader), "read")

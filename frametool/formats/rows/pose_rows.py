@@ -1,8 +1,6 @@
-"""How a form writes poses, one after the other: the text around the numbers of each, and what it cannot hold.
+"""How formats write poses, one after the other: the text around the numbers of each, and what they cannot hold.
 
-    RowForm(("seconds", b" ", Numbers(7, b" "), b"\\n"))                         a row of a TUM trajectory
-    1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0
-
+`("seconds", b" ", Numbers(7), b"\\n")` is a row of a TUM trajectory, 1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0.
 The table is filled in by `frametool.stream.writers`, for one pose and for a million.  Also what all files of poses of
 one thing that moves share when they are read, lines in, blocks of poses out: checked rotations, direction, axes of
 cameras, stamps, names of the two frames.
@@ -11,6 +9,7 @@ cameras, stamps, names of the two frames.
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -143,6 +142,23 @@ def rows_of_matrix(*pose: float) -> Components:
     tx, ty, tz, *turn = pose
     r = quaternion.to_matrix(*turn)
     return tuple(chain(r[0:3], [tx], r[3:6], [ty], r[6:9], [tz]))
+
+
+# TUM: seconds, metres, x y z w; EuRoC: CSV, nanoseconds, w first; KITTI: the first three rows of a 4x4, no time
+ROWS = {
+    "tum": RowForm(("seconds", b" ", Numbers(7), b"\n")),
+    "euroc": RowForm(
+        ("nanoseconds", b",", Numbers(7, b","), b"\n"), lambda tx, ty, tz, x, y, z, w: (tx, ty, tz, w, x, y, z),
+        head=",".join(FORMATS["euroc"].columns[:8]).encode() + b"\n",
+    ),
+    "kitti": RowForm((Numbers(12), b"\n"), rows_of_matrix, holds=()),
+}  # fmt: skip
+
+
+def rows_of(form: str) -> RowForm | None:
+    """Return how all poses are written in a format; None where each result has a text of its own."""
+    found = getattr(import_module(FORMATS[form].writer), "ROWS", None)
+    return found[form] if isinstance(found, dict) else found
 
 
 BLOCK = 1 << 12  # poses
