@@ -78,18 +78,19 @@ def _read_first(text: str) -> Delta:
     return parse_delta(f"{text}frames" if text.isdigit() else text, ("frames", "s", "m"))
 
 
-ALIGN = ("se3", "sim3", "yaw", "origin", "none")
+ALIGN = ("se3", "sim3", "yaw", "origin", "origin+scale", "none")
 pairing_options = together(
     option("--match HOW", "interpolate or nearest  [default: interpolate]", ("interpolate", "nearest")),
     option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span, name="max_gap_ns"),
     option("--max-diff TIME", "of nearest stamps  [default: 10ms]", read_span, name="max_diff_ns"),
     option("--min-match SHARE", "fewer partners are an error  [default: 10%]", parse_share),
     option("--start TIME", "first pair, a stamp of REF; +5s is after the first", _read_limit, under="Time"),
-    option("--end TIME", "last pair", _read_limit),
+    option("--stop TIME", "last pair", _read_limit, under="Time"),
     option("--offset TIME|auto", "what EST's clock is behind; auto:LIMIT finds it", _read_offset),
     option("--mount POSE|auto", "REF's body in EST's; also FILE:BODY:POINT"),
-    option("--align FIT", f"{', '.join(ALIGN)}  [default: se3]", ALIGN),
+    option("--align FIT", ", ".join(ALIGN).replace("se3", "se3 (default)", 1), ALIGN),
     option("--align-first N|10s|5m", "fit by the first pairs alone", _read_first),
+    option("--tie-first", "of se3, sim3, yaw: first position on first"),
     option("--up AXIS", "of REF's world: z, -y ..  [default: z]", _read_up),
 )  # fmt: skip
 error_options = together(

@@ -14,6 +14,8 @@ REPLACED = {
     "sim sweep": "`frametool.simulate_many` in Python tries many gains at once",
     "view --live": "the page plays what moves, `frametool view TREE --open`",
     "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
+    "compare --end": "--stop says the same",
+    "align --end": "--stop says the same",
     "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",
     "--explain-full": "--explain writes every product",
     "--array": 'NPZ is not read; one NPY for each array, `numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"])`',
@@ -24,7 +26,7 @@ def replacement(arguments: Sequence[str]) -> str | None:
     """Return the sentence on the first word of a command line that went; None where all are in use."""
     for before, word in pairwise(("", *arguments)):
         option, _, value = word.partition("=")
-        for name in (option, f"{option} {value}", f"{before} {word}", f"{arguments[0]} {word}"):
+        for name in (option, f"{option} {value}", f"{before} {word}", f"{arguments[0]} {option}"):
             if name in REPLACED:
                 return f"{name} is gone: {REPLACED[name]}"
     return None

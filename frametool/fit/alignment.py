@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
+SCALED = ("sim3", "origin+scale")
 FEWEST = 3  # pairs
 STILL = 1e-9  # rms, of 1 + the largest coordinate: what rounding moves
 THIN = 1e-5  # of the second axis over the first: a line
@@ -51,8 +52,15 @@ class Fit(NamedTuple):
         return est._replace(xyz=xyz, xyzw=np.stack((rotation @ est.rotation).components, -1))
 
 
-def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[str, str] = ("ref", "est")) -> Fit:
-    """Fit paired poses; raises Unaligned, with the name of the side, where they do not determine the alignment."""
+def fitted(
+    kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[str, str] = ("ref", "est"), *,
+    tied: bool = False,
+) -> Fit:
+    """Fit paired poses; raises Unaligned, with the name of the side, where they do not determine the alignment.
+
+    tied: the first position of the estimate comes to that of the reference
+    `origin+scale` takes the scale of sim3, then the first pose, as evo does with --correct_scale --align_origin.
+    """
     if kind == "none":
         return Fit(Transform.identity())
     if kind == "origin":
@@ -60,10 +68,13 @@ def fitted(kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[
             raise Unaligned("origin needs rotations of both; --align se3, yaw or none")
         return Fit(ref.poses[0] @ est.poses[0].inverse())  # the first pose of the estimate on that of the reference
     if kind == "yaw":
-        return _yaw(ref.xyz, est.xyz, up, names)
+        return _yaw(ref.xyz, est.xyz, up, names, tied=tied)
     for name, each in zip(names, (ref, est), strict=True):
         _require_plane(kind, each.xyz, name)
-    return umeyama(ref.xyz, est.xyz, with_scale=kind == "sim3")
+    found = umeyama(ref.xyz, est.xyz, with_scale=kind in SCALED, tied=tied)
+    if kind == "origin+scale":
+        return _origin(ref, est._replace(xyz=found.scale * est.xyz))._replace(scale=found.scale)
+    return found
 
 
 def principal_axes(xyz: Array) -> Array:
@@ -82,12 +93,14 @@ def _require_plane(kind: str, xyz: Array, name: str) -> None:
         raise Unaligned(f"{name} lies on a line: the turn about it is free; --align yaw, origin or none")
 
 
-def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool) -> Fit:
-    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991."""
+def umeyama(
+    ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool, tied: bool = False
+) -> Fit:
+    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991.  tied: among those with c R e_0 + t = r_0."""
     mass = np.ones(len(ref)) if weights is None else weights
-    ref_mean, est_mean = centre(ref, mass), centre(est, mass)
+    ref_mean, est_mean = (each[0] if tied else centre(each, mass) for each in (ref, est))
     r, e = ref - ref_mean, est - est_mean
-    e = e - centre(e, mass)  # what rounding left of the mean
+    e = e if tied else e - centre(e, mass)  # what rounding left of the mean
     rotation = align_vectors(e, mass[:, None] * r)
     scale = float((mass[:, None] * rotation.apply(e) * r).sum() / (mass[:, None] * e**2).sum()) if with_scale else 1.0
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
@@ -99,9 +112,9 @@ def centre(xyz: Array, mass: Array | None = None) -> Array:
     return found
 
 
-def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str]) -> Fit:
+def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str], *, tied: bool) -> Fit:
     """Minimise the same over turns about `up` alone."""
-    ref_mean, est_mean = centre(ref), centre(est)
+    ref_mean, est_mean = (each[0] if tied else centre(each) for each in (ref, est))
     r, e = ref - ref_mean, est - est_mean
     across = [each - np.outer(each @ up, up) for each in (r, e)]
     for name, each, whole in zip(names, across, (ref, est), strict=True):
@@ -148,7 +161,7 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
 
 def _tangents(kind: str, xyz: Array, up: Array) -> Array | None:
     """Return how the parameters of an alignment move positions: shifts, turns about x, y, z or up, and scale."""
-    if kind in ("none", "origin"):
+    if kind.startswith(("none", "origin")):
         return None
     centred = xyz - centre(xyz)
     axes = up[None] if kind == "yaw" else np.eye(3)
@@ -197,7 +210,7 @@ def interpolated(ref: Trajectory, est: Trajectory, max_gap_ns: float | None = No
     walked, dense = (est, ref) if walks_est else (ref, est)
     gap_ns = GAP * interval(dense.stamps_ns) if max_gap_ns is None else max_gap_ns
     made, has_partner = between(dense, walked.stamps_ns, gap_ns)
-    kept = walked.at(has_partner)
+    kept = walked if has_partner.all() else walked.at(has_partner)
     sides = (made, kept) if walks_est else (kept, made)
     possible = est.size if walks_est else _inside(ref.stamps_ns, est.stamps_ns)
     name = "ref" if walks_est else "est"

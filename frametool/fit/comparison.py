@@ -10,7 +10,17 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.fit import alignment as pairing
-from frametool.fit.alignment import ALIGNMENTS, LIMIT_S, Fit, Unaligned, clock_offset, fitted, lever_arm, principal_axes
+from frametool.fit.alignment import (
+    ALIGNMENTS,
+    LIMIT_S,
+    SCALED,
+    Fit,
+    Unaligned,
+    clock_offset,
+    fitted,
+    lever_arm,
+    principal_axes,
+)
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
@@ -78,11 +88,12 @@ class Settings(NamedTuple):
 
     match: "interpolate" or "nearest"; max_gap_ns, max_diff_ns, min_match (a share): what counts as a partner
     offset: nanoseconds that EST's clock is behind, or "auto" within offset_limit_s; None: none, but one may be told of
-    align, up: one of ALIGNMENTS, and the axis of yaw; align_first: the fit takes the pairs so far only
+    align, up: one of ALIGNMENTS or origin+scale, and the axis of yaw; align_first: the fit takes the pairs so far only;
+        tie_first: it puts the first position onto that of the reference
     mount: REF's body in EST's, or "auto"
     deltas: None for 1m, 10m and 100m as far as the path is long; all_pairs, tolerance, pairs_from: which poses
     segments: of KITTI, in metres, from every segment_step-th pair
-    start, end: (True, nanoseconds) after the first pair, or (False, a stamp on REF's clock)
+    start, stop: (True, nanoseconds) after the first pair, or (False, a stamp on REF's clock)
     evo: what evo does where nothing else is said, and its two more numbers
     """
 
@@ -94,6 +105,7 @@ class Settings(NamedTuple):
     offset_limit_s: float = LIMIT_S
     align: str = "se3"
     align_first: Delta | None = None
+    tie_first: bool = False
     mount: Transform | str | None = None
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     deltas: tuple[Delta, ...] | None = None
@@ -103,7 +115,7 @@ class Settings(NamedTuple):
     segments: tuple[float, ...] = SEGMENTS
     segment_step: int = 10
     start: tuple[bool, int] | None = None
-    end: tuple[bool, int] | None = None
+    stop: tuple[bool, int] | None = None
     evo: bool = False
 
 
@@ -165,7 +177,7 @@ def compare(
     pairs, mount = _mounted(_cut(pairs, settings), settings)
     up = np.array(settings.up)
     first = pairs.at(slice(_first(pairs, settings.align_first)))
-    fit = fitted(settings.align, first.ref, first.est, up, names)
+    fit = fitted(settings.align, first.ref, first.est, up, names, tied=settings.tie_first)
     moved = fit.moved(pairs.est)
     ate = absolute_errors(pairs.ref, moved, up)
     if settings.mount is None and not settings.evo:
@@ -223,7 +235,7 @@ def _paired(
         return pairing.by_number(ref, est), 0, None
     offset_ns, score = 0, None
     if settings.offset == AUTO:
-        kind = "sim3" if settings.align == "sim3" else "se3"
+        kind = "sim3" if settings.align in SCALED else "se3"
         by_turning = settings.mount == AUTO
         found = clock_offset(ref, est, limit_s=settings.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:
@@ -274,14 +286,14 @@ def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
 
 def _cut(pairs: Pairs, settings: Settings) -> Pairs:
     """Keep the pairs from the start to the end that are asked for, both inclusive."""
-    if settings.start is None and settings.end is None:
+    if settings.start is None and settings.stop is None:
         return pairs
     stamps = pairs.ref.stamps_ns
     if stamps is None:
-        raise ValueInvalid("poses that are counted have no times; leave --start and --end out")
+        raise ValueInvalid("poses that are counted have no times; leave --start and --stop out")
     begin, end = (
         default if limit is None else limit[1] + limit[0] * int(stamps[0])
-        for limit, default in ((settings.start, stamps[0]), (settings.end, stamps[-1]))
+        for limit, default in ((settings.start, stamps[0]), (settings.stop, stamps[-1]))
     )
     found = pairs.at((begin <= stamps) & (stamps <= end))
     if not found.ref.size:

@@ -233,6 +233,22 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
     raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
 
 
+def open_trajectory(path: str, chosen: Collection[str], tally: Tally) -> tuple[BufferedReader, str] | None:
+    """Open the poses of the one topic that is chosen, or that moves alone, as JSON lines; return it too.
+
+    None for other topics, and where nobody chose and transforms are there too.
+    """
+    with ExitStack() as opened:
+        reader = opened.enter_context(opened_recording(path, tally))
+        wanted = {topic.strip("/") for topic in chosen}
+        there = [each for each in reader.channels if not wanted or each.topic.strip("/") in wanted]
+        found = [each for each in there if each.type in POSES]
+        if len({each.topic for each in found}) != 1 or any(each.type in TYPES for each in there):
+            return None
+        pieces = filter(None, _pieces(reader, found))
+        return BufferedReader(Pieces(pieces, opened.pop_all())), found[0].topic
+
+
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
     """Yield each message, or each pose of a list, as a line, many together; an error comes behind the lines before."""
     held: list[bytes] = []

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import closing
 from operator import ge
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,21 +15,23 @@ import numpy as np
 
 from frametool.documents.source import InputFile
 from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
-from frametool.formats.detect import by_sign, detect
+from frametool.formats.detect import by_sign, detect, of_folder
 from frametool.formats.load import FrameFile, Rules, load_sources, opened_together
-from frametool.formats.table import FORMATS
+from frametool.formats.table import BAG, FORMATS, by_suffix
 from frametool.frames.stamps import FURTHEST_NS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
-from frametool.grammar.edges import Answers
+from frametool.grammar.edges import Answers, Names, Tally
 from frametool.grammar.names import in_nanoseconds, stamp_column, stamp_places
 from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.result import Result, Style
+from frametool.ros.messages import body_of
 from frametool.stream import stamp_columns
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.faults import BadRows
 from frametool.stream.header import listed
-from frametool.stream.record_results import stream_results
+from frametool.stream.record_results import stream_rows
 from frametool.stream.request import Operation, Request
+from frametool.stream.row_poses import RowPoses, block_of
 from frametool.stream.run import Outcome, run
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
@@ -40,11 +43,11 @@ if TYPE_CHECKING:
 
     from frametool.frames.buffer import TransformBuffer
     from frametool.grammar.edges import Report
-    from frametool.stream.row_poses import RowPoses
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
 
 POSITION = 3  # numbers
+RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # of a tree
 
 
@@ -88,6 +91,14 @@ def read_trajectory(
     name, inside = split_name(text)
     if len(inside) == 1:
         topics, inside = inside, []
+    if not inside and (form or by_suffix(name, RECORDINGS) or of_folder(name)) in RECORDINGS:
+        from frametool.recordings.messages import open_trajectory
+
+        if (found := open_trajectory(name, topics, Tally())) is not None:
+            bad = policy(name)
+            asked = Request(normalize=normalize, on_error=bad.on_error)
+            with closing(InputFile(name, found[0])) as file:
+                return _of_records(file, "json", bad, asked, body_of(found[1], answers))
     if os.path.isdir(name) or inside or topics:
         return _of_tree(name, form, topics, answers, inside, normalize=normalize)
     file = InputFile(name)
@@ -244,26 +255,31 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
 
 
-def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request) -> Trajectory:
-    """Gather records one by one: poses, or points, with their stamps."""
-    poses, stamps, named = [], [], set()
-    for each in stream_results(cast("ByteStream", file.stream), form, asked, Style("tum"), bad):
-        if not isinstance(each, Result) or each.pose.position is None:
-            raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
-        poses.append(each.pose)
-        stamps.append(each.extras.get("stamp_ns"))
-        named.add((each.pose.parent, each.pose.name))
-    if not poses:
+def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
+    """Gather records: poses, or points, with their stamps."""
+    blocks, named, turned = list[RowPoses](), set[tuple[str | None, str | None]](), True
+    for rows in stream_rows(cast("ByteStream", file.stream), form, asked, Style("tum"), bad):
+        found = rows.posed()
+        if found is None:
+            results = [each for each in rows.in_order() if isinstance(each, Result) and each.pose.position is not None]
+            if len(results) != len(rows.values) + sum(len(each.places) for each in rows.batches):
+                raise FormatError("a trajectory is made of poses, or of points with stamps", source=file.name)
+            turned &= all(each.pose.rotation is not None for each in results)
+            whole = (Result(each.pose._replace(rotation=each.pose.components[3:]), each.extras) for each in results)
+            found = block_of([*whole]) if results else None
+        if found is not None:
+            blocks.append(found)
+            named |= {*zip(found.for_each(found.parents), found.for_each(found.names), strict=True)}
+    if not blocks:
         raise FormatError("no poses in it", source=file.name)
-    if stamps.count(None) not in (0, len(stamps)):
+    stamps = [each.stamps_ns for each in blocks if each.stamps_ns is not None]
+    if len(stamps) not in (0, len(blocks)):
         raise FormatError("some poses have a stamp and some have none", source=file.name)
-    has_turns = all(pose.rotation is not None for pose in poses)
-    columns = np.array([pose.components for pose in poses])
+    columns = np.concatenate([each.numbers for each in blocks])
     parent, name = named.pop() if len(named) == 1 else (None, None)
-    times: Any = None if stamps[0] is None else np.array(stamps, np.int64)
-    return Trajectory(
-        times, columns[:, :POSITION], columns[:, POSITION:] if has_turns else None, parent or WORLD, name or BODY
-    )
+    times: Any = np.concatenate(stamps) if stamps else None
+    turns = columns[:, POSITION:] if turned else None
+    return Trajectory(times, columns[:, :POSITION], turns, Names().bare(parent or WORLD), name or body)
 
 
 def _of_tree(

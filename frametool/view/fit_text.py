@@ -271,7 +271,7 @@ def write_comparison(found: dict[str, Any]) -> str:
         place = ", ".join(f"{number:.6f}" for number in settings["mount"]["xyz"])
         lines.append(f"{'mount':<{width}}{place} m" + (f", turned by {turn:.3f} deg" if turn else ""))
     each = "  ".join(f"{kind} {_short(value)}" for kind, value in found["ate_by_alignment"].items())
-    lines += [f"{'fit ' + settings['align'] + '; ate m':<{width}}{each}"]
+    lines += [f"{'fit ' + settings['align'] + '; ate m ':<{width}}{each}"]
     indent = " " * LABEL
     folded = partial(fill, width=WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     lines = [*map(folded, lines)]

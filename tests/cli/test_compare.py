@@ -283,3 +283,59 @@ def test_text_fits_eighty_columns_whatever_files_are_called(run: Run, name: str)
     lines = run("compare", f"ref-{name}", name, files=files).out.splitlines()
     assert max(map(len, lines)) <= 80
     assert any(line.startswith(name) for line in lines)
+
+
+MONO = ("mono-ref.tum", "mono-est.tum")
+
+
+def test_origin_and_scale_are_those_of_evo(run: Run) -> None:
+    """evo 1.38.1: evo_ape tum mono-ref.tum mono-est.tum --correct_scale --align_origin."""
+    each = found(run, *MONO, "--align", "origin+scale", "--as", "evo")
+    assert each["ate"]["m"]["rmse"] == pytest.approx(0.03275968068181095, rel=1e-12)
+    assert each["transform"]["scale"] == pytest.approx(2.7023720167395764, rel=1e-12)
+    assert run("compare", *MONO, "--align", "origin+scale", files=FILES).out.splitlines()[2].startswith("fit origin+scale; ate m none ")
+    assert "needs rotations of both" in run("compare", "prism-ref.csv", "prism-est.tum", "--align", "origin+scale", files=FILES).err
+
+
+@pytest.mark.parametrize("align", ["se3", "sim3", "yaw"])
+def test_a_fit_with_the_first_position_tied_is_the_best_of_those_that_keep_it(run: Run, align: str) -> None:
+    from scipy.optimize import minimize
+    from scipy.spatial.transform import Rotation
+
+    arguments = ("compare", *MONO, "--align", align, "--tie-first", "--rows")
+    done = run(*arguments, "-f", "json", files=FILES)
+    errors = [json.loads(line)["ate_m"] for line in done.out.splitlines()]
+    assert errors[0] == pytest.approx(0.0, abs=1e-9)
+    ref, est = (frametool.load_trajectory(GOLDEN / name) for name in MONO)
+    pairs = frametool.resample(ref, at=est.stamps_ns)
+    r, e = (each.xyz - each.xyz[0] for each in (pairs, est))
+
+    def cost(x: Any) -> Any:
+        turn = Rotation.from_rotvec([0, 0, x[0]] if align == "yaw" else x[:3])
+        return ((turn.apply(e) * (np.exp(x[3]) if align == "sim3" else 1.0) - r) ** 2).sum()
+
+    entry = found(run, *MONO, "--align", align, "--tie-first")["transform"]
+    turn = Rotation.from_quat([*entry["quaternion"].values()]).as_rotvec()
+    start = [turn[2], 0, 0, 0] if align == "yaw" else [*turn, np.log(entry.get("scale", 1.0))]
+    best = minimize(cost, np.array(start) + 1e-3, tol=1e-14).fun
+    assert sum(error**2 for error in errors) == pytest.approx(best, rel=1e-6)
+
+
+def test_the_span_has_the_same_options_everywhere(run: Run) -> None:
+    first = frametool.load_trajectory(GOLDEN / DRONE[0]).stamps_ns[0] / 1e9
+    span = ("--start", f"{first + 2:.6f}", "--stop", f"{first + 3:.6f}")
+    for command in (("compare", *DRONE, "--rows"), ("resample", DRONE[0], "--rate", "20")):
+        lines = run(*command, *span, "-f", "json", files=FILES).out.splitlines()
+        rows = [json.loads(line)["stamp_ns"] / 1e9 for line in lines]
+        assert (len(rows) > 10, min(rows) >= first + 2 - 1e-6, max(rows) <= first + 3 + 1e-6) == (True, True, True)
+    assert "compare --end is gone: --stop says the same" in run("compare", *DRONE, "--end", "5", files=FILES).err
+    assert run("resample", "kitti-ref.txt", "--every", "1m", *span, files=FILES).status == 2
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "bag"])
+def test_a_recording_with_one_trajectory_is_that_trajectory(run: Run, tmp_path: Path, suffix: str) -> None:
+    pytest.importorskip("rosbags")
+    bag = str(tmp_path / f"ref.{suffix}")
+    assert run("convert", "-i", DRONE[0], "-o", bag, files=FILES).status == 0
+    wanted = found(run, *DRONE)["ate"]
+    assert found(run, bag, DRONE[1])["ate"] == found(run, f"{bag}:/pose", DRONE[1])["ate"] == wanted

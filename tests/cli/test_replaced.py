@@ -22,6 +22,8 @@ TYPED = {
     "--explain latex": "convert --from rpy 0 0 1 --explain=latex",
     "--tf2": "lookup robot.yaml map base_link --tf2 ros1",
     "--explain-full": "convert --explain-full --from rpy 0 0 1",
+    "compare --end": "compare --end 5 a.tum b.tum",
+    "align --end": "align --end=5 a.tum b.tum",
     "--array": "convert -i poses.npz --array xyz",
 }
 

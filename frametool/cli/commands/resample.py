@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import forms_of, parse_every, read_span, trajectory, trajectory_options, write_trajectory
-from frametool.cli.options import offset_option, read_times, reading_options, result_options, rotation_options
+from frametool.cli.options import (
+    limit_options,
+    read_times,
+    reading_options,
+    result_options,
+    rotation_options,
+    window_of,
+)
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, warn
@@ -27,7 +34,7 @@ if TYPE_CHECKING:
 @option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span,
     name="max_gap_ns")  # fmt: skip
 @trajectory_options
-@offset_option
+@limit_options
 @reading_options()
 @rotation_options
 @result_options("poses")
@@ -55,6 +62,9 @@ def command(inputs: Inputs) -> int:
         refuse(every is None, f"{name} has no stamps; give them with --stamps FILE")
         found = found.numbered()
     stamps = stamps_at_rate(found, rate) if rate else stamps_every(found, every) if every else _stamps(times or "")
+    if not counted and (window := window_of(inputs)):
+        inputs.ask("start", "stop")
+        stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
     made = resampled(found, stamps, inputs.max_gap_ns)
     if lost := len(stamps) - made.size:
         say(f"note: {lost} of {len(stamps)} moments are beyond the ends of {name}, or in a gap: no pose")
