@@ -73,7 +73,7 @@ def fitted(
         _require_plane(kind, each.xyz, name)
     found = umeyama(ref.xyz, est.xyz, with_scale=kind in SCALED, tied=tied)
     if kind == "origin+scale":
-        return _origin(ref, est._replace(xyz=found.scale * est.xyz))._replace(scale=found.scale)
+        return fitted("origin", ref, est._replace(xyz=found.scale * est.xyz), up)._replace(scale=found.scale)
     return found
 
 
