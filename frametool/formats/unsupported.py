@@ -51,8 +51,7 @@ UNSUPPORTED = {
     "srdf": Unsupported(
         "SRDF, the semantics of a robot",
         "give values of joints, --joints FILE with {JOINT: VALUE}; a virtual joint is an edge of a tree",
-        (("xml text", rf"\A<robot\b[^<>]*>\s*<(?:{_SRDF})\b"),),
-        (".srdf",),
+        (("xml text", rf"\A<robot\b[^<>]*>\s*<(?:{_SRDF})\b"),), (".srdf",),
     ),
     "open3d": Unsupported(
         "Open3D camera trajectory",
@@ -67,16 +66,12 @@ UNSUPPORTED = {
     "npz": Unsupported(
         "NPZ of numpy, several arrays in a zip file",
         'use one NPY for each array (numpy.save("NEW.npy", numpy.load("OLD.npz")["NAME"]))',
-        (("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),),
-        (".npz",),
-        was_written=True,
+        (("magic", rb"PK\x03\x04.{26}[^\0/]{1,200}?\.npy"),), (".npz",), was_written=True,
     ),
     "arrows": Unsupported(
         "a stream of Arrow",
         "use a file of Arrow (arrow): pyarrow.feather.write_feather(pyarrow.ipc.open_stream(SOURCE).read_all(), NEW)",
-        (("magic", rb"\xff\xff\xff\xff..\0\0"),),
-        (".arrows",),
-        was_written=True,
+        (("magic", rb"\xff\xff\xff\xff..\0\0"),), (".arrows",), was_written=True,
     ),
     "colmap-bin": Unsupported(
         "COLMAP images.bin",
@@ -85,12 +80,10 @@ UNSUPPORTED = {
     ),
     "feather1": Unsupported(
         "Feather of the first version",
-        "write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)",
-        (("magic", rb"FEA1"),),
+        "write it anew: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), NEW)", (("magic", rb"FEA1"),),
     ),
     "xacro": Unsupported(
-        "xacro, from which URDF is made",
-        "expand it: xacro FILE > robot.urdf (pip install xacro)",
+        "xacro, from which URDF is made", "expand it: xacro FILE > robot.urdf (pip install xacro)",
         (  # launch files have the same substitutions
             ("xml text", r"(?s)\A(?!<launch\b).*?(?:<xacro:\w|\$\{|\$\((?:arg|find|eval|env|optenv|dirname)\b)"),
         ),
@@ -102,8 +95,7 @@ UNSUPPORTED = {
         (("yaml key", "kinematics"),),
     ),
     "camera_info": Unsupported(
-        "camera_info, the intrinsics of a camera",
-        "there is no pose in it; its frame stands in the tree of the robot",
+        "camera_info, the intrinsics of a camera", "there is no pose in it; its frame stands in the tree of the robot",
         (("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
     ),
     "intrinsics": Unsupported(
@@ -127,28 +119,21 @@ UNSUPPORTED = {
         (("yaml key", "occupied_thresh"),),
     ),
     "usd": Unsupported(
-        "a USD scene",
-        "its units and axes differ from file to file; export URDF, or the poses as JSON",
-        (("magic", rb"#usda |PXR-USDC"),),
-        (".usd", ".usda", ".usdc", ".usdz"),
+        "a USD scene", "its units and axes differ from file to file; export URDF, or the poses as JSON",
+        (("magic", rb"#usda |PXR-USDC"),), (".usd", ".usda", ".usdc", ".usdz"),
     ),
     "gltf": Unsupported(
-        "a glTF scene",
-        "glTF has y up and z forward; export URDF, or the poses as JSON",
-        (("magic", rb"glTF"), ("json path", "asset/version")),
-        (".gltf", ".glb"),
+        "a glTF scene", "glTF has y up and z forward; export URDF, or the poses as JSON",
+        (("magic", rb"glTF"), ("json path", "asset/version")), (".gltf", ".glb"),
     ),
     "unity": Unsupported(
-        "a Unity scene",
-        "Unity is left-handed with y up; export poses as JSON and convert them",
-        (("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),),
-        (".unity", ".prefab"),
+        "a Unity scene", "Unity is left-handed with y up; export poses as JSON and convert them",
+        (("magic", rb"%YAML 1\.1\r?\n%TAG !u! tag:unity3d"),), (".unity", ".prefab"),
     ),
     "itk": Unsupported(
         "an ITK or ANTs transform",
         "it maps points about a centre in LPS axes, in mm; convert it to a 4x4 matrix first",
-        (("magic", rb"#Insight Transform File"),),
-        (".tfm",),
+        (("magic", rb"#Insight Transform File"),), (".tfm",),
     ),
 }
 
