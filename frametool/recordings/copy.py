@@ -150,7 +150,10 @@ class RecordedEdges:
             (found.same if same else found.replaced).append(edge)
         if found.replaced and not replace:
             raise BadTopology(self._others(found.replaced, tree.name), rule="two-poses")
-        self._refuse_cycles(found.added)
+        parents = {child: [*edge.parents][-1] for child, edge in self.known.items()}
+        parents |= {edge.child: edge.parent for edge in found.added}
+        for edge in found.added:
+            to_root(edge.child, parents.get)  # raises where one hangs a frame below itself
         return found
 
     def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
@@ -174,13 +177,6 @@ class RecordedEdges:
             told.append(f"{edge} on {first_of([*known.topics], MOST_NAMED)} ({off})")
         what = first_of(told, MOST_NAMED)
         return f"{self.name}: other values than in {bare(tree)}: {what}; --replace puts those of {bare(tree)} in"
-
-    def _refuse_cycles(self, added: list[AddedEdge]) -> None:
-        """Raise BadTopology where edges that are added hang a frame below itself."""
-        parents = {child: [*edge.parents][-1] for child, edge in self.known.items()}
-        parents |= {edge.child: edge.parent for edge in added}
-        for edge in added:
-            to_root(edge.child, parents.get)
 
 
 def is_same(a: Rigid, b: Rigid) -> bool:
@@ -379,18 +375,15 @@ class RecordCopy:
             file.add(Message(channel, self.first_ns or 0, data, self.first_ns or 0))
         file.begin(self.reader.all)
         for message in self._messages(advance):
-            if self._keeps(message):
-                self._copy(message, file)
+            if not self._keeps(message):
+                continue
+            change = self.change.get(message.channel)
+            copied = message.data if change is None else change(message.data)
+            if copied is not None:
+                file.add(message if copied is message.data else message._replace(data=copied))
         with broken(self.reader.path):
             said = self._others(file)
             yield from file.pieces(said or self.reader.metadata, itself=said is not None)
-
-    def _copy(self, message: Message, file: RecordingFile) -> None:
-        """Copy a message as it is, or changed, or not at all."""
-        change = self.change.get(message.channel)
-        data = message.data if change is None else change(message.data)
-        if data is not None:
-            file.add(message if data is message.data else message._replace(data=data))
 
     def _others(self, file: RecordingFile) -> dict[str, Any] | None:
         """Copy attachments and metadata of MCAP; return what rosbag2 says of it there, or None."""

@@ -390,7 +390,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
     """Return the channels with transforms, and those chosen that hold poses; raises FormatError without any."""
     reader.refuse_foreign(options.topics.chosen)
-    found = [each for each in reader.channels if _is_read(each, options)]
+    chosen = options.topics.chooses
+    found = [each for each in reader.channels if each.type in TYPES or (each.type in POSES and chosen(each.topic))]
     options.topics.seen |= {each.topic for each in reader.channels}
     for other in reader.channels:
         if other not in found and other.topic.rpartition("/")[2] in ("tf", "tf_static"):
@@ -404,11 +405,6 @@ def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
         what = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
         raise FormatError(what, source=reader.path)
     return found
-
-
-def _is_read(channel: Channel, options: Options) -> bool:
-    """Return True for a channel that holds transforms, or was chosen and holds poses."""
-    return channel.type in TYPES or (channel.type in POSES and options.topics.chooses(channel.topic))
 
 
 def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options: Options) -> Iterator[Edge]:
@@ -439,7 +435,9 @@ def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: s
     parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
     components = unit_components(said.numbers, number, tally, options.normalize)
     if components is None or not parent or not child:
-        problem = _complaint(parent, child, said.numbers, normalize=options.normalize)
+        problem = ValueInvalid("its position is not finite", rule="not-finite")
+        problem = quaternion.complaint(*said.numbers[3:], normalize=options.normalize) or problem
+        problem = problem if parent and child else ValueInvalid("an empty frame name")
         edge = f"{shown(parent)} -> {shown(child)}"
         raise FormatError(f"message {number}: {edge}: {problem}", source=path, rule=problem.rule)
     if misfit := stamp_problem(*said.stamp, STAMPS[0]):
@@ -450,9 +448,3 @@ def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: s
     return Edge(parent, child, components, stamp_ns, number, received_ns, topic=topic)
 
 
-def _complaint(parent: str, child: str, numbers: tuple[float, ...], *, normalize: bool) -> ValueInvalid:
-    """Say what is wrong with a transform that was refused."""
-    if not parent or not child:
-        return ValueInvalid("an empty frame name")
-    problem = quaternion.complaint(*numbers[3:], normalize=normalize)
-    return problem or ValueInvalid("its position is not finite", rule="not-finite")

@@ -101,18 +101,12 @@ def stamp(stamp_ns: int, form: str) -> dict[str, int]:
 
 def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
     """Put a point or vector into its message; leave alone what has a header or is another message."""
-    if not MESSAGE_KEYS.isdisjoint(record) or not (position := _position(record)):
-        return record
-    key = "vector" if "vector" in record else "point"
-    return {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: position}
-
-
-def _position(record: dict[str, Any]) -> dict[str, float] | None:
-    """Find the coordinates of a point in any of its spellings."""
     inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
     values: list[Any] = inner if isinstance(inner, list) else [inner.get(axis) for axis in "xyz"]
-    is_point = len(values) == 3 and all(type(each) is float for each in values)
-    return dict(zip("xyz", values, strict=True)) if is_point else None
+    if not MESSAGE_KEYS.isdisjoint(record) or len(values) != 3 or any(type(each) is not float for each in values):
+        return record
+    key, position = "vector" if "vector" in record else "point", dict(zip("xyz", values, strict=True))
+    return {"header": header(record.get("frame"), record.get("stamp_ns"), style), key: position}
 
 
 def _ros2_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:

@@ -455,7 +455,10 @@ class Matrices:
             found = grid.size if grid else kind(value)
             raise Misfit(f"{bare(key)}: expected a 4 x 4 or 3 x 4 matrix, found {found}", path)
         if whole is None or (not says and no_pose(key)):
-            self._leave(path, value, grid)
+            is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
+            if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
+                what = no_pose(str(path[-1]))
+                self.left.append(f"{bare(dotted(path))} ({what})" if what else bare(dotted(path)))
             return None
         if isinstance(meaning, Ambiguous):
             ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
@@ -522,13 +525,6 @@ class Matrices:
             meaning = directed(f"{key} and {pair.translation}", path, parent, child, self.answers)
         rotation = within(path, read_turn, turn, self.reading)
         return Stated(*meaning[:3], (*within(place, read_shift, shift), *rotation), path)
-
-    def _leave(self, path: Path, value: Any, grid: Grid | None) -> None:
-        """Keep the name of a matrix that is no pose."""
-        is_matrix = grid is not None and (grid.rows > 1 or type(value) is dict)
-        if is_matrix or (type(value) is dict and value.get(TAG) in TAGS):
-            what = no_pose(str(path[-1]))
-            self.left.append(f"{bare(dotted(path))} ({what})" if what else bare(dotted(path)))
 
 
 def _before(blocks: Sequence[MatrixBlock]) -> dict[Path, str]:

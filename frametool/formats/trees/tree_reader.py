@@ -256,16 +256,11 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
     for message, here in messages.messages(value, path):
         reading.here = here
         try:
-            yield _message(message, here, reading)
+            parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
+            yield Edge(parent, child, (*position, *rotation), stamp_ns, path=here)
         except Misfit as misfit:
             reading.refuse(misfit.below(*here))
         message.clear()  # a million of them need no room beside their edges
-
-
-def _message(message: dict[str, Any], path: Path, reading: Reading) -> Edge:
-    """Read one TransformStamped."""
-    parent, child, position, rotation, stamp_ns = messages.read_transform(message, reading)
-    return Edge(parent, child, (*position, *rotation), stamp_ns, path=path)
 
 
 def read_samples(
