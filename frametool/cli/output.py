@@ -19,16 +19,7 @@ from frametool.cli.options import FULL
 from frametool.cli.sink import filling, is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
-from frametool.formats.table import (
-    FORMATS,
-    by_name,
-    has_no_text,
-    holds_arrays,
-    is_folder,
-    is_recording,
-    is_trajectory,
-    writers,
-)
+from frametool.formats import table
 from frametool.geometry.representations import EARTH_FRAMES, Notation, notation
 from frametool.grammar.result import Result, Style, is_locked, sample_results
 
@@ -47,7 +38,7 @@ if TYPE_CHECKING:
     from frametool.stream.row_poses import RowPoses
 
 BATCH = 256  # poses
-WITH_PLACES = ("text", "yaml", "json", "csv", *writers("recording"))
+WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
 BLOCK = 1 << 13  # poses of a trajectory
 
 
@@ -69,7 +60,7 @@ class Output:
 
             refuse_suffix(self.path)
         self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
-        self.told = told or (by_name(self.path, writers(*what)) if self.path is not None else None)
+        self.told = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
         if inputs.peek("origin") is not None or any(each.representation.is_place for each in notations):
             from frametool.cli.earth import places_of
@@ -78,9 +69,9 @@ class Output:
         self.notations: tuple[Notation, ...] = notations
         self._form_is_default = not (self.told or otherwise)
         form = self.told or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
-        self._holds_arrays = holds_arrays(form)
-        self.is_trajectory = is_trajectory(form)  # of the poses of one frame over time
-        self._in_blocks = self.is_trajectory or self._holds_arrays or is_recording(form)
+        self._holds_arrays = table.holds_arrays(form)
+        self.is_trajectory = table.is_trajectory(form)  # of the poses of one frame over time
+        self._in_blocks = self.is_trajectory or self._holds_arrays or table.is_recording(form)
         self.holds_all = self._in_blocks or form == "csv"  # rows, of which there may be many
         if self._holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
@@ -92,7 +83,7 @@ class Output:
             keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
         self.style.put_at(place)
-        if is_recording(form):
+        if table.is_recording(form):
             from frametool.cli.recording import recorded
 
             self.style.recording = recorded(inputs, form, self.path)
@@ -108,7 +99,8 @@ class Output:
         stated = self._inputs.peek("camera_axes") or ""
         self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style.in_camera = operation is not None and operation.looks_back
-        if stated and self.style.axes and self.style.form in FORMATS and FORMATS[self.style.form].poses.axes:
+        row = table.FORMATS.get(self.style.form)
+        if stated and self.style.axes and row and row.poses.axes:
             self._inputs.forms_read = (*self._inputs.forms_read, ("", ("camera_axes",)))
 
     def take_axes_in(self, tree: Frames, source: str) -> None:
@@ -255,7 +247,7 @@ class Output:
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.form}; -f text shows its frames")
         if tree.covariances and self.style.form not in ("yaml", "json", "text"):
             warn(f"{self.style.form}: covariances left out")
-        if is_recording(self.style.form):
+        if table.is_recording(self.style.form):
             self.pieces(self._module("").tree_pieces(tree, self.style))
             return
         holds_samples = "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
@@ -265,7 +257,7 @@ class Output:
             self.values(sample_results(tree))
             return
         if self.style.form != "text":
-            if loses := FORMATS[self.style.form].not_stored:
+            if loses := table.FORMATS[self.style.form].not_stored:
                 say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return
@@ -284,7 +276,7 @@ class Output:
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points; for a person one a line, but what has more than three numbers as a mapping."""
         found = list(records)
-        if self.style.form in FORMATS and "points" not in self._writes:
+        if self.style.form in table.FORMATS and "points" not in self._writes:
             raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
         if self._in_blocks:
             self.pieces(self._blocks(_batched(iter(found))))
@@ -292,7 +284,7 @@ class Output:
         placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
         self._tell_dropped(key for each in placed for key in each)
         is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in found)
-        text_module = "frametool.view.pose_text" if is_plain else FORMATS["yaml"].writer
+        text_module = "frametool.view.pose_text" if is_plain else table.FORMATS["yaml"].writer
         self.text(self._module(text_module).write_points(found, self.style))
 
     def report(self, entries: Sequence[dict[str, Any]]) -> None:
@@ -307,15 +299,15 @@ class Output:
 
     @property
     def _writes(self) -> tuple[str, ...]:
-        return FORMATS[self.style.form].writes if self.style.form in FORMATS else ()
+        return table.FORMATS[self.style.form].writes if self.style.form in table.FORMATS else ()
 
     def _module(self, text_module: str) -> Any:
-        return import_module(FORMATS[self.style.form].writer if self.style.form in FORMATS else text_module)
+        return import_module(table.FORMATS[self.style.form].writer if self.style.form in table.FORMATS else text_module)
 
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
         is_plain = self.style.form == "text"
-        if not has_no_text(self.style.form):
+        if not table.has_no_text(self.style.form):
             self._inputs.ask("precision")
         with self.opened() as write:
             for piece in pieces:
@@ -383,4 +375,4 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
 
 def opened_place(form: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
     """Open the place where results of a form go."""
-    return filling(path, force=force) if is_folder(form) and path is not None else writing(path, force=force)
+    return filling(path, force=force) if table.is_folder(form) and path is not None else writing(path, force=force)

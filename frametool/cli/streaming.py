@@ -10,17 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli import options
 from frametool.cli.command import Inputs, option, refuse, together
-from frametool.cli.options import (
-    STREAMED,
-    UTF8,
-    ColumnNames,
-    Notations,
-    in_option,
-    input_forms,
-    say_if_verbose,
-    verbose_option,
-)
 from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD, Source, has_line, has_record
 from frametool.errors import FileProblem, FormatError
@@ -37,17 +28,17 @@ if TYPE_CHECKING:
     About = Callable[[], str] | None  # what else there is to say of a form
 
 BAGS = (".bag", ".mcap", ".db3")
-_STREAMS = ", ".join(readers(*STREAMED))
+_STREAMS = ", ".join(readers(*options.STREAMED))
 RECORDS = readers("records")
 
 
 _of_rows = partial(option, under="Rows")
 _ROWS = (
-    option("--from REP", "what unnamed numbers are", Notations(), name="given", under="Rotations"),
+    option("--from REP", "what unnamed numbers are", options.Notations(), name="given", under="Rotations"),
     _of_rows("--columns NAME,..", "our columns, by name or number, once for each pose; one key of records, a.b",
-             ColumnNames(), multiple=True),
+             options.ColumnNames(), multiple=True),
     _of_rows("--keep", "add the result's columns, leave ours"),
-    _of_rows("--prefix TEXT", "begin the names of the result's columns so", UTF8, default=""),
+    _of_rows("--prefix TEXT", "begin the names of the result's columns so", options.UTF8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
     _of_rows("--max-errors N", "report at most N bad rows, count all", click.IntRange(0), default=MOST),
     _of_rows("--no-header", "a table without names; columns are numbered", name="header",
@@ -61,7 +52,7 @@ SEVERAL = _of_rows("-i --input FILE", _SEVERAL, name="input_path", multiple=True
 
 def stream_options(function: Any, first: Any = _INPUT) -> Any:
     """Add to a command the options of streams; `Stream` takes them.  first: the option for the input."""
-    return together(first, in_option, *_ROWS, verbose_option)(function)
+    return together(first, options.in_option, *_ROWS, options.verbose_option)(function)
 
 
 class Stream:
@@ -176,7 +167,7 @@ class Stream:
 
     def told_form(self) -> str:
         """Return the form that --in names for the stream, "" if it names none."""
-        others, form = input_forms(streams=True)
+        others, form = options.input_forms(streams=True)
         if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {form}: there is one stream"
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
@@ -249,9 +240,9 @@ class Stream:
         """Find the form of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        form, known_by = detect(begin, *STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
+        form, known_by = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
         if known_by and not quiet:
-            say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
+            options.say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
         return form
 
     def _way(self, form: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
@@ -409,7 +400,7 @@ def _signed(begin: bytes, name: str) -> str:
     """Return the form that a stream shows, if it is no single row of a pose, which may have been pasted."""
     from frametool.formats.detect import by_sign
 
-    form = by_sign(begin, *STREAMED, name=name) or ""
+    form = by_sign(begin, *options.STREAMED, name=name) or ""
     return "" if form == "kitti" else form
 
 
@@ -434,6 +425,6 @@ def _form_of(path: str) -> str:
 
     try:
         with open(path, "rb") as file:
-            return detect(file.read(HEAD), *STREAMED, name=path)[0]
+            return detect(file.read(HEAD), *options.STREAMED, name=path)[0]
     except (OSError, ValueError):
         return ""

@@ -8,20 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from frametool.cli import options
 from frametool.cli.cloud_files import SeveralClouds, clouds_of
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
-from frametool.cli.options import (
-    TIME,
-    ColumnNames,
-    at_ns,
-    offset_option,
-    pose_result_options,
-    reading_options,
-    rules,
-    rules_options,
-    scale_option,
-)
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
 from frametool.cli.streaming import SEVERAL, stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, tell_granted
@@ -51,16 +41,16 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @option("--as KIND", "point, vector, pose, twist, wrench; once a --columns", CHOICES, name="kinds", multiple=True)
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
 @partial(stream_options, first=SEVERAL)
-@pose_result_options("points", "trajectory")
+@options.pose_result_options("points", "trajectory")
 @option("--covariance", "also that of the tree's edges, or of --transform", excludes=("explain",))
-@scale_option
+@options.scale_option
 @EXPLAIN
-@option("--frame-column NAME", "column with each row's frame, without SOURCE", ColumnNames())
-@option("--time-column NAME", "column or key of each row's own time", ColumnNames(), excludes=("at",))
-@option("--at TIME", "move all at this time  [default: latest]", TIME)
-@rules_options
-@offset_option
-@reading_options(streams=True)
+@option("--frame-column NAME", "column with each row's frame, without SOURCE", options.ColumnNames())
+@option("--time-column NAME", "column or key of each row's own time", options.ColumnNames(), excludes=("at",))
+@option("--at TIME", "move all at this time  [default: latest]", options.TIME)
+@options.rules_options
+@options.offset_option
+@options.reading_options(streams=True)
 def command(inputs: Inputs) -> int:
     """Move points, vectors and poses from SOURCE into TARGET.
 
@@ -189,7 +179,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
     is_named = len(arguments) > 2 and not is_record(arguments[2]) and not (numbers and begins_number(arguments[2]))
     named = arguments[2:3] if is_named else ()
     rest = arguments[2 + len(named) :]
-    tree = load_tree(arguments[0], inputs.more, rules(inputs), streams=rest in ((), ("-",)))
+    tree = load_tree(arguments[0], inputs.more, options.rules(inputs), streams=rest in ((), ("-",)))
     lookups = lookups_in(tree, carried=uncertain)
     target, *sources = (frame_name(each, tree) for each in (arguments[1], *named))
     source = next(iter(sources), None)
@@ -207,7 +197,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
         return settled
 
     def from_frame(own: str | None, own_ns: int | None) -> Components:
-        return lookups.one(target, start(own), own_ns if chosen is None else at_ns(chosen))
+        return lookups.one(target, start(own), own_ns if chosen is None else options.at_ns(chosen))
 
     def at_times(own: str | None, times_ns: Any) -> Components:
         return lookups.many(target, start(own), times_ns)
@@ -221,7 +211,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
     def explained() -> ByTree:
         from frametool.explain.derive import ByTree
 
-        return ByTree(tree, target, source, at_ns(chosen))
+        return ByTree(tree, target, source, options.at_ns(chosen))
 
     has_source, tell = source is not None, partial(tell_granted, lookups)
     return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell, tree), rest

@@ -7,25 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli import options, poses
 from frametool.cli.command import Command, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
-from frametool.cli.options import (
-    AxesName,
-    ColumnNames,
-    frames_out_option,
-    limit_options,
-    pose_result_options,
-    window_of,
-)
-from frametool.cli.poses import (
-    is_inline,
-    pose_from_numbers,
-    pose_source,
-    rejoined,
-    source_from_numbers,
-    values_of,
-    without_inverse,
-)
 from frametool.cli.stderr import say
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
@@ -43,6 +27,9 @@ if TYPE_CHECKING:
     from frametool.stream.request import Operation
 
 
+AXES = options.AxesName()
+
+
 class ConvertCommand(Command):
     """A command whose help lists the representations."""
 
@@ -55,19 +42,19 @@ class ConvertCommand(Command):
 
 @command_named("convert", own=("given", "notations"), cls=ConvertCommand)
 @argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
-@option("--axes NAME", "the pose at the same place in these axes (help axes)", AxesName())
-@option("--world-axes A_from_B", "axes of the frame it is seen from (help axes)", AxesName(), name="world")
-@option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", AxesName(), excludes=("axes", "world"))
+@option("--axes NAME", "the pose at the same place in these axes (help axes)", AXES)
+@option("--world-axes A_from_B", "axes of the frame it is seen from (help axes)", AXES, name="world")
+@option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", AXES, excludes=("axes", "world"))
 @option("--find A,B,C", "Euler conventions with these angles (help euler)")
 @option("--tolerance RAD", "how near --find wants it  [default: 1e-06]", parse_number, requires=("find",), default=1e-6)
 @pose_stream_options
-@pose_result_options("poses", "points")
-@frames_out_option
+@options.pose_result_options("poses", "points")
+@options.frames_out_option
 @EXPLAIN
 @option("--unwrap", "let angles go on beyond half a turn")
-@option("--time-column NAME", "column or key of stamps, for the next three", ColumnNames(),
+@option("--time-column NAME", "column or key of stamps, for the next three", options.ColumnNames(),
     requires=("time_offset", "start", "stop"), under="Time")  # fmt: skip
-@limit_options
+@options.limit_options
 def command(inputs: Inputs) -> int:
     """Write one rotation or pose in other representations.
 
@@ -80,7 +67,7 @@ def command(inputs: Inputs) -> int:
     VALUES are numbers in the order of the representation, after x y z when there is a position; an angle may carry
     its unit: 90deg, 1.57rad, pi/2. POSE is a mapping, what a tool printed (help pose), a file, or - for stdin.
     """
-    values, window, task = rejoined(inputs.values), window_of(inputs), PoseTask(inputs, "poses", "points")
+    values, window, task = poses.rejoined(inputs.values), options.window_of(inputs), PoseTask(inputs, "poses", "points")
     stream, output = task.stream, task.output
     axes, world = inputs.axes, inputs.world
     if inputs.all_axes is not None:
@@ -103,7 +90,7 @@ def command(inputs: Inputs) -> int:
         from frametool.cli.earth import mapping_of
 
         values, is_numbers = (mapping_of(values, request.given_place),), False
-    bare, is_inverse = without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
+    bare, is_inverse = poses.without_inverse(values[0]) if len(values) == 1 and not is_numbers else ("", False)
     if bare == "-" or (bare and not stream.path and task.has_table(bare)):
         refuse(task.derives, f"{values[0]} is a stream; {ONE_RECORD}")
         values, request = ("-",), request.of_inverses() if is_inverse else request
@@ -112,34 +99,34 @@ def command(inputs: Inputs) -> int:
         request = request._replace(unwrap=inputs.unwrap)
         return stream.run(request, output)
     task.only_arguments(values)
-    if not (is_numbers or all(map(is_inline, values))):
+    if not (is_numbers or all(map(poses.is_inline, values))):
         request = request._replace(unwrap=inputs.unwrap)
     results: list[Any]
     sources: Sequence[str | Source] = ()
     if is_numbers or not values:
-        pose = pose_from_numbers(values, request) if values else Pose()
+        pose = poses.pose_from_numbers(values, request) if values else Pose()
         results = [Result(_changed(pose, operation))]
     else:
-        sources = [pose_source(each, request) for each in values] if task.derives else values
-        results = list(values_of(sources, request, output))
-    poses = [each.pose for each in results if isinstance(each, Result)]
+        sources = [poses.pose_source(each, request) for each in values] if task.derives else values
+        results = list(poses.values_of(sources, request, output))
+    found = [each.pose for each in results if isinstance(each, Result)]
     if inputs.find is not None:
-        output.style = _found(poses, inputs.find, inputs.tolerance, output.style)
+        output.style = _found(found, inputs.find, inputs.tolerance, output.style)
     if task.derives:
-        refuse(len(poses) != 1, f"--explain derives one pose, found {len(results)}")
+        refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
-            own = (values, request.given) if values else (list(map(repr, poses[0].components[3:])), notation("xyzw"))
-            sources = [source_from_numbers(*own)]
+            own = (values, request.given) if values else (list(map(repr, found[0].components[3:])), notation("xyzw"))
+            sources = [poses.source_from_numbers(*own)]
         change = _named_change(axes, world, operation) if values else None
-        return task.derive("convert", task.written(sources[0], warned=True), own=poses[0], change=change)
+        return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)
     output.values(results)
-    output.tell_of_lock(poses)
+    output.tell_of_lock(found)
     return 0
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
     """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
-    if not values or is_inline(values[0]):
+    if not values or poses.is_inline(values[0]):
         return False
     if len(values) > 1:
         return True

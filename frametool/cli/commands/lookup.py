@@ -6,23 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
 from frametool.cli.explaining import EXPLAIN, PoseTask
-from frametool.cli.options import (
-    TIME,
-    ColumnNames,
-    Skipped,
-    at_ns,
-    limit_options,
-    read_times,
-    reading_options,
-    result_options,
-    rules,
-    rules_options,
-    times_option,
-    whole_pose_options,
-    window_of,
-)
 from frametool.cli.streaming import stream_options
 from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, tell_granted
 from frametool.errors import NoDataAt, UnknownFrame
@@ -45,7 +31,7 @@ MANY = ("times", "start", "stop")
 def _column_option(end: str, *excludes: str) -> Adds:
     about, under = f"column of each row's {end} in the table of -i or stdin", "Time" if end == "time" else "Rows"
     excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
-    return option(f"--{end.lower()}-column NAME", about, ColumnNames(), excludes=excluded, under=under)
+    return option(f"--{end.lower()}-column NAME", about, options.ColumnNames(), excludes=excluded, under=under)
 
 
 @command_named("lookup", own=("times", "notations"))
@@ -53,18 +39,18 @@ def _column_option(end: str, *excludes: str) -> Adds:
 @argument("target", FRAME, required=False, metavar="TARGET")
 @argument("source", FRAME, required=False, metavar="SOURCE")
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
-@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", TIME, excludes=MANY)
-@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", TIME, requires=("fixed",),
+@option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", options.TIME, excludes=MANY)
+@option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", options.TIME, requires=("fixed",),
         excludes=MANY)  # fmt: skip
 @option("--fixed FRAME", "what stands still between the two times: map", FRAME, excludes=MANY, requires=("source_at",))
 @option("--covariance", "how sure it is, by the edges' sigmas (help covariance)", excludes=("explain", "fixed"))
-@times_option
-@limit_options
-@rules_options
-@reading_options(streams=True)
+@options.times_option
+@options.limit_options
+@options.rules_options
+@options.reading_options(streams=True)
 @stream_options
-@whole_pose_options
-@result_options("poses")
+@options.whole_pose_options
+@options.result_options("poses")
 @EXPLAIN
 @together(_column_option("TARGET"), _column_option("SOURCE"), _column_option("time", "at"))
 def command(inputs: Inputs) -> int:
@@ -78,7 +64,7 @@ def command(inputs: Inputs) -> int:
     TREE is a file, -, or . for FRAMETOOL_TREE's (help time).
     Trajectories and tables (-f tum, csv ..) hold all samples, those from --start to --stop.
     """
-    window, task = window_of(inputs), PoseTask(inputs)
+    window, task = options.window_of(inputs), PoseTask(inputs)
     columns = inputs.target_column, inputs.source_column
     output, target, source = task.output, inputs.target, inputs.source
     by_row = {*columns, inputs.time_column} != {None}
@@ -89,14 +75,14 @@ def command(inputs: Inputs) -> int:
     covariance = not task.derives and inputs.covariance
     if covariance:
         _check_covariance(output, by_row=by_row)
-    tree = load_tree(inputs.tree, inputs.more, rules(inputs), streams=by_row)
-    lookups, at = lookups_in(tree, carried=covariance), at_ns(inputs.at)
+    tree = load_tree(inputs.tree, inputs.more, options.rules(inputs), streams=by_row)
+    lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source, window)
         tell_granted(lookups)
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
-    source_at, fixed = at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
+    source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
     if task.derives:
         return task.derive("lookup", tree, target, source, at_ns=at, source_at_ns=source_at, fixed=fixed)
     output.take_axes_in(tree, source)
@@ -126,11 +112,12 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
 def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tuple[int, int] | None) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip others are left out, and told."""
     inputs, tree = task.inputs, lookups.tree
-    times, skipped = inputs.times, Skipped(in_json=task.output.told == "json")
+    times, skipped = inputs.times, options.Skipped(in_json=task.output.told == "json")
     skip = times is not None and inputs.on_error == SKIP
     if times is not None and inputs.on_error == NULL:
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")
-    asked = sample_stamps(tree, target, source) if times is None else read_times(times, skipped.add if skip else stop)
+    report = skipped.add if skip else stop
+    asked = sample_stamps(tree, target, source) if times is None else options.read_times(times, report)
     if window is not None:
         inputs.ask("start", "stop")
         asked = [stamp for stamp in asked if window[0] <= stamp <= window[1]]
@@ -159,7 +146,8 @@ def _by_row(
     for name, column, called in ((target, columns[0], "TARGET"), (source, columns[1], "SOURCE")):
         refuse((name is None) == (column is None), f"name {called} or its column, one of the two")
     fixed_target, fixed_source = (name and frame_name(name, tree) for name in (target, source))
-    frames, at = tuple(each for each in columns if each is not None), None if inputs.time_column else at_ns(inputs.at)
+    frames = tuple(each for each in columns if each is not None)
+    at = None if inputs.time_column else options.at_ns(inputs.at)
 
     def ends_of(names: str | None) -> tuple[str, str]:
         cells = (names or "").split("\0") if len(frames) == 2 else [names or ""]
