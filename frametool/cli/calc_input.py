@@ -117,8 +117,6 @@ def _values(source: Source, scope: Scope) -> Term | None:
 class Expression(Text):
     """An expression, completed from --tree and from the files that were named before it."""
 
-    name = "expression"
-
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Offer what its last word may become."""
         from click.shell_completion import CompletionItem

@@ -238,9 +238,18 @@ class Text(click.types.StringParamType):
 
     name = "text"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
-        """Remove the blank."""
-        return value[1:] if value[:1] == " " and _is_negative(value[1:]) else value
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Remove the blank, and read the text."""
+        if not isinstance(value, str):
+            return value
+        try:
+            return self.read(value[1:] if value[:1] == " " and _is_negative(value[1:]) else value)
+        except ValueInvalid as error:
+            self.fail(str(error), param, ctx)
+
+    def read(self, text: str) -> Any:
+        """Return what a text says; a ValueInvalid that it raises is a wrong value of the option."""
+        return text
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
         """Return what the shell may complete, and what it means; None for names of files, which the shell knows."""
@@ -259,26 +268,17 @@ class Text(click.types.StringParamType):
 class File(Text):
     """A file's name."""
 
-    name = "file"
-
     def offers(self, ctx: click.Context, incomplete: str) -> None:  # noqa: ARG002
         """Leave it to the shell."""
         return
 
 
 class Parsed(Text):
-    """A text that a function reads; what it refuses is a wrong value of the option."""
+    """A text that a function reads."""
 
     def __init__(self, parse: Callable[[str], Any]) -> None:
         """Keep what reads it."""
-        self.parse = parse
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Read it."""
-        try:
-            return self.parse(super().convert(value, param, ctx)) if isinstance(value, str) else value
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
+        self.read = parse  # type: ignore[assignment, method-assign]
 
 
 TEXT = Text()

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from frametool.cli.command import Adds
     from frametool.formats.load import Rules
+    from frametool.geometry.representations import Notation
     from frametool.grammar.result import Result
 
 STREAMED = ("records", "rows", "arrays")
@@ -34,13 +35,13 @@ READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 class Utf8(Text):
     """Text that will be part of a result."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def read(self, text: str) -> str:
         """Refuse bytes that are no text."""
         try:
-            str(value).encode()
+            text.encode()
         except UnicodeEncodeError:
-            self.fail(f"{shown(value)} is not UTF-8 text", param, ctx)
-        return super().convert(value, param, ctx)
+            raise ValueInvalid(f"{shown(text)} is not UTF-8 text") from None
+        return text
 
 
 FULL = -1  # digits: as many as the number has
@@ -49,28 +50,19 @@ FULL = -1  # digits: as many as the number has
 class Digits(Text):
     """How many digits stand after the point: a number, or `full`."""
 
-    name = "digits"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def read(self, text: str) -> Any:
         """Take the word for all, or count."""
-        return FULL if value in ("full", FULL) else click.IntRange(0, 30).convert(value, param, ctx)
+        return FULL if text == "full" else click.IntRange(0, 30)(text)
 
 
 class Notations(Text):
     """Names of representations, separated by commas."""
 
-    name = "rep[,rep..]"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def read(self, text: str) -> tuple[Notation, ...]:
         """Look each name up."""
-        if not isinstance(value, str):
-            return tuple(value)
-        try:
-            chosen = tuple(form for spec in value.split(",") for form in notations(spec.strip()))
-            for form in chosen:
-                form.bound_axes()  # euler without its axes is refused before any work
-        except ValueInvalid as error:
-            self.fail(str(error), param, ctx)
+        chosen = tuple(form for spec in text.split(",") for form in notations(spec.strip()))
+        for form in chosen:
+            form.bound_axes()  # euler without its axes is refused before any work
         return chosen
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
@@ -86,20 +78,18 @@ class Notations(Text):
 class Form(Text):
     """The name of a form of text, of any or of those from which something is read."""
 
-    name = "form"
-
     def __init__(self, names: Collection[str], are: str) -> None:
         """Keep the forms that may be named, and what they are in an error: `read`, `known`."""
         self.names = names
         self.are = are
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def read(self, text: str) -> str:
         """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
-        if value not in self.names:
-            _refuse_unsupported(self, value, param, ctx)
-            near = did_you_mean(value, self.names)
-            self.fail(f"no form {shown(value)} is {self.are}{near}; `frametool formats` lists all", param, ctx)
-        return value
+        if text not in self.names:
+            _refuse_unsupported(text)
+            near = did_you_mean(text, self.names)
+            raise ValueInvalid(f"no form {shown(text)} is {self.are}{near}; `frametool formats` lists all")
+        return text
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the forms."""
@@ -112,18 +102,15 @@ class WrittenForm(click.Choice[str]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse an unknown one; of one that is not supported, say what to do."""
         if value not in self.choices:
-            _refuse_unsupported(self, value, param, ctx)
+            _refuse_unsupported(value)
         return super().convert(value, param, ctx)
 
 
-def _refuse_unsupported(
-    kind: click.ParamType[Any], value: Any, param: click.Parameter | None, ctx: click.Context | None
-) -> None:
+def _refuse_unsupported(name: str) -> None:
     from frametool.formats.unsupported import UNSUPPORTED
 
-    if value in UNSUPPORTED:
-        row = UNSUPPORTED[value]
-        kind.fail(f"{value} ({row.summary}) is not supported: {row.remedy}", param, ctx)
+    if row := UNSUPPORTED.get(name):
+        raise click.BadParameter(f"{name} ({row.summary}) is not supported: {row.remedy}")
 
 
 def suffix_of(path: str) -> str:
@@ -145,8 +132,6 @@ def file_with(*suffixes: str) -> Callable[[str], str]:
 class AxesName(Text):
     """A convention of axes, or the change from one to another: A_from_B."""
 
-    name = "axes"
-
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the conventions; behind `_from_` those it may come from."""
         from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
@@ -158,8 +143,6 @@ class AxesName(Text):
 
 class ColumnNames(Text):
     """Columns of the input, or keys of its records, with commas between them."""
-
-    name = "name"
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
         """Offer those of the file that -i names."""
@@ -381,32 +364,29 @@ class Skipped:
 class Time(Text):
     """A time in seconds, or in nanoseconds with `ns`; `latest` where that is a choice."""
 
-    name = "time"
-
     def __init__(self, *, latest: bool = True) -> None:
         """Keep whether `latest` is a choice."""
         self.latest = latest
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def read(self, text: str) -> Any:
         """Return nanoseconds, or `latest`."""
-        text = super().convert(value, param, ctx)
-        if not isinstance(text, str) or (self.latest and text == LATEST):
+        if self.latest and text == LATEST:
             return text
         from frametool.frames.stamps import NotATime, parse_time  # few calls say a time
 
         try:
             return parse_time(text)
-        except ValueInvalid as error:
-            self.fail(f"{error}{', or latest' if self.latest and isinstance(error, NotATime) else ''}", param, ctx)
+        except NotATime as error:
+            raise ValueInvalid(f"{error}{', or latest' * self.latest}") from None
 
 
 class Offset(Time):
     """A time that is added to others; `first` makes the first of them 0."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def read(self, text: str) -> Any:
         """Return nanoseconds, or what is added like them."""
-        if value != "first":
-            return super().convert(value, param, ctx)
+        if text != "first":
+            return super().read(text)
         from frametool.frames.stamps import FromFirst
 
         return FromFirst()

@@ -261,8 +261,6 @@ def tree_file(argument: str) -> str:
 class Frame(Text):
     """A frame's name, completed from the tree named before it."""
 
-    name = "frame"
-
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
         """Offer the frames of the tree, or files where none is named yet."""
         # behind an option that wants a frame click has not come to the arguments

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option, refuse
 from frametool.cli.sink import refuse_existing, writing
-from frametool.errors import FileProblem, nearest, printable, shown
+from frametool.errors import FileProblem, ValueInvalid, nearest, printable, shown
 
 if TYPE_CHECKING:
     import click
@@ -40,17 +40,15 @@ def example(name: str) -> bytes:
 class Example(Text):
     """The name of an example file."""
 
-    name = "name"
-
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+    def read(self, text: str) -> str:
         """Refuse an unknown one with the nearest."""
-        name = value.removeprefix("examples/")
+        name = text.removeprefix("examples/")
         if name not in names():
             stems = {each: splitext(each)[0] for each in names()}
             near = nearest(splitext(name)[0], set(stems.values()))
             likely = " or ".join(shown(each) for each, stem in stems.items() if stem in near)
             hint = f"did you mean {likely}?" if near else "`frametool examples` lists all"
-            self.fail(f"no example {shown(name)}; {hint}", param, ctx)
+            raise ValueInvalid(f"no example {shown(name)}; {hint}")
         return name
 
     def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002

@@ -193,8 +193,6 @@ def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, A
 class Topic(Text):
     """A subject or a command."""
 
-    name = "topic"
-
     def offers(self, ctx: click.Context, incomplete: str) -> dict[str, str]:  # noqa: ARG002
         """Offer the subjects and the commands."""
         return topics() | MADE | {name: row[1] for name, row in COMMANDS.items()}

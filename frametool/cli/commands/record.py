@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Inputs, Text, argument, command_named, option
-from frametool.cli.options import LIMIT, pose_options, reading_options, verbose_option
+from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.options import pose_options, reading_options, verbose_option
 from frametool.cli.output import opened_place
 from frametool.cli.recording import copied_as, folder_of, refuse_input
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
-from frametool.errors import FileProblem, FormatError, shown, warn
+from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
 from frametool.formats.load import FrameFile, Rules
 from frametool.formats.table import FORMATS, is_recording, writers
+from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Tally
 from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP
@@ -28,20 +29,15 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 messages skipped, 4 loo
 TRANSFORMS = ("tf", "tf_static")  # how topics of transforms are called, in any namespace
 
 
-class Between(Text):
-    """Two times with a comma between them, the second not before the first."""
-
-    name = "times"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return nanoseconds."""
-        parts = [part.strip() for part in super().convert(value, param, ctx).split(",")]
-        if len(parts) != len(("START", "STOP")):
-            self.fail(f"{shown(value)} is not START,STOP: two times with a comma between them", param, ctx)
-        start, stop = (LIMIT.convert(part, param, ctx) for part in parts)
-        if start > stop:
-            self.fail(f"{parts[0]} is after {parts[1]}; START comes first", param, ctx)
-        return start, stop
+def _between(text: str) -> tuple[int, int]:
+    """Read two times with a comma between them, the second not before the first."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != len(("START", "STOP")):
+        raise ValueInvalid(f"{shown(text)} is not START,STOP: two times with a comma between them")
+    start, stop = map(parse_time, parts)
+    if start > stop:
+        raise ValueInvalid(f"{parts[0]} is after {parts[1]}; START comes first")
+    return start, stop
 
 
 @command_named("record", own=("topics",), epilog=EXIT_CODES)
@@ -53,7 +49,7 @@ class Between(Text):
 @option("--topic NAME", "a topic whose messages move, or whose transforms count; may be repeated", name="moved_topics",
     multiple=True)  # fmt: skip
 @option("--on-error", "at a message that cannot be moved", ON_ERROR[:2], default=STOP)
-@option("--between START,STOP", "leave out what was logged before and after", Between())
+@option("--between START,STOP", "leave out what was logged before and after", _between)
 @option("-f --format", "form of the copy  [default: by the name of --output]", writers("recording"), name="format_name")
 @option("--force", "let --output replace a file", requires=("output",), under="Result")
 @reading_options(topics=False)
