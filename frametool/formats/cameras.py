@@ -60,7 +60,7 @@ COLMAP = {
     "SIMPLE_RADIAL_FISHEYE": ("equidistant", 1, 1), "RADIAL_FISHEYE": ("equidistant", 1, 2), "FOV": ("fov", 2, 1),
     "EUCM": ("eucm", 2, 2),
 }  # fmt: skip
-CORNER = "the centre of its first pixel is 0.5, 0.5: 0.5 is taken off cx and cy"
+ANGLE = "camera_angle_x"
 
 
 def load_camera(
@@ -134,21 +134,14 @@ def _made(
     """Make a camera of what a file says; raises FormatError."""
     given, line = {"model": None, **fields}, fields.get("line", 0)
     try:
-        if "angle" in fields:
-            given |= _of_angle(fields["angle"], fields.get("size") or size)
         if "colmap" in fields:
-            given |= _of_colmap(fields["colmap"], fields["numbers"])
-        left, top, width, height, *binning = fields.get("roi", (0, 0, 0, 0, 1, 1))
+            given |= _of_colmap(fields["colmap"], fields["numbers"], fields.get("size") or size)
+            warn(f"{source}: the centre of its first pixel is 0.5, 0.5: 0.5 is taken off cx and cy")
         given = {key: each for key, each in given.items() if key in (*CAMERA_KEYS, "shift")}
         camera = Camera(**(given if model is None else {**given, "model": model}))
-        if "roi" in fields:
-            inside = zip((width, height), camera.size or (0, 0), binning, strict=True)
-            whole = [(part or side) // by for part, side, by in inside]
-            across, down = (1.0 / by for by in binning)
-            camera = camera.resampled((across, down), (-left * across, -top * down), whole if all(whole) else None)
-        if "colmap" in fields or "corner" in fields:
-            camera = camera.resampled((1.0, 1.0), (-0.5, -0.5), camera.size)
-            warn(f"{source}: {CORNER}")
+        if "moved" in fields:
+            scale, shift = fields["moved"]
+            camera = camera.resampled(scale, shift, camera.size)
         if size is not None:
             before, camera = camera.size, camera.scaled(size)
             if before not in (None, camera.size):
@@ -156,14 +149,6 @@ def _made(
     except ValueInvalid as error:
         raise FormatError(f"{name}: {error}" if name and not line else str(error), source=source, line=line) from None
     return camera
-
-
-def _of_angle(angle: float, size: Sequence[int] | None) -> dict[str, Any]:
-    """Return a camera of which only the angle across the picture is known."""
-    if not size:
-        raise ValueInvalid("camera_angle_x needs --size W,H")
-    focal = size[0] / (2.0 * tan(0.5 * angle))
-    return {"model": "pinhole", "K": [focal, focal, size[0] / 2.0, size[1] / 2.0], "size": size}
 
 
 # ---------------------------------------------------------------- which form
@@ -194,7 +179,7 @@ def _in_document(value: Any, file: InputFile) -> Found:
         yield from _nuscenes(value, file) if is_table else _ours(value, "")
     elif not isinstance(value, dict):
         return
-    elif "fl_x" in value or "camera_angle_x" in value:
+    elif "fl_x" in value or ANGLE in value:
         yield "", _nerf(value)
     elif value.keys() <= {*CAMERA_KEYS}:
         yield "", camera_fields(value)
@@ -235,10 +220,12 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
         if all(side in value for side in sides):
             found["size"] = [numbers_of(value[side]) for side in sides]
     region = value.get("roi") or {}
-    roi = [int(numbers_of(region.get(key, 0))) for key in ("x_offset", "y_offset", "width", "height")]
+    left, top, *inner = (int(numbers_of(region.get(key, 0))) for key in ("x_offset", "y_offset", "width", "height"))
     binning = [int(numbers_of(value.get(key) or 1)) or 1 for key in ("binning_x", "binning_y")]
-    if any(roi) or binning != [1, 1]:
-        found["roi"] = *roi, *binning
+    if any((left, top, *inner)) or binning != [1, 1]:
+        found["moved"] = [1.0 / by for by in binning], [-left / binning[0], -top / binning[1]]
+        parts = zip(inner, found.get("size", inner), binning, strict=True)
+        found["size"] = [(part or side) // by for part, side, by in parts]
     return found if "K" in found else {}
 
 
@@ -278,8 +265,13 @@ def _colmap(file: InputFile) -> Found:
             yield name, {"colmap": model, "numbers": numbers, "size": [width, height], "line": line}
 
 
-def _of_colmap(name: str, numbers: Sequence[float]) -> dict[str, Any]:
+def _of_colmap(name: str, numbers: Sequence[float], size: Sequence[int] | None) -> dict[str, Any]:
     """Return a camera by a model's name and its parameters; raises ValueInvalid."""
+    if name == ANGLE:  # NeRF's, across the picture
+        if not size:
+            raise ValueInvalid(f"{ANGLE} needs --size W,H")
+        focal = size[0] / (2.0 * tan(0.5 * numbers[0]))
+        return {"model": "pinhole", "K": [focal, focal, size[0] / 2.0 - 0.5, size[1] / 2.0 - 0.5], "size": size}
     if name not in COLMAP:
         raise ValueInvalid(f"{name} is not read; models: {listing(COLMAP)}")
     model, focals, count = COLMAP[name]
@@ -287,16 +279,17 @@ def _of_colmap(name: str, numbers: Sequence[float]) -> dict[str, Any]:
         raise ValueInvalid(f"{name} has {focals + 2 + count} parameters, not {len(numbers)}")
     rest, own = numbers[focals + 2 :], CAMERA_MODELS[model].parameters
     fields = dict(zip(own, rest, strict=True)) if own else {"D": [*rest, *[0.0] * (4 - len(rest))] if rest else []}
-    return {"model": model, "K": [numbers[0], numbers[focals - 1], *numbers[focals : focals + 2]], **fields}
+    cx, cy = numbers[focals : focals + 2]
+    return {"model": model, "K": [numbers[0], numbers[focals - 1], cx - 0.5, cy - 0.5], **fields}
 
 
 def _nerf(value: dict[str, Any]) -> dict[str, Any]:
     """Return the one camera of transforms.json: a model of COLMAP whose parameters have names."""
-    keys = r"fl_[xy]|c[xy]|[wh]|[kp]\d|camera_angle_x"
+    keys = rf"fl_[xy]|c[xy]|[wh]|[kp]\d|{ANGLE}"
     known = {key: parse_number(each) for key, each in value.items() if re.fullmatch(keys, key)}
     size = [known["w"], known["h"]] if {"w", "h"} <= known.keys() else None
     if "fl_x" not in known:
-        return {"angle": known["camera_angle_x"], "corner": True, "size": size}
+        return {"colmap": ANGLE, "numbers": [known[ANGLE]], "size": size}
     model = value.get("camera_model") or ("OPENCV_FISHEYE" if value.get("is_fisheye") == "true" else "OPENCV")
     words = "k1 k2 k3 k4" if "FISHEYE" in model else "k1 k2 p1 p2 k3 k4 k5 k6"
     focals, count = COLMAP.get(model, ("", 2, 0))[1:]

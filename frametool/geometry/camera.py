@@ -10,8 +10,9 @@ another centre, `fov` an equidistant lens whose points are stretched before and 
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
-from math import acos, atan2, inf, isfinite, nan, pi, sqrt
+from math import acos, atan2, inf, isfinite, nan, pi, sqrt, tan
 from typing import NamedTuple
 
 from frametool.errors import ValueInvalid, alternatives, shown, warn
@@ -335,19 +336,18 @@ class Camera:
         name, row = _model_of(model, len(d), own)
         if axes not in AXES:
             raise ValueInvalid(f"axes {shown(axes)} are not known; axes: {', '.join(AXES)}")
-        lens = Lens((*d, *(0.0,) * 12)[:12], **own)
-        sine, cosine = half_sincos(lens.w, floats)
-        lens = lens._replace(end=row.end(lens.D), stretch=2.0 * sine / cosine if "w" in own else 1.0)
+        lens = Lens((*d, *(0.0,) * 12)[:12], stretch=2.0 * tan(0.5 * own["w"]) if "w" in own else 1.0, **own)
+        lens = lens._replace(end=row.end(lens.D))
         numbers = _intrinsics(K, skew)
         size = None if size is None else _size(size)
         fields: dict[str, Any] = {"model": name, "K": [*numbers[:4]], "D": [*d], "size": size and [*size]}
-        fields |= {"skew": numbers[4], **own, "axes": axes, "R": R and [*_numbers(R, "R", 9)]}
-        fields |= {"P": P and [*_numbers(P, "P", 12)], "turn": turn, "shift": shift}
-        a, b = AXES[axes], turn or AXES["optical"]
-        places = [(row, column) for row in range(3) for column in range(3)]
+        fields |= {"skew": numbers[4], **own, "axes": axes, "shift": shift}
+        for key, each, count in (("R", R, 9), ("P", P, 12), ("turn", turn, 9)):
+            fields[key] = None if each is None else [*_numbers(each, key, count)]
+        a, b = AXES[axes], fields["turn"] or AXES["optical"]
         vars(self).update(
             model=name, numbers=numbers, D=d, size=size, axes=axes, lens=lens, end_angle=row.end_angle(lens),
-            fields=fields, _turn=[sum(b[3 * i + k] * a[3 * k + j] for k in range(3)) for i, j in places],
+            fields=fields, _turn=[sum(b[i + k] * a[3 * k + j] for k in range(3)) for i in (0, 3, 6) for j in range(3)],
         )  # fmt: skip
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -436,8 +436,7 @@ class Camera:
 
     def points_of(self, u: Number, v: Number, depth: Number = None, range: Number = None) -> Vector:  # noqa: A002
         """Return points x, y, z in the camera's frame of pixels and their depth, or their range from the camera."""
-        kernel, far = (self._at_depth, depth) if range is None else (self._at_range, range)
-        return validation.run(kernel, 3, (u, v, far))
+        return validation.run(partial(self._point, range is None), 3, (u, v, depth if range is None else range))
 
     def plane_points_of(self, u: Number, v: Number, plane_from_camera: Rigid, height: Number = 0.0) -> Vector:
         """Return where the rays of pixels meet z = height of a frame, in that frame; NaN behind and above the horizon.
@@ -478,13 +477,12 @@ class Camera:
 
         depth: z in optical axes; range: the distance from the camera.  NaN where there is none.
         """
-        place = _columns(pixels, 2, "pixels")
-        if depth is None and range is None:
-            return validation.stacked(self.rays_of(*place))
-        if depth is not None and range is not None:
+        u, v = _columns(pixels, 2, "pixels")
+        given = (("depth", depth), ("range", range))
+        far = {name: validation.as_numbers(each, name) for name, each in given if each is not None}
+        if len(far) > 1:
             raise ValueInvalid("unproject takes depth or range, not both")
-        name, far = ("depth", depth) if range is None else ("range", range)
-        return validation.stacked(self.points_of(*place, **{name: validation.scalars(far, name)}))
+        return validation.stacked(self.points_of(u, v, **far) if far else self.rays_of(u, v))
 
     def on_plane(self, pixels: Numbers, plane_from_camera: Transform, height: float = 0.0) -> Array:
         """Return where the rays of pixels (.., 2) meet z = height of a frame: points (.., 3) in it, NaN for no such."""
@@ -526,23 +524,17 @@ class Camera:
     def _ray(self, u: N, v: N, xp: Functions[N]) -> Three[N]:
         return self._unturned(*self._optical_ray(u, v, xp))
 
-    def _along(self, ray: Three[N], scale: N) -> Three[N]:
-        x, y, z = (part * scale - off for part, off in zip(ray, self.fields["shift"], strict=True))
-        return self._unturned(x, y, z)
-
-    def _at_depth(self, u: N, v: N, depth: N, xp: Functions[N]) -> Three[N]:
-        ray = self._optical_ray(u, v, xp)
-        scale = depth / _divisor(ray[2], xp)
-        return self._along(ray, xp.where(scale > 0.0, scale, nan))
-
-    def _at_range(self, u: N, v: N, distance: N, xp: Functions[N]) -> Three[N]:
-        return self._along(self._optical_ray(u, v, xp), xp.where(distance >= 0.0, distance, nan))
+    def _point(self, at_depth: bool, u: N, v: N, far: N, xp: Functions[N]) -> Three[N]:  # noqa: FBT001 - bound
+        x, y, z = self._optical_ray(u, v, xp)
+        scale = far / _divisor(z, xp) if at_depth else far
+        scale = xp.where(scale >= 0.0, scale, nan)
+        right, below, ahead = self.fields["shift"]
+        return self._unturned(x * scale - right, y * scale - below, z * scale - ahead)
 
     def _on_plane(
         self, u: N, v: N, height: N, tx: N, ty: N, tz: N, qx: N, qy: N, qz: N, qw: N, xp: Functions[N]
     ) -> Three[N]:
-        zero = 0.0 * u
-        ox, oy, oz = rigid.apply(tx, ty, tz, qx, qy, qz, qw, *self._along((zero, zero, zero), zero))
+        ox, oy, oz = rigid.apply(tx, ty, tz, qx, qy, qz, qw, *self._point(False, u, v, 0.0 * u, xp))  # noqa: FBT003
         x, y, z = quaternion.rotate(qx, qy, qz, qw, *self._ray(u, v, xp))
         scale = (height - oz) / _divisor(z, xp)
         scale = xp.where(scale > 0.0, scale, nan)
@@ -594,11 +586,11 @@ def _model_of(model: str | None, count: int, own: dict[str, float]) -> tuple[str
     Raises ValueInvalid where several have, and where a model cannot have such numbers.
     """
     if model is None:
-        fitting = [name for name, row in CAMERA_MODELS.items() if {*row.parameters} == own.keys()]
-        fitting = [each for each in fitting if count in (CAMERA_MODELS[each].coefficients or (0,))] or fitting
+        fitting = [each for each, row in CAMERA_MODELS.items() if {*row.parameters} == own.keys()] or ["pinhole"]
+        fitting = [each for each in fitting if count in CAMERA_MODELS[each].coefficients] or fitting
         if len(fitting) > 1 and count == 4:
             raise ValueInvalid(f"4 coefficients: {' or '.join(f'--model {each}' for each in fitting)}")
-        model = fitting[0] if fitting else "pinhole"
+        model = fitting[0]
     name = next((name for name, row in CAMERA_MODELS.items() if model.lower() in (name, *row.aliases)), "")
     if not name:
         raise ValueInvalid(f"camera model {shown(model)} is not known{alternatives(model, CAMERA_MODELS, 'models')}")

@@ -295,6 +295,20 @@ def test_without_a_model_the_count_of_coefficients_says_it(count: int, model: st
     assert Camera(None, [1, 1, 0, 0], [0.0] * count).model == model
 
 
+def test_arrays_of_numbers_are_taken() -> None:
+    given: dict[str, Any] = {key: np.array(each) for key, each in RIGHT.items()}
+    made = Camera("plumb_bob", np.array([[502.82, 0, 316.62], [0, 528.2, 234.22], [0, 0, 1]]), np.zeros(5), np.array([640, 480]), **given)
+    assert made.mapping() == {**rectifiable().mapping(), "D": [0.0] * 5}
+    assert made.K.shape == (3, 3)
+
+
+def test_a_depth_for_each_pixel_some_of_them_unknown() -> None:
+    camera = CAMERAS["pinhole"]
+    found = camera.unproject([[10.0, 10.0], [10.0, 10.0]], depth=[2.0, math.nan])
+    np.testing.assert_array_equal(found[0], camera.unproject([10.0, 10.0], depth=2))
+    assert np.isnan(found[1]).all()
+
+
 def test_parameters_say_the_model_too() -> None:
     assert Camera(None, [1, 1, 0, 0], xi=0.1, alpha=0.5).model == "ds"
     assert Camera(None, [1, 1, 0, 0], [0.0] * 4, xi=0.1).model == "omni"
