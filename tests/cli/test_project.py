@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 if TYPE_CHECKING:
@@ -281,6 +282,23 @@ def test_pixels_of_messages_are_seen_at_the_stamps_of_their_headers(run: Run) ->
     way = ["unproject", "move.yaml", "map", "cam", "--camera", PINHOLE, "--ground", "map"]
     found = run(*way, stdin=line(3) + line(7) * 40, files={"move.yaml": MOVING}).out.splitlines()
     assert [json.loads(row)["point"][0] for row in found] == pytest.approx([3.0, *[7.0] * 40])
+
+
+def test_points_of_a_bag_in_the_camera_of_its_topic(run: Run, tmp_path: Path) -> None:
+    recorded = pytest.importorskip("recorded")
+    made, info = recorded.Maker("mcap"), "sensor_msgs/msg/CameraInfo"
+    k, r, p = ([500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0], [1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0], [500.0, 0, 320.0, 0, 0, 500.0, 240.0, 0, 0, 0, 1.0, 0])
+    numbers = (np.array(each) for each in ([0.0] * 5, k, r, p))
+    region = made.part("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, 0)
+    point = made.part("geometry_msgs/msg/PointStamped", made.header("lidar", 5), made.part("geometry_msgs/msg/Point", 0.3, -0.6, 2.0))
+    bag = recorded.write(tmp_path / "run", "mcap", [
+        recorded.Sent("/tf_static", *made.transforms(*(("base", name, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), 0) for name in ("cam", "lidar"))), 1),
+        recorded.Sent("/info", info, made.part(info, made.header("cam", 5), 480, 640, "plumb_bob", *numbers, 0, 0, region), 2),
+        recorded.Sent("/point", "geometry_msgs/msg/PointStamped", point, 3),
+    ])  # fmt: skip
+    for way in (["--camera", f"{bag}:/info"], [str(bag), "cam"]):
+        done = run("project", *way, "-i", str(bag), "--topic", "/point")
+        assert (json.loads(done.out)["pixel"], done.err) == ([395.0, 90.0], "frametool: 1 point: 1 in the image\n")
 
 
 def test_what_has_no_pixel_has_no_ray(run: Run) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli.cloud_files import is_bag
 from frametool.cli.command import Inputs, Text, argument, command_named, option, together
 from frametool.cli.commands.apply import Way, begins_number, is_record, sources_of, way_by_tree
 from frametool.cli.options import (
@@ -144,6 +145,9 @@ class CameraTask:
         """Read tree and camera; named: the arguments that lead to the camera, if there is a tree."""
         self.inputs = inputs
         self.stream = Stream(inputs)
+        path = self.stream.path  # of a bag, --topic is what is streamed
+        if self.stream.messages() is None and path and is_bag(path):
+            raise click.UsageError(f"write the clouds of {path} as files first: apply -o '{{stamp_ns}}.pcd'")
         self.way: Way | None = None
         self.rest: tuple[str, ...] = inputs.arguments
         self.name = (inputs.camera or "").rpartition(":")[2] if not is_inline(inputs.camera or "") else ""
