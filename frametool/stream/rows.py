@@ -128,10 +128,17 @@ def assemble(
     ]  # fmt: skip
 
 
+def _distinct(numbers: Floats) -> tuple[list[float], Ints]:
+    """Return the numbers that differ, and which of them each is."""
+    found, of_row = np.unique(numbers, return_inverse=True)
+    return found.tolist(), of_row
+
+
 def worded(numbers: Floats, piece: Word) -> Spans:
     """Return the words that numbers (n,) stand for."""
-    found, of_row = np.unique(numbers, return_inverse=True)
-    texts = [piece.text(number) for number in found.tolist()]
+    counts = type(piece) is Word
+    found, of_row = ([*range(len(piece.words))], numbers.astype(np.int64)) if counts else _distinct(numbers)
+    texts = [piece.text(number) for number in found]
     ends = np.cumsum([len(text) for text in texts]) + MARGIN
     starts = ends - [len(text) for text in texts]
     return Spans(framed(b"".join(texts)), starts[of_row], ends[of_row])

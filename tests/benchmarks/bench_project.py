@@ -1,6 +1,7 @@
 """Time cameras beside OpenCV, one thread each: `python tests/benchmarks/bench_project.py [POINTS]`.
 
-Points to pixels beside `cv2.projectPoints` and `cv2.fisheye.projectPoints` where OpenCV is installed, pixels to points,
+The commands first, file to nowhere: rows a second beside `apply`, and whether their memory grows with the rows.  Then
+points to pixels beside `cv2.projectPoints` and `cv2.fisheye.projectPoints` where OpenCV is installed, pixels to points,
 and how far what is projected comes back from where it was.  Then in how much of a lidar sweep each draws points that a
 folding distortion does not hold for (opencv#17768).
 """
@@ -8,7 +9,10 @@ folding distortion does not hold for (opencv#17768).
 from __future__ import annotations
 
 import importlib
+import os
+import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +29,16 @@ if TYPE_CHECKING:
 ROUNDS = 5
 FASTER = {"plumb_bob": 3.0, "rational_polynomial": 3.0, "thin_prism": 3.0, "equidistant": 1.0}  # than OpenCV
 SECONDS = 6.0  # for a million pixels back
+OF_APPLY = 0.6  # of its rows a second
+PART = 10_000  # rows that are drawn at once
+GROWTH = 1.2  # of memory from a quarter of the rows to all
+ROOT = Path(__file__).parents[2]
+RIG = str(ROOT / "examples" / "cameras.yaml")
+COMMANDS = {
+    "apply": ["apply", RIG, "cam_front", "lidar"],
+    "project": ["project", RIG, "cam_front", "lidar"],
+    "unproject --ground": ["unproject", RIG, "map", "cam_front", "--ground", "map", "--columns", "x,y", "--prefix", "p_"],
+}
 CAMERAS = (
     Camera("pinhole", [500.5, 510.25, 320.5, 239.75]),
     Camera("plumb_bob", [461.6, 460.3, 363.0, 248.1], [-0.2834, 0.0739, 0.000193, 1.7e-05]),
@@ -64,6 +78,40 @@ def sweep(count: int) -> Any:
     return np.column_stack([far * np.cos(up) * np.sin(around), -far * np.sin(up), far * np.cos(up) * np.cos(around)])
 
 
+def spent(arguments: list[str], path: Path) -> tuple[float, float]:
+    """Give the processor seconds of a command on a file, the least of some rounds, and its memory in MB."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    seconds, memory = [], 0.0
+    for _ in range(ROUNDS):
+        line = [sys.executable, "-m", "frametool", *arguments, "-i", str(path), "--quiet"]
+        process = subprocess.Popen(line, stdout=subprocess.DEVNULL, env=environment)
+        _, status, usage = os.wait4(process.pid, 0)
+        assert status == 0, line
+        seconds.append(usage.ru_utime + usage.ru_stime)
+        memory = max(memory, usage.ru_maxrss / 1024)
+    return min(seconds), memory
+
+
+def commands(count: int) -> list[str]:
+    """Print rows a second and memory of the commands; return which goals are missed."""
+    missed, rates, drawn = [], {}, np.random.default_rng(2)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / name for name in ("quarter.csv", "all.csv")]
+        for path, rows in zip(paths, (count // 4, count), strict=True):
+            with path.open("w") as file:
+                file.write("x,y,z\n")
+                for _ in range(rows // PART):
+                    np.savetxt(file, drawn.normal(size=(PART, 3)) * 10.0, "%.6f", ",")
+        for name, arguments in COMMANDS.items():
+            (_, less), (seconds, memory) = (spent(arguments, path) for path in paths)
+            rates[name] = count / seconds
+            ratio = rates[name] / rates["apply"]
+            print(f"{name:22s} {rates[name]:10.0f} rows/s, {ratio:.2f} of apply; {memory:.0f} MB, of a quarter of them {less:.0f}")
+            missed += [f"{name}: {ratio:.2f} of apply"] if name == "project" and ratio < OF_APPLY else []
+            missed += [f"{name}: memory grows"] if memory > GROWTH * less else []
+    return missed
+
+
 def main(count: int) -> None:
     """Print the tables; exit with 1 where a goal is missed."""
     try:
@@ -73,7 +121,7 @@ def main(count: int) -> None:
         cv2 = None
     drawn = np.random.default_rng(0)
     points = np.column_stack([drawn.uniform(-5, 5, count), drawn.uniform(-5, 5, count), drawn.uniform(4, 30, count)])
-    missed = []
+    missed = commands(count)  # first: the memory of a process counts that of the one it was forked from
     print(f"{count} points, ns each    to pixels   OpenCV  times  to points   comes back to  from OpenCV (px)")
     for camera in CAMERAS:
         pixels, depth = camera.project(points)
