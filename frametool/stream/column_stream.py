@@ -34,7 +34,7 @@ from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import Naming, Table, unnamed
-from frametool.stream.table_plan import plan_table, with_vectors
+from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
 from frametool.stream.table_stream import moves_in_time, settle_stamps
 from frametool.text.cells import Cells
 from frametool.text.spans import Spans, framed
@@ -203,7 +203,7 @@ class ColumnRows:
         names: list[Sequence[str | None]] = [[name] for name in unnamed(self.request, self.shape)]
         for role, texts in results.names.items():
             names[role] = [text or None for text in texts]
-        own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.numbers.shape[1]
+        own = self.plan.targets[0].size if has_vectors(self.plan) else results.numbers.shape[1]
         for column in self.layout.columns:
             if isinstance(column, New) and column.number >= own:
                 extras[column.name] = results.numbers[:, column.number]

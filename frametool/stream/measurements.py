@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from frametool.documents.document import locate_many, parse_documents
 from frametool.documents.source import Verbatim
-from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown
+from frametool.errors import FormatError, ValueInvalid, did_you_mean, shown, warn
 from frametool.formats.load import EdgePlace, close_all, lines_of
 from frametool.formats.trees.tree_reader import read_edges, shown_keys
 from frametool.geometry.rotation import Rotation
@@ -202,8 +202,10 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     request = request._replace(operation=MOVED, notations=(notation("quaternion"),), keep_sign=True)
     begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
     rows = TablePoses(begun, file.form, request, file.name)
+    if rows.shape.notation is None and rows.shape.unit is None:
+        raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
     if rows.shape.notation is None:
-        raise FormatError(f"no rotation among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
+        warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
     bare = file.tally.names.bare
     has_place = rows.shape.whole or rows.shape.unit is not None
     for block, line, _ in rows.blocks(begun):

@@ -28,7 +28,7 @@ from frametool.stream.rows import chosen
 from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
 from frametool.stream.table import UNCLOSED, Naming, at_other_times, coded, table_block, unnamed
-from frametool.stream.table_plan import plan_table, with_vectors
+from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
 from frametool.text.cells import torn_record, without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
@@ -165,7 +165,7 @@ class TablePoses:
         same = rows is run.rows and len(rows) == run.count
         parts = block.parts if same else [chosen(part, rows) for part in block.parts]
         texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
-        own = self.plan.targets[0].size if len(self.plan.shapes) > 1 else results.shape[1]
+        own = self.plan.targets[0].size if has_vectors(self.plan) else results.shape[1]
         beside = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
         texts |= {each.name: results[:, each.number] for each in beside}
         names: list[Sequence[str | None]] = [[name] for name in self.unnamed]

@@ -191,6 +191,11 @@ def with_vectors(
     return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
 
 
+def has_vectors(plan: Plan) -> bool:
+    """Return True if vectors turn with the points of each row."""
+    return len(plan.shapes) > 1 and plan.shapes[-1].kind == VECTOR
+
+
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
     """Find the columns of the poses; an expression that does not read the row needs none."""
     formula = request.operation.formula

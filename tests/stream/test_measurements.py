@@ -207,10 +207,17 @@ def test_columns_that_say_too_little_or_too_much_are_refused(read: Read, columns
     assert str(caught.value) == message
 
 
-@pytest.mark.parametrize("text", ["parent,child,x,y,z\na,b,1,2,3\n", "stamp,x,y,z,yaw\n1,1,2,3,1\n2,1,2,3,1\n"])
-def test_a_table_without_rotations_or_names_is_refused(read: Read, text: str) -> None:
-    with pytest.raises(FormatError, match=r"no rotation among the columns|missing parent and child"):
+@pytest.mark.parametrize("text", ["parent,child,id\na,b,1\n", "stamp,x,y,z,yaw\n1,1,2,3,1\n2,1,2,3,1\n"])
+def test_a_table_without_poses_or_names_is_refused(read: Read, text: str) -> None:
+    with pytest.raises(FormatError, match=r"columns|missing parent and child"):
         read(text, "m.csv")
+
+
+def test_a_table_without_rotations_means_what_such_a_document_does(read: Read) -> None:
+    with pytest.warns(match="m.csv:1: no rotation among the columns parent, child, x, y, z: each is taken for 0"):
+        (row,) = read("parent,child,x,y,z\na,b,1,2,3\n", "m.csv")
+    (wanted,) = read("[{parent: a, child: b, xyz: [1, 2, 3]}]", "m.yaml")
+    assert row.components == wanted.components == (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def test_recordings_of_what_moves_are_refused(read: Read) -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import random
 from itertools import pairwise
+from typing import Any
 
 import pytest
 from flow import INVERT, MOVE, asked, calls, convert, flow
@@ -259,3 +260,10 @@ def test_the_work_grows_with_the_text_and_not_faster(short: bytes, long: bytes) 
     request = MOVE._replace(on_error="skip")
     flow(short, request)
     assert calls(long, request) < 2.2 * calls(short, request)
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "yaml"])
+def test_two_poses_a_row_keep_what_was_computed_beside_them_in_every_form(run: Any, form: str) -> None:
+    rows = "a_x,a_y,a_z,a_qx,a_qy,a_qz,a_qw,b_x,b_y,b_z,b_qx,b_qy,b_qz,b_qw\n1,2,3,0,0,0,1,4,6,3,0,0,0,1\n"
+    done = run("relative", "-f", form, stdin=rows)
+    assert (done.status, "distance" in done.out, "5.0" in done.out) == (0, True, True), done.err
