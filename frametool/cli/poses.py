@@ -36,7 +36,8 @@ INLINE = "argument"
 LONGEST_REMEMBERED = 4096  # characters
 # the grammar's own, or a header; compiled when first needed
 _PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
-_NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*):\s*\["  # of a table; the last: GTSAM, Gazebo
+# of a table; the last: GTSAM, Gazebo, tf2_echo
+_NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*|Translation):\s*\[|\s*Rotation: in "
 
 
 def is_inline(text: str) -> bool:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
-_TRANSLATION = re.compile(r"(?m)^[ \t]*+-\s+Translation:")
+_TRANSLATION = re.compile(r"(?m)^[ \t]*+(?:-\s+)?Translation:")  # a selection may begin behind the dash
 _TIME = re.compile(rf"(?m)^[ \t]*+At time ({NUMBER})")
 _HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
@@ -60,7 +60,7 @@ _BEGIN = re.compile(
     | (?:\w++:\s*+)?t\s*+= | (?:R|rot|rotation|rotation_matrix|t|p|T|trans|translation|tvec)\s*[:=]\s*[\[(\n]
     | [xyzw]:\s*{NUMBER}\s*,
     | <(?:origin|joint|node|Matrix|Quaternion|Euler)\b | (?:args|x)\s*=
-    | (?:\[\w++\]\ .*+\n\s*+)*+(?:At\ (?:any\ )?time\b|-\ ++(?:Translation|Rotation):|\S+\ seen\ from\ )
+    | (?:\[\w++\]\ .*+\n\s*+)*+(?:At\ (?:any\ )?time\b|-\ ++(?:Translation|Rotation):|Rotation:\ in\ |\S+\ seen\ from\ )
     | (?:Requesting\ state\ .*+\s++)?(?:Model:\ \[|(?:-\ )?Pose\ \[\ XYZ)
     | .*\b{CALL}\s | --(?:[xyz]|roll|pitch|yaw|q[xyzw]|(?:child-)?frame-id)[ =]
     )"""

@@ -92,6 +92,8 @@ PLACED = {
     "a C array": "{0, -1, 0, 0.5, 1, 0, 0, -1, 0, 0, 1, 2}",
     "tf2_echo of ROS 1 Noetic": BLOCK_1,
     "tf2_echo of ROS 2 Jazzy": BLOCK_2,
+    "tf2_echo of ROS 1, from behind the first dash": BLOCK_1.partition("\n- ")[2],
+    "tf2_echo of ROS 2, without dashes": BLOCK_2.partition("\n- ")[2].replace("\n- ", "\n"),
     "rostopic echo Noetic, from the middle of a line": FRAGMENT,
     "rclpy Jazzy, repr of a Transform": "geometry_msgs.msg.Transform(translation=geometry_msgs.msg.Vector3(x=0.5, y=-1.0, "
     f"z=2.0), rotation=geometry_msgs.msg.Quaternion(x=0.0, y=0.0, z={HALF!r}, w={HALF!r}))",
@@ -252,7 +254,7 @@ def test_three_rows_that_may_be_positions_are_refused_where_both_have_a_result(r
 
 
 def test_blocks_of_tf2_echo_are_poses_at_their_times(run: Run) -> None:
-    outcome = run("convert", "-", "-f", "json", stdin=BLOCK_1 + BLOCK_1.replace("110.083", "111.5") + BLOCK_2)
+    outcome = run("convert", "-", "-f", "json", stdin=BLOCK_1 + BLOCK_1.replace("110.083\n- ", "111.5\n") + BLOCK_2)
     stamps = [json.loads(line).get("stamp_ns") for line in outcome.out.splitlines()]
     assert stamps == [1253924110083000000, 1253924111500000000, None]
 
