@@ -349,7 +349,7 @@ UNITS = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "deg": 1.0, "
 SIGNS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
 }  # fmt: skip
-_LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z]*|%)"
+_LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d+)?)\s*([a-z]*|%)"
 
 
 class Limit(NamedTuple):

@@ -114,7 +114,7 @@ _TABLE = "frametool.stream.table_samples"
 _POSE_ROWS = "frametool.formats.rows.pose_rows"
 BAG = "frametool.recordings.messages"
 _RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
@@ -301,8 +301,8 @@ FORMATS = {
         magic=(
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
             ("json path", "*/T_BS/data"),
-            ("line", r"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+): *(?:\[|$)"),
-            ("text", r'(?m)^(?:\{\s*|[ \t]+)"(?:T_[A-Za-z]\w*_\w+|[A-Za-z]\w*_T_\w+)":\s*\['),
+            ("line", r"(?=\w+: *(?:\[|$))(?:T_[A-Za-z]\w*_\w|[A-Za-z]\w*_T_\w)"),
+            ("text", r'(?m)^(?:\{\s*|[ \t]+)"(?=\w+":\s*\[)(?:T_[A-Za-z]\w*_\w|[A-Za-z]\w*_T_\w)'),
             ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
         ),
         conventions="target<-source as each key says; metres; intrinsics are not kept",

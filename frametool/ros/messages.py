@@ -265,7 +265,7 @@ def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading)
 
 STATE_LISTS = ("name", "position", "velocity", "effort")
 _NUMBERED = re.compile(r"(name|position)(\d+)")
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)")
+_NUMBER = re.compile(r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?|[-+]?(?:nan|inf)")
 
 
 def is_joint_state(value: dict[str, Any]) -> bool:

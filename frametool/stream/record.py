@@ -144,7 +144,7 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
     try:
         search = _search_under if request.columns else _search
         found = list(search(document, (), (), request)) if request.poses else []
-        is_bare = request.poses and not request.operation.moves
+        is_bare = request.poses and not request.operation.takes_points
         if not found and is_bare and type(document) is dict and NOTHING_BUT.issuperset(document):
             reading.here = path
             reading.note("neither position nor rotation: taken as the identity", rule="identity")

@@ -35,7 +35,7 @@ from frametool.text.spans import Spans, windows
 if TYPE_CHECKING:
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Words
 
-_NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[ \t]*")
+_NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
 _MOST_WORDS = 3
 _EXACT = 1 << 53
 # Results are good to 2**-100; what the rounding dropped may be off by this share of itself and still be decided.
