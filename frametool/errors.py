@@ -53,7 +53,7 @@ class FrametoolError(Exception):
     @property
     def kind(self) -> str:
         """Return the name of the failure in machine output: `unknown_frame`."""
-        name = type(self).__name__
+        name = next(each.__name__ for each in type(self).__mro__ if each.__name__[0] != "_")
         return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name)[1:]
 
     def details(self) -> dict[str, object]:

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
 
 # plain words and numbers that mean themselves in YAML and hold nothing that JSON would need to escape
-_WORD = r"(?:(?!(?:null|Null|NULL)[^\w./-])[A-Za-z_/][\w./-]*+|[-+]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]+)?)"
+_WORD = r"(?:(?!(?:null|Null|NULL)[^\w./-])[A-Za-z_/][\w./-]*+|[-+]?(?:[0-9]++\.?[0-9]*+|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
 _LIST = rf"\[{_WORD}(?:, {_WORD})*+\]"
 _PAIR = rf"{_WORD}: (?:{_WORD}|{_LIST})"
 _BLOCKS = rf"(?a)(?P<indent> *)- {_PAIR}\n(?:(?P=indent)(?:- |  ){_PAIR}\n)*+\Z"

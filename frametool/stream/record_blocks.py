@@ -5,16 +5,17 @@ The same definition as for one record (`template.learn`), evaluated for many at 
 
 from __future__ import annotations
 
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 from frametool.stream.answers import Outside
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, STOP, Fault, RowNote
 from frametool.stream.record_cuts import RecordCutter, block_of, in_order, plan_of
-from frametool.stream.record_text import Rendered, column_in, null_of, rendered
+from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.rows import texts_as_rows, written
 from frametool.stream.run import Outcome
-from frametool.stream.splitter import ARRAY
+from frametool.stream.splitter import ARRAY, Part
 from frametool.stream.template import Template
 from frametool.text.spans import framed
 
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 
     from frametool.stream.record_cuts import Cut, FoundRecords, Places
     from frametool.stream.request import Request
-    from frametool.stream.splitter import Part, Splitter
+    from frametool.stream.splitter import Splitter
+
+MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
 
 
 class Found:
@@ -106,12 +109,14 @@ class RecordBlocks:
             run = Run(plan, block_of(cut, data, text), self.state)
             runs.append(run)
             bad = [(int(run.block.places[row]), row) for row in run.reasons]
-            faults += [(place, Fault.of(run.block.line_of(row), *run.reasons[row])) for place, row in bad]
+            told = [Fault.of(run.block.line_of(row), *run.reasons[row]) for _, row in bad]
+            told[:MOST_EXACT] = map(self._exactly, repeat(text), repeat(cut), bad[:MOST_EXACT], told)
+            faults += zip((place for place, _ in bad), told, strict=True)
             odd += [] if skips else [(place, _null_row(cut, row, text)) for place, row in bad]
             notes += [run.note_of_degrees(*each) for each in run.doubted[:1]]
             notes += run.rounded
-            told = [*cut.template.notes, *cut.template.of_places]
-            notes += [each._replace(line=run.block.line_of(0)) for each in told if len(cut.starts)]
+            own = [*cut.template.notes, *cut.template.of_places]
+            notes += [each._replace(line=run.block.line_of(0)) for each in own if len(cut.starts)]
         end = min((place for place, _ in faults), default=None) if stops else None
         groups = [group for run in runs for group in run.groups(end)]
         kept = sum(len(run.rows) for run in runs) + found.alone + (0 if skips else len(faults))
@@ -131,9 +136,20 @@ class RecordBlocks:
             None if self.cutter.splitter.layout != ARRAY else not self.cutter.closed,
         )
 
+    def _exactly(self, text: bytes, cut: Cut, bad: tuple[int, int], fault: Fault) -> Fault:
+        """Return what is wrong with a record as it is said of one alone, with its place; else the fault."""
+        part = _part(cut, bad[1])
+        said = attempt(text, part, self.form, self.request, self.cutter.source, text.count(b"\n", 0, part.start))
+        return said if isinstance(said, Fault) else fault
+
+
+def _part(cut: Cut, row: int) -> Part:
+    """Return where a record stands."""
+    begin, start = int(cut.starts[row, -1]), int(cut.starts[row, 0])
+    return Part(begin, start, int(cut.starts[row, -2]), int(cut.ends[row, -2]))
+
 
 def _null_row(cut: Cut, row: int, text: bytes) -> bytes:
     """Return what stands for a record without a result, with what goes with it."""
-    begin, start = int(cut.starts[row, -1]), int(cut.starts[row, 0])
-    end, after = int(cut.starts[row, -2]), int(cut.ends[row, -2])
+    begin, start, end, after, *_ = _part(cut, row)
     return text[begin:start] + null_of(text[start:end], json=cut.template.json) + text[end:after]

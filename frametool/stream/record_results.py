@@ -91,11 +91,12 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
                     text = decode(block[part.start : part.end], bad.source)
                     plain_text = without_noise(text) if form == "yaml" else text
                     source = Source(bad.source, plain_text, line, column_in(block, part.start))
-                    found = results(source, request, style, memory, teller)
+                    found = results(source, request, style, memory, teller, json=form == "json")
                     values += zip(count(part.start), found, strict=False)
             except FormatError as error:
                 below, column = source.place(max(error.line, 1), error.column)
-                fault = Fault(below, str(column) if error.column else "", error.message)
+                named = getattr(error, "column_name", "") or (str(column) if error.column else "")
+                fault = Fault(below, named, error.message, kind=error.kind)
             except FrametoolError as error:
                 fault = Fault.of(line, "", error)
             if fault is not None and (fault.final or bad.on_error == STOP):

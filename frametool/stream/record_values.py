@@ -27,7 +27,7 @@ from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 from frametool.stream.splice import refuse_member, target_of
 from frametool.stream.stamp_source import read_stamp
-from frametool.stream.template import cut, edits_of, filled, rest_of, used_keys
+from frametool.stream.template import cut, edits_of, filled, json_documents, rest_of, used_keys
 from frametool.stream.text_parts import Const, Word
 
 if TYPE_CHECKING:
@@ -147,18 +147,19 @@ def documents(source: Source, request: Request) -> Iterator[tuple[Document, list
 
 
 def results(
-    source: Source, request: Request, style: Style, memory: Memory | None = None, teller: Teller | None = None
-) -> Iterator[Value]:
+    source: Source, request: Request, style: Style, memory: Memory | None = None, teller: Teller | None = None,
+    *, json: bool = False,
+) -> Iterator[Value]:  # fmt: skip
     """Yield the results of every record of a text in a form: poses with what else their records say, or messages.
 
-    memory: of the records before this text; teller: of what was told before.
+    memory: of the records before this text; teller: of what was told before; json: the text is strict JSON.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
     own, memory, request = teller or Teller(), memory or Memory(), request._replace(canonical=True)
     nodes: list[Node] = []
     spliced = _Spliced(source, request)
     units: dict[Path, tuple[Document, list[Answer]]] = {}
-    documents = parse_documents(source.text, source.name)
+    documents = json_documents(source) if json else parse_documents(source.text, source.name)
     for document in documents:
         entries = read_entries(document, request, source, partial(own.tell, source))
         found = (_answer(document, entry, request, source, memory, own) for entry in entries)

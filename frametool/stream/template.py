@@ -497,7 +497,7 @@ def learn(text: str, request: Request, *, json: bool, source: str, line: int) ->
     here = Source(source, text)
     notes: list[Finding] = []
     try:
-        documents = _json_documents(here) if json else parse_documents(text, source)
+        documents = json_documents(here) if json else parse_documents(text, source)
         entries = [entry for document in documents for entry in read_entries(document, request, here, notes.extend)]
     except FormatError as error:
         error.line += line - 1
@@ -518,7 +518,7 @@ def nulled(text: str, *, json: bool) -> str | None:
     from frametool.stream.splice import null_edits
 
     try:
-        _json_documents(Source("", text)) if json else parse_documents(text, "")
+        json_documents(Source("", text)) if json else parse_documents(text, "")
         edits = null_edits(Node(0, len(text), parse_nodes(text)))
     except FormatError:
         return None
@@ -529,7 +529,7 @@ def nulled(text: str, *, json: bool) -> str | None:
     return "".join(shown)
 
 
-def _json_documents(source: Source) -> list[Document]:
+def json_documents(source: Source) -> list[Document]:
     """Read strict JSON: what only YAML would take is a fault of the record."""
     check_text(source)
     values = strict_json(source)

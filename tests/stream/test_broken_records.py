@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import re
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from flow import MOVE, asked, convert, flow
+
+from frametool.documents.json import dump
+from frametool.documents.source import Verbatim
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
 
 CONSECUTIVE = asked(of="previous")
 GOOD = '{"point":[1,2,3]}\n'
@@ -51,3 +60,37 @@ def test_a_cut_first_line_takes_no_other_with_it(cut: str, count: int) -> None:
     result = flow(f"{cut}\n{GOOD * count}".encode(), MOVE._replace(on_error="skip"), "json")
     assert result.text.count(b"[-1.0,3.0,6.0]") == count
     assert result.told[-1] == f"in: 1 of {count + 1} rows skipped"
+
+
+WHOLE: dict[str, Any] = {"header": {"frame_id": "a"}, "pose": {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}}
+NOT_FINITE, NO_UNIT, NO_NUMBER, HALF = (copy.deepcopy(WHOLE) for _ in range(4))
+NOT_FINITE["pose"]["position"]["z"] = Verbatim("1e999")
+NO_UNIT["pose"]["orientation"]["z"] = 2
+NO_NUMBER["pose"]["position"]["y"] = "q"
+del HALF["pose"]["orientation"]["w"]
+BLOCK = "header:\n  frame_id: a\npose:\n  position:\n    x: {x}\n    y: {y}\n    z: {z}\n  orientation: {q}\n"
+
+
+def document(record: Any, form: str) -> str:
+    """Write a record on a line of JSON, or as a document of YAML with a number a line."""
+    position, orientation = record["pose"]["position"], record["pose"]["orientation"]
+    return f"{dump(record)}\n" if form == "json" else f"{BLOCK.format(**position, q=dump(orientation))}---\n"
+
+
+@pytest.mark.parametrize("form", ["json", "yaml"])
+@pytest.mark.parametrize("repeated", [1, 100])
+def test_a_bad_record_has_one_place_whatever_is_written(form: str, repeated: int, run: Callable[..., Any], tmp_path: Path) -> None:
+    records = [*[WHOLE] * repeated, NOT_FINITE, *[WHOLE] * repeated, NO_UNIT, NO_NUMBER, WHOLE, HALF]
+    (tmp_path / f"a.{form}").write_text("".join(document(each, form) for each in records))
+    told = set()
+    for sink in ("csv", "yaml", "json", "npy", "tum", "ros2"):
+        done = run("apply", "--transform", "{name: a}", "-i", f"a.{form}", "-f", sink, "-o", f"out.{sink}", "--on-error", "skip", "--quiet")
+        assert done.status == 3
+        told.add(tuple(line for line in said_in(done.err) if "skipped" in line))
+    (only,) = told
+    assert [line.split(": ")[0].split(":")[2] for line in only[:4]] == ["pose.position.z", "pose.orientation", "pose.position.y", "pose.orientation"]
+
+
+def said_in(err: str) -> list[str]:
+    """Return the messages of errors, for machines or for people."""
+    return [json.loads(line)["message"] if line[:1] == "{" else line.removeprefix("frametool: ") for line in err.splitlines()]
