@@ -46,7 +46,7 @@ INFO = "sensor_msgs/msg/CameraInfo"
 # what Camera takes -> keys that files have for it; OpenCV's may end in a number
 KEYS = {
     "K": "K|k|camera_matrix|cameraMatrix|M|camera_intrinsic",
-    "D": "D|d|distortion_coefficients|distortion_coeffs|dist_?[cC]oeffs|dist",
+    "D": r"D|d|dist(?!ance|ortion_(?:model|type))\w*?",
     "R": "R|r|rectification_matrix",
     "P": "P|p|projection_matrix",
     "model": "distortion_model|model",
@@ -60,7 +60,7 @@ COLMAP = {
     "SIMPLE_RADIAL_FISHEYE": ("equidistant", 1, 1), "RADIAL_FISHEYE": ("equidistant", 1, 2), "FOV": ("fov", 2, 1),
     "EUCM": ("eucm", 2, 2),
 }  # fmt: skip
-ANGLE = "camera_angle_x"
+ANGLE, LISTED = "camera_angle_x", "intrinsics"  # keys of NeRF and Kalibr
 
 
 def load_camera(
@@ -185,8 +185,8 @@ def _in_document(value: Any, file: InputFile) -> Found:
         yield "", camera_fields(value)
     elif "frames" in value or "camera" in value:
         yield from _ours(value, "")
-    elif chain := {name: each for name, each in {"": value, **value}.items() if "intrinsics" in (each or ())}:
-        yield from ((name, _kalibr(each)) for name, each in chain.items() if isinstance(each, dict))
+    elif chain := {at: each for at, each in {"": value, **value}.items() if isinstance(each, dict) and LISTED in each}:
+        yield from ((name, _kalibr(each)) for name, each in chain.items())
     else:
         numbers = [match[1] for key in value if (match := re.fullmatch(r"(?:K|M|camera_?[mM]atrix)_?(\d+)", key))]
         name = (value.get("header") or {}).get("frame_id") or value.get("camera_name") or ""
@@ -211,8 +211,8 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for taken, keys in KEYS.items():
         for key, each in value.items():
-            if re.fullmatch(rf"(?:{keys})_?{end}", key) and each not in (None, "", []):
-                found.setdefault(taken, str(each) if taken == "model" else numbers_of(each))
+            if re.fullmatch(rf"(?:{keys})_?{end}", key) and each and isinstance(each, str) == (taken == "model"):
+                found.setdefault(taken, each if taken == "model" else numbers_of(each))
     for key in ("P", "R"):
         if "P" not in found or not any(found.get(key, ())):
             found.pop(key, None)
@@ -247,7 +247,7 @@ def _in_bag(file: InputFile) -> Found:
 def _kalibr(value: dict[str, Any]) -> dict[str, Any]:
     """Return a camera of a camchain, or of a sensor.yaml of EuRoC: the model's own parameters come first."""
     lens, warp = value.get("camera_model", "pinhole"), value.get("distortion_model", "none")
-    numbers = numbers_of(value["intrinsics"])
+    numbers = numbers_of(value[LISTED])
     d = numbers_of(value.get("distortion_coeffs") or value.get("distortion_coefficients") or [])
     own = dict(zip(CAMERA_MODELS[lens].parameters, numbers, strict=False)) if lens in CAMERA_MODELS else {}
     if warp == "fov":

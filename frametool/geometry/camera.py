@@ -594,9 +594,10 @@ def _model_of(model: str | None, count: int, own: dict[str, float]) -> tuple[str
     name = next((name for name, row in CAMERA_MODELS.items() if model.lower() in (name, *row.aliases)), "")
     if not name:
         raise ValueInvalid(f"camera model {shown(model)} is not known{alternatives(model, CAMERA_MODELS, 'models')}")
-    if name == "plumb_bob" and (counted := {8: "rational_polynomial", 12: "thin_prism"}.get(count)):
-        warn(f"plumb_bob with {count} coefficients is read as {counted}")
-        name = counted
+    counted = {4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial", 12: "thin_prism"}
+    if name in counted.values() and counted.get(count, name) != name:
+        warn(f"{name} with {count} coefficients is read as {counted[count]}")
+        name = counted[count]
     row = CAMERA_MODELS[name]
     if count and count not in row.coefficients:
         counts = " or ".join(map(str, row.coefficients)) or "no"

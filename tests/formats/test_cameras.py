@@ -259,6 +259,16 @@ def test_axes_of_a_nerf_camera_come_with_its_tree(tmp_path: Path) -> None:
         assert frametool.load_camera(tmp_path / "transforms.json").axes == "optical"
 
 
+@pytest.mark.parametrize("key", ["distCoeffs", "dist_coeffs", "distortion", "D"])
+@pytest.mark.parametrize("matrix", ["cameraMatrix", "K", "M"])
+def test_keys_of_opencv(tmp_path: Path, matrix: str, key: str) -> None:
+    k = "{rows: 3, cols: 3, data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}"
+    text = f"%YAML:1.0\n---\n{matrix}1: {k}\n{key}1: [0.1, 0.2, 0.3, 0.4, 0.5]\n{matrix}2: {k}\ncamera_name: my_intrinsics\np1: 3\n"
+    put(tmp_path, {"cv.yml": text})
+    assert frametool.load_camera(tmp_path / "cv.yml", "1").D == (0.1, 0.2, 0.3, 0.4, 0.5)
+    assert frametool.load_camera(tmp_path / "cv.yml", "2").model == "pinhole"
+
+
 def test_the_cameras_of_a_pose_file_by_opencv(tmp_path: Path) -> None:
     pose = "body_T_cam1: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.]\n"
     put(tmp_path, {"rig.yml": FORMS["OpenCV YAML, M1 D1 M2 D2"]["files"]["stereo.yml"] + pose})

@@ -320,10 +320,10 @@ def test_every_alias_is_its_model() -> None:
         assert {Camera(alias, [1, 1, 0, 0], **given).model for alias in (name, *row.aliases)} == {name}
 
 
-@pytest.mark.parametrize("count", [8, 12])
-def test_more_coefficients_than_plumb_bob_has(count: int) -> None:
-    with pytest.warns(FrametoolWarning, match=f"plumb_bob with {count} coefficients is read as"):
-        assert len(Camera("plumb_bob", [1, 1, 0, 0], [0.01] * count).D) == count
+@pytest.mark.parametrize(("model", "count"), [("plumb_bob", 8), ("plumb_bob", 12), ("rational_polynomial", 5), ("rational_polynomial", 12)])
+def test_the_count_of_coefficients_goes_before_the_name(model: str, count: int) -> None:
+    with pytest.warns(FrametoolWarning, match=f"{model} with {count} coefficients is read as"):
+        assert len(Camera(model, [1, 1, 0, 0], [0.01] * count).D) == count
 
 
 K = [1.0, 1.0, 0.0, 0.0]
