@@ -574,7 +574,7 @@ CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "ner
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
     """Give a tree the cameras of its files: those in trees of ours, others when one is asked for."""
 
-    def read_cameras() -> dict[str, Callable[[], Camera]]:
+    def read_cameras() -> dict[str, Callable[..., Camera]]:
         from frametool.formats.cameras import cameras_of_tree
 
         others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]

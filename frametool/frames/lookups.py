@@ -44,7 +44,7 @@ class Frames:
     at_ns: int | None = None  # the time that a tree was taken at, of one that moves
 
     cameras: Mapping[str, Camera] = MappingProxyType({})  # of frames, as a tree of ours says
-    read_cameras: Callable[[], dict[str, Callable[[], Camera]]] = staticmethod(dict)  # in files of other forms
+    read_cameras: Callable[[], dict[str, Callable[..., Camera]]] = staticmethod(dict)  # in files of other forms
 
     def __init__(self, name: str) -> None:
         """Create an empty set of frames; `name` says in error messages where they come from."""
@@ -133,9 +133,10 @@ class Frames:
         """List the frames whose intrinsics are known."""
         return [*dict.fromkeys((*self.cameras, *self.read_cameras()))]
 
-    def camera(self, frame: str) -> Camera:
+    def camera(self, frame: str, size: tuple[int, int] | None = None) -> Camera:
         """Return the camera that a frame is: its intrinsics as the tree's files say, points seen in its own axes.
 
+        size: of the picture, where a file does not say it, or another
         Raises UnknownFrame, ValueInvalid where there are none, FormatError where they cannot be read.
         """
         self.require(frame)
@@ -146,7 +147,7 @@ class Frames:
             if frame not in known:
                 what = f"{self.name}: {bare(frame)} has no intrinsics; --camera FILE[:NAME]"
                 raise ValueInvalid(f"{what}; cameras: {listing(self.camera_names) or 'none'}")
-            found = known[frame]()
+            found = known[frame](size=size)
         axes = self.camera_axes.get(frame, found.axes)
         return found if axes == found.axes else found.changed(axes=axes)
 

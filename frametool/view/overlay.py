@@ -46,7 +46,8 @@ def read_shot(path: str) -> Shot:
         if data[at + 1] in FRAMES:
             height, width = (int.from_bytes(data[begin : begin + 2], "big") for begin in (at + 5, at + 7))
             return Shot(data, "jpeg", width, height)
-        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+        is_filled = data[at + 1] == 0xFF  # before a marker there may be more of its first byte
+        at += 1 if is_filled else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
     raise FormatError("neither a PNG nor a JPEG; an overlay is drawn over one of these", source=path)
 
 
@@ -95,8 +96,9 @@ class Overlay:
 
     def summary(self) -> str:
         """Return what was drawn."""
-        thinned = f", every {self.every}th of {self.count}" if self.every > 1 else ""
-        return f"{self.path}: {len(self.points)} points over {self.image}{thinned}"
+        thinned = f", 1 in {self.every} of {self.count}" if self.every > 1 else ""
+        points = f"{len(self.points)} point{'s' * (len(self.points) != 1)}"
+        return f"{self.path}: {points} over {self.image}{thinned}"
 
     @property
     def span(self) -> tuple[float, float]:
@@ -166,7 +168,9 @@ class Overlay:
         axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.axis("off")
         ends = (-0.5, shot.width - 0.5, shot.height - 0.5, -0.5)
-        axes.imshow(imread(BytesIO(shot.data), format=shot.kind), extent=ends, interpolation="none", cmap="gray")
+        pixels = imread(BytesIO(shot.data), format=shot.kind)
+        white = 1.0 if pixels.dtype.kind == "f" else 255.0
+        axes.imshow(pixels, extent=ends, interpolation="none", cmap="gray", vmin=0.0, vmax=white)
         if self.points:
             depths, us, vs = zip(*self.points, strict=True)
             colours = [self._colour(depth) for depth in depths]

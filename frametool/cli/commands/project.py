@@ -21,7 +21,7 @@ from frametool.cli.options import (
 )
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, values_of
-from frametool.cli.sink import writing
+from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import FRAME
@@ -112,12 +112,13 @@ def command(inputs: Inputs) -> int:
     if inputs.image is not None:
         from frametool.view.overlay import Overlay
 
+        refuse_existing(inputs.output, force=inputs.force)
         overlay = Overlay(inputs.image, inputs.output)
         task.scale(overlay.size)
     task.camera = task.rectified()
     if task.camera.size is None and not inputs.quiet:
         say("note: the camera has no size, in_image is empty; --size W,H gives it one")
-    output = Output(inputs, "points", otherwise="yaml") if overlay is None else Undrawn(inputs, "points")
+    output = Output(inputs, "points", otherwise="yaml") if overlay is None else Undrawn(inputs)
     take = None if overlay is None else overlay.take
     seen = Projection(task.camera, inputs.first_pixel, ranged=bool(inputs.ranged), take=take)
     request = task.request(inputs.frame_column if task.is_stream else None, seen, seen.shown(task.name))
@@ -132,6 +133,11 @@ def command(inputs: Inputs) -> int:
 
 class Undrawn(Output):
     """The rows of an overlay, which are not written."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        """Take no path: it is that of the drawing."""
+        super().__init__(inputs, "points", otherwise="yaml")
+        self.path = None
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open no place."""
@@ -164,7 +170,7 @@ class CameraTask:
         """Return the camera in the axes of its frame, as its pixels are wanted."""
         inputs, tree = self.inputs, None if self.way is None else self.way.tree
         if tree is not None and inputs.camera is None:
-            camera = tree.camera(self.name)
+            camera = tree.camera(self.name, inputs.size)
         else:
             from frametool.formats.cameras import load_camera
 
