@@ -13,6 +13,7 @@ import struct
 from collections import Counter
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,17 +22,7 @@ from frametool import sizes
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import FileProblem, FormatError, ValueInvalid, printable, shown, warn
-from frametool.formats.rows.column_file import (
-    FLOATS,
-    WHOLE,
-    Batch,
-    Collected,
-    ColumnFile,
-    ColumnNumbers,
-    plain_value,
-    seekable,
-    whole_stamps,
-)
+from frametool.formats.rows import column_file
 from frametool.frames.stamps import SUFFIXES
 from frametool.text.parse import nanoseconds_of
 
@@ -69,7 +60,7 @@ def kind_of(arrow_type: Any) -> Kind | None:
 def is_floating(arrow_type: Any) -> bool:
     """Return True if a type of Arrow is one of floating point."""
     kind = kind_of(arrow_type)
-    return kind is not None and kind.kind in FLOATS
+    return kind is not None and kind.kind in column_file.FLOATS
 
 
 def in_one(column: Any) -> Any:
@@ -110,7 +101,7 @@ def stamps_of(column: Any, name: str) -> tuple[Ints, Flags | None, Ints]:
     return counts.fill_null(0).to_numpy(zero_copy_only=False), nulls, np.zeros(0, np.int64)
 
 
-class ArrowBatch(Batch):
+class ArrowBatch(column_file.Batch):
     """Some rows of a file.
 
     rows: a RecordBatch; ends_group: whether they are the last of a group of rows that is written as one
@@ -122,10 +113,10 @@ class ArrowBatch(Batch):
         self.size = int(rows.num_rows)
         self.bytes_read, self.ends_group = bytes_read, ends_group
 
-    def numbers(self, place: int) -> ColumnNumbers:
+    def numbers(self, place: int) -> column_file.ColumnNumbers:
         """Return a column as floats, nan where it is null."""
         column = self.rows.column(place)
-        return ColumnNumbers(column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column))
+        return column_file.ColumnNumbers(column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column))
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none: timestamps, integers by their name, float seconds."""
@@ -134,8 +125,8 @@ class ArrowBatch(Batch):
             raise ValueInvalid(f"column {shown(name)} is {column.type}; {SUFFIXES[in_ns]} are integers or timestamps")
         stamps, nulls, bad = stamps_of(column, name)
         kind = kind_of(column.type)
-        if kind is not None and kind.kind in WHOLE:
-            numbers, (stamps, beyond) = stamps, whole_stamps(stamps, in_ns)
+        if kind is not None and kind.kind in column_file.WHOLE:
+            numbers, (stamps, beyond) = stamps, column_file.whole_stamps(stamps, in_ns)
             if beyond.any():
                 remedy = "are these some? then call the column stamp_ns, or let it be a timestamp"
                 seconds = numbers[int(np.argmax(beyond))]
@@ -158,7 +149,7 @@ class ArrowBatch(Batch):
         if kind_of(column.type) is None and not kind.startswith(STRUCTURED):
             with suppress(pa.ArrowInvalid, pa.ArrowNotImplementedError, pa.ArrowTypeError):
                 column = column.cast(pa.string())
-        return list(map(plain_value, column.to_pylist()))
+        return list(map(column_file.plain_value, column.to_pylist()))
 
     def column(self, place: int) -> Any:
         """Return a column as it is: numbers and truth values without a null as an array, else plain values."""
@@ -194,7 +185,7 @@ def translated(name: str) -> Iterator[None]:
         raise FormatError(f"it cannot be read: {printable(first[:200].rstrip('. '))}", source=name) from None
 
 
-class ArrowFile(ColumnFile):
+class ArrowFile(column_file.ColumnFile):
     """A file that was opened: its schema is read, its rows are not."""
 
     gaps = False
@@ -244,7 +235,7 @@ class ArrowFile(ColumnFile):
         pa = require_pyarrow(self.name)
         if file.path != "-" and os.path.isfile(file.path):
             return pa.OSFile(file.path)
-        stream = seekable(file, self)
+        stream = column_file.seekable(file, self)
         stream.seek(0)
         return pa.PythonFile(stream, mode="r")
 
@@ -254,6 +245,27 @@ class ArrowFile(ColumnFile):
         form = style.form if style.form in WRITERS else self.form
         same = WRITERS[form] is WRITERS[self.form]
         return WRITERS[form](form, columns, self.schema, self.encoding() if same else {})
+
+
+class Collected(BytesIO):
+    """A file to write to, whose bytes are taken out piece by piece."""
+
+    before = 0  # bytes that were taken out
+
+    def tell(self) -> int:
+        """Return how many bytes were written so far."""
+        return self.before + super().tell()
+
+    def close(self) -> None:
+        """Do nothing: what was written is still to be taken."""
+
+    def taken(self) -> bytes:
+        """Return what was written since the last time."""
+        piece = self.getvalue()
+        self.before += len(piece)
+        self.seek(0)
+        self.truncate()
+        return piece
 
 
 class GroupWriter:
@@ -279,7 +291,7 @@ class GroupWriter:
         """Write a group of rows."""
         raise NotImplementedError
 
-    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> memoryview:
+    def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Return what is written once a group of rows is whole."""
         new = self._rows(batch, rows, made)
         self.waiting.append(new)
@@ -296,7 +308,7 @@ class GroupWriter:
         if self.waiting or self.writer is None:
             self._write_group()
         self.writer.close()
-        yield bytes(self.sink.taken())
+        yield self.sink.taken()
 
     def _field(self, column: OutColumn, given: Any | None) -> Any:
         """Return the field of a column: that of the input where it passes or is replaced."""
