@@ -10,17 +10,7 @@ import numpy as np
 
 from frametool.errors import ValueInvalid, shown
 from frametool.fit import alignment as pairing
-from frametool.fit.alignment import (
-    ALIGNMENTS,
-    LIMIT_S,
-    SCALED,
-    Fit,
-    Unaligned,
-    clock_offset,
-    fitted,
-    lever_arm,
-    principal_axes,
-)
+from frametool.fit.alignment import ALIGNMENTS, Fit, Unaligned, clock_offset, fitted, lever_arm, principal_axes
 from frametool.fit.least_squares import require_near
 from frametool.fit.numbers import absolute_errors, all_pairs, chained, is_lost, relative_errors, segment_errors
 from frametool.frames.stamps import format_stamp
@@ -102,7 +92,7 @@ class Settings(NamedTuple):
     max_diff_ns: float = 10_000_000
     min_match: float = 0.1
     offset: int | str | None = None
-    offset_limit_s: float = LIMIT_S
+    offset_limit_s: float = pairing.LIMIT_S
     align: str = "se3"
     align_first: Delta | None = None
     tie_first: bool = False
@@ -235,7 +225,7 @@ def _paired(
         return pairing.by_number(ref, est), 0, None
     offset_ns, score = 0, None
     if settings.offset == AUTO:
-        kind = "sim3" if settings.align in SCALED else "se3"
+        kind = "sim3" if settings.align in pairing.SCALED else "se3"
         by_turning = settings.mount == AUTO
         found = clock_offset(ref, est, limit_s=settings.offset_limit_s, kind=kind, by_turning=by_turning)
         if found.score < CLEAR:

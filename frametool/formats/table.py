@@ -69,11 +69,11 @@ class Format(NamedTuple):
         return self.delimiter is not None
 
 
-def _trajectory(summary: str, module: str, **fields: Any) -> Format:
-    """Return the row of a form that lists poses of one frame, which one module writes, and reads unless told."""
-    known: dict[str, Any] = {"reader": module, "required_options": ("frames", "stamps", "camera_axes")}
+def _trajectory(summary: str, reader: str, **fields: Any) -> Format:
+    """Return the row of a form that lists poses of one frame, all written alike."""
+    known: dict[str, Any] = {"reader": reader, "required_options": ("frames", "stamps", "camera_axes")}
     known |= {"reads": ("tree", "trajectory", "rows"), "writes": ("poses", "trajectory")}
-    return Format(summary, writer=module, **known | fields)
+    return Format(summary, writer="frametool.formats.rows.pose_rows", **known | fields)
 
 
 def _tree(summary: str, module: str, **fields: Any) -> Format:
@@ -111,7 +111,6 @@ _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
-_POSE_ROWS = "frametool.formats.rows.pose_rows"
 BAG = "frametool.recordings.messages"
 _RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
 _NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
@@ -196,7 +195,7 @@ FORMATS = {
         magic=(("header", r"#|\s*\S+\s+\S"),), delimiter="",
     ),
     "tum": _trajectory(
-        "trajectory: t x y z qx qy qz qw", _POSE_ROWS, suffixes=(".tum",), reader=_TABLE,
+        "trajectory: t x y z qx qy qz qw", _TABLE, suffixes=(".tum",),
         magic=(("line", rf"(?:{_NUMBER}[ \t]+){{7}}{_NUMBER}\s*$"),),
         conventions="world<-body, seconds, metres, quaternion x y z w", required_options=("frames",), delimiter="",
         columns=("t", "x", "y", "z", "qx", "qy", "qz", "qw"), poses=Poses("xyzw", counted=""),
@@ -252,7 +251,7 @@ FORMATS = {
     ),
     "mermaid": Format("a mermaid flowchart", (".mmd",), writes=("tree",), writer="frametool.formats.trees.drawings"),
     "euroc": _trajectory(
-        "EuRoC ground truth", _POSE_ROWS, reader=_TABLE,
+        "EuRoC ground truth", _TABLE,
         magic=(
             ("text", r"\A\ufeff?#\s*timestamp[^\n]*q_RS_w"),
             ("line", rf"\d{{19}}(?:\s*,\s*{_NUMBER}){{7}}(?:(?:\s*,\s*{_NUMBER}){{9}})?\s*$"),
@@ -275,7 +274,7 @@ FORMATS = {
         magic=(("json path", "frames/transform_matrix"),), conventions="world<-camera; opengl (y up, z back)",
     ),
     "kitti": _trajectory(
-        "KITTI poses", _POSE_ROWS, reader=_TABLE,
+        "KITTI poses", _TABLE,
         magic=(("line", rf"(?:{_NUMBER}[ \t]+){{11}}{_NUMBER}\s*$"),), conventions="world<-cam0, metres", delimiter="",
         columns=("r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"), widths=(12,),
         poses=Poses("matrix", axes="optical", frames=("world", "cam0"), counted="numbers of pictures"),

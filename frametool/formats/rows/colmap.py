@@ -15,7 +15,7 @@ import re
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, shown
-from frametool.formats.rows.pose_rows import IMAGE, Numbers, RowForm, Written, numbers_in, samples, text_lines, whole_in
+from frametool.formats.rows.pose_rows import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:
@@ -29,16 +29,6 @@ NUMBER_BEFORE = r"[-+.\d]+(?:[eE][-+]?\d+)?\s"
 FRAME_LINE = "FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS .."
 POSES = FORMATS["colmap"].poses
 
-
-ROWS = RowForm(
-    ("number", b" ", Numbers(7), b" 1 ", IMAGE, b"\n\n"),
-    lambda tx, ty, tz, x, y, z, w: (w, x, y, z, tx, ty, tz),
-    head=b"# Image list with two lines of data per image:\n"
-    b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
-    first=1,
-    holds=(),
-    beside="every camera is number 1, without points",
-)
 
 
 def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG001 - as the other forms have it

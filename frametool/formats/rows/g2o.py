@@ -14,7 +14,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from frametool.errors import FormatError, did_you_mean, listing, shown
-from frametool.formats.rows.pose_rows import Numbers, RowForm, Written, numbers_in, samples, text_lines, whole_in
+from frametool.formats.rows.pose_rows import Written, numbers_in, samples, text_lines, whole_in
 from frametool.formats.table import FORMATS, Poses
 from frametool.geometry import euler, floats
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Options, Samples
 
 POSES = FORMATS["g2o"].poses
-ROWS = RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=())
 EDGES = Poses("quaternion", counted="")
 # what else g2o writes: landmarks, parameters, measurements between others
 NO_POSE = r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|\w+XYZ?|CAM|SW\w*)|EDGE_(?:SE[23]|PRIOR|BEARING|PR|SW|PO)\w+"

@@ -12,12 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.formats.rows.pose_rows import (
-    IMAGE,
-    Numbers,
-    RowForm,
     Written,
     position_and_turn,
-    rows_of_matrix,
     samples,
 )
 from frametool.formats.table import FORMATS
@@ -32,16 +28,6 @@ if TYPE_CHECKING:
 POSES = FORMATS["nerf"].poses
 MATRIX = "transform_matrix"
 LAST_ROW = (0.0, 0.0, 0.0, 1.0)
-_ROW = b"], [", Numbers(4, b", ")
-ROWS = RowForm(
-    (b'    {"file_path": "', IMAGE, b'", "transform_matrix": [[', Numbers(4, b", "), *_ROW, *_ROW,
-     b"], [0.0, 0.0, 0.0, 1.0]]}"),
-    rows_of_matrix,
-    head=b'{\n  "frames": [\n',
-    between=b",\n",
-    tail=b"\n  ]\n}\n",
-    holds=(),
-)  # fmt: skip
 
 
 def poses(file: InputFile, options: Options) -> Iterator[Written]:

@@ -144,7 +144,7 @@ def rows_of_matrix(*pose: float) -> Components:
     return tuple(chain(r[0:3], [tx], r[3:6], [ty], r[6:9], [tz]))
 
 
-# TUM: seconds, metres, x y z w; EuRoC: CSV, nanoseconds, w first; KITTI: the first three rows of a 4x4, no time
+_ROW = b"], [", Numbers(4, b", ")
 ROWS = {
     "tum": RowForm(("seconds", b" ", Numbers(7), b"\n")),
     "euroc": RowForm(
@@ -152,6 +152,18 @@ ROWS = {
         head=",".join(FORMATS["euroc"].columns[:8]).encode() + b"\n",
     ),
     "kitti": RowForm((Numbers(12), b"\n"), rows_of_matrix, holds=()),
+    "colmap": RowForm(
+        ("number", b" ", Numbers(7), b" 1 ", IMAGE, b"\n\n"), lambda tx, ty, tz, x, y, z, w: (w, x, y, z, tx, ty, tz),
+        head=b"# Image list with two lines of data per image:\n"
+        b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
+        first=1, holds=(), beside="every camera is number 1, without points",
+    ),
+    "nerf": RowForm(
+        (b'    {"file_path": "', IMAGE, b'", "transform_matrix": [[', Numbers(4, b", "), *_ROW, *_ROW,
+         b"], [0.0, 0.0, 0.0, 1.0]]}"),
+        rows_of_matrix, head=b'{\n  "frames": [\n', between=b",\n", tail=b"\n  ]\n}\n", holds=(),
+    ),
+    "g2o": RowForm((b"VERTEX_SE3:QUAT ", "number", b" ", Numbers(7), b"\n"), holds=()),
 }  # fmt: skip
 
 
