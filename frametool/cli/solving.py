@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import degrees, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import Inputs, refuse
@@ -104,7 +104,7 @@ def _numbers(components: Iterable[Any]) -> Any:
     return tuple(float(part) + 0.0 for part in components)
 
 
-def _side(parent: str, name: str, pose: Transform, covariance: Array, rows: int) -> list[SolvedFrame]:
+def _side(parent: str, name: str, pose: Transform, covariance: Array | None, rows: int) -> list[SolvedFrame]:
     """Return a root and the one frame in it."""
     root = SolvedFrame(parent, None, IDENTITY, None, rows, checked=True)
     return [root, SolvedFrame(name, parent, _numbers(pose.components), _listed(covariance), rows, checked=True)]
@@ -130,7 +130,8 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
-        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=inputs.normalize)
+        form, columns, normalize = forms_of(1)[0], inputs.columns or (), inputs.normalize
+        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, form=form, columns=columns)
     else:
         samples = _paired(inputs, files)
     named = [each or name for each, name in zip(samples.names, NAMES, strict=True)]
@@ -149,8 +150,13 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     for each in found.warnings:
         warn(each)
     count = int(found.used.sum())
-    frames = _side(holder, camera, found.x, found.covariance_x, count)
-    frames += _side(other, target, found.z, found.covariance_z, count)
+    sigmas: list[Any] = [found.covariance_x, found.covariance_z]
+    if not samples.placed:
+        sure = " and ".join(f"{degrees(sqrt(each[3:, 3:].trace() / 3)):.2g} deg" for each in sigmas)
+        warn(f"no positions: only the rotations are solved (sigma {sure}); xyz 0, 0, 0 stands for what is not known")
+        sigmas = [None, None]
+    frames = _side(holder, camera, found.x, sigmas[0], count)
+    frames += _side(other, target, found.z, sigmas[1], count)
     labels = [(place, None, camera, target) for place in samples.places]
     rows = _rows(found, labels, checked=[found.dof > 0] * number)
     numbers = found.dof, found.rms_distance, found.rms_angle, found.sigma

@@ -8,6 +8,7 @@ id,x,y,z,weight                                                        points, i
 
 from __future__ import annotations
 
+from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -19,24 +20,25 @@ from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.formats.trees.tree_reader import shown_keys
 from frametool.geometry.transform import Transform
+from frametool.grammar.edges import Answers
 from frametool.grammar.pose import inverted, read_pose
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, tell, within
 from frametool.grammar.result import Style
 from frametool.stream.as_poses import FormatConverter
+from frametool.stream.header import listed
 from frametool.stream.record import placed, value_at
 from frametool.stream.record_values import documents, pose_of
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import plain_cells
-from frametool.stream.trajectories import TREE, gathered
+from frametool.stream.table import open_table
+from frametool.stream.trajectories import TREE, gathered, stop_at_first
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from io import BufferedReader
 
     from frametool.documents.document import Document
     from frametool.geometry.types import Array
-    from frametool.grammar.edges import Answers
     from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Path
     from frametool.stream.faults import BadRows
@@ -53,6 +55,7 @@ class HandEyeSamples(NamedTuple):
 
     places: where each stands; names: of base, gripper, camera and target, None where nothing says one
     files: what they are called; taken: how a form's own words were taken; told: sentences on what has no partner
+    placed: whether they have positions; else these are 0
     """
 
     gripper: Transform
@@ -62,16 +65,23 @@ class HandEyeSamples(NamedTuple):
     files: tuple[str, ...]
     taken: str = ""
     told: Sequence[str] = ()
+    placed: bool = True
 
 
-def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -> HandEyeSamples:
-    """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2.
+def read_samples(
+    argument: str, *, eye_to_hand: bool, normalize: bool = False, form: str = "", columns: Sequence[str] = ()
+) -> HandEyeSamples:
+    """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2, or a table of both poses.
 
     eye_to_hand: easy_handeye has gripper_from_base as `robot` then; it is inverted.
+    columns: of a table, those of the gripper and those of the target; else they begin with these words
     Raises FormatError with the place.
     """
     file = InputFile(argument)
     try:
+        form = form or detect(file.head(), "rows", "records", name=file.path, otherwise="json")[0]
+        if columns or FORMATS[form].is_table:
+            return _of_table(file, form, columns, normalize=normalize)
         source = file.source
     finally:
         file.close()
@@ -98,7 +108,33 @@ def read_samples(argument: str, *, eye_to_hand: bool, normalize: bool = False) -
     if any(ROBOT in value for value in values):
         ways = ("gripper<-base, inverted", "with") if eye_to_hand else ("base<-gripper", "without")
         taken = f"robot is taken for {ways[0]}, as easy_handeye has it {ways[1]} --eye-to-hand"
-    return HandEyeSamples(_batch(sides[0]), _batch(sides[1]), places, tuple(names), (source.name,), taken)
+    placed = any(pose.position is not None for side in sides for pose in side)
+    gripper, target = map(_batch, sides)
+    return HandEyeSamples(gripper, target, places, tuple(names), (source.name,), taken, placed=placed)
+
+
+def _of_table(file: InputFile, form: str, columns: Sequence[str], *, normalize: bool) -> HandEyeSamples:
+    """Read the poses of gripper and target that stand side by side in the rows of a table."""
+    text = file.stream.read()
+    names = open_table(text, form, header=True, source=file.name)[0].names or ()
+    for first, others in () if columns else PARTNERS.items():
+        found = [",".join(name for name in names if name.startswith(word)) for word in (first, *others)]
+        columns = columns or [*filter(None, found)]
+    if len(columns) != 2:
+        what = "gripper_x .. and target_x ..; name those of each with --columns, twice"
+        raise FormatError(f"no columns {what}; columns: {listed(names)}", source=file.name, line=1)
+    sides, placed, places = list[Transform](), False, list[str]()
+    for each in columns:
+        request = Request(Operation(moves=True), columns=(each,), normalize=normalize)
+        converter = FormatConverter(form, request, Style("json"), file.name, Answers())
+        blocks = gathered(converter, BufferedReader(BytesIO(text)), stop_at_first(file.name))
+        numbers = np.concatenate([poses.numbers for poses, _ in blocks] or [np.empty((0, 7))])
+        if numbers.shape[1] not in (4, 7):
+            raise FormatError(f"no rotation among the columns {each}", source=file.name, line=1)
+        placed |= numbers.shape[1] == 7
+        sides.append(Transform.of(*np.pad(numbers, ((0, 0), (7 - numbers.shape[1], 0))).T.copy()))
+        places = [f"{file.name}:{line}" for _, at in blocks for line in at.tolist()]
+    return HandEyeSamples(sides[0], sides[1], places, (None,) * 4, (file.name,), placed=placed)
 
 
 def _listed(value: Any) -> Iterator[tuple[Path, Any]]:

@@ -308,3 +308,36 @@ def test_three_samples_do_not_look_certain() -> None:
         sizes.append(off @ np.linalg.solve(found.covariance_x, off) / 6)
         assert found.warnings[-1] == "3 samples say little of their own noise: the sigmas are rough; take 8 or more"
     assert 0.2 < np.median(sizes) < 5.0
+
+
+# --- one table of both, and orientations alone ---------------------------------------------------------------------
+
+
+def table(made: Any, words: tuple[str, str], parts: slice = slice(7)) -> str:
+    """Write samples side by side."""
+    names = ("x", "y", "z", "qx", "qy", "qz", "qw")[parts]
+    sides = [np.hstack([each.xyz, each.xyzw])[:, parts] for each in (made.gripper, made.target)]
+    rows = [",".join(map(repr, row)) for row in np.hstack(sides).tolist()]
+    return "\n".join([",".join(f"{word}{name}" for word in words for name in names), *rows]) + "\n"
+
+
+@pytest.mark.parametrize("words", [("gripper_", "target_"), ("gripper.", "target."), ("ee_", "tag_")])
+def test_both_poses_of_a_sample_may_stand_side_by_side(run: Any, words: tuple[str, str]) -> None:
+    made = rig("target", seed=4, count=8, turn=0.6)
+    sides = [[word + name for name in ("x", "y", "z", "qx", "qy", "qz", "qw")] for word in words]
+    more = [] if words[0].startswith("gripper") else [part for side in sides for part in ("--columns", ",".join(side))]
+    done = run("solve", "--hand-eye", "s.csv", *more, "-f", "csv", files={"s.csv": table(made, words)})
+    assert done.status == 0, done.err
+    samples = [{"gripper": {"xyz": g.xyz.tolist(), "xyzw": g.xyzw.tolist()}, "target": {"xyz": t.xyz.tolist(), "xyzw": t.xyzw.tolist()}} for g, t in zip(made.gripper, made.target, strict=True)]
+    assert done.out == run("solve", "--hand-eye", "s.json", "-f", "csv", files={"s.json": json.dumps(samples)}).out
+    bare = run("solve", "--hand-eye", "s.csv", files={"s.csv": table(made, words)})
+    assert (bare.status, "--columns, twice" in bare.err) == ((0, False) if not more else (1, True))
+
+
+def test_orientations_alone_give_the_rotation_and_say_so(run: Any) -> None:
+    made = rig("target", seed=4, count=12, turn=0.6)
+    done = run("solve", "--hand-eye", "s.csv", "-f", "json", files={"s.csv": table(made, ("gripper_", "target_"), slice(3, 7))})
+    assert "no positions: only the rotations are solved (sigma 0.0" in done.err
+    camera = next(each for each in json.loads(done.out)["frames"] if each["name"] == "camera")
+    assert "covariance" not in camera
+    assert Rotation.from_quaternion([*camera["quaternion"].values()]).distance(made.x.rotation) < 3e-3

@@ -10,7 +10,7 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
 from frametool.cli.comparing import read_span
-from frametool.cli.options import file_with, reading_options, result_options, suffix_of, whole_pose_options
+from frametool.cli.options import ColumnNames, file_with, reading_options, result_options, suffix_of, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import tell
@@ -36,13 +36,15 @@ def _read_names(text: str) -> list[str]:
 
 @command_named("solve", epilog=EXIT_CODES)
 @argument("files", FILE, nargs=-1, required=True, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
-@option("--root FRAME", "that all others are given in  [default: never a child]", excludes=SHAPES)
+@option("--root FRAME", "of all the others  [default: never a child]", excludes=SHAPES)
 @option("--fix TREE", "exact edges, kept as they are; may be repeated", FILE, excludes=SHAPES, multiple=True)
 @option("--without FILE:LINE", "leave this row out; may be repeated", excludes=SHAPES, multiple=True)
 @option("--hand-eye", "where a camera sits, from poses of gripper and target", excludes=("points",))
 @option("--eye-to-hand", "the camera stands still, the target moves", requires=("hand_eye",))
 @option("--max-gap TIME", "between stamps that are paired  [default: 50ms]", read_span,
     name="max_gap_ns", requires=("hand_eye",))  # fmt: skip
+@option("--columns NAME,..", "of GRIPPER, then of TARGET, side by side in one table", ColumnNames(),
+    multiple=True, requires=("hand_eye",), under="Rows")  # fmt: skip
 @option("--points", "A<-B from points that are the same in both")
 @option("--scale", "of A to B too", requires=("points",))
 @option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names,
@@ -61,10 +63,10 @@ def command(inputs: Inputs) -> int:
       frametool solve --hand-eye hand_eye_samples.json -f handeye
       frametool solve --points points_a.csv points_b.csv --scale --report fit.json
 
-    A measurement is {parent, child, a pose, sigma or covariance}: the pose of child in parent; YAML, JSON, CSV or
-    whatever `tree` reads. The result is a tree with covariances, of all frames in one root. GRIPPER holds
-    base<-gripper, TARGET camera<-target, row by row or by their stamps; SAMPLES are {gripper, target}, or of
-    moveit_calibration or easy_handeye. Points are matched by id, else by row; a column weight counts.
+    A measurement is {parent, child, a pose, sigma or covariance}: the pose of child in parent, in whatever `tree`
+    reads. The result is a tree with covariances, of all frames in one root. GRIPPER holds base<-gripper, TARGET
+    camera<-target, row by row or by their stamps; SAMPLES are {gripper, target}, columns gripper_x .. target_qw, or
+    of moveit_calibration or easy_handeye. Points are matched by id, else by row; a column weight counts.
     """
     for library in ("OPENBLAS", "OMP", "MKL"):  # sums come out in one order: the same bytes each run
         os.environ[f"{library}_NUM_THREADS"] = "1"
