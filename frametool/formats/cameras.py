@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import os
 import re
-from contextlib import closing
+from contextlib import closing, contextmanager
 from functools import partial
 from io import BufferedReader, BytesIO
 from math import tan
@@ -98,12 +98,10 @@ def cameras_of(file: InputFile) -> dict[str, partial[Camera]]:
     """
     found: dict[str, dict[str, Any]] = {}
     changed: dict[str, None] = {}
-    try:
+    with _placed(file.name):
         for name, fields in _read(file):
             if found.setdefault(name, fields) != fields:
                 changed[name] = None
-    except ValueInvalid as error:
-        raise error if isinstance(error, FormatError) else FormatError(str(error), source=file.name) from None
     if changed:
         warn(f"{file.name}: {listing(changed)}: other numbers come later; the first ones hold")
     return {name: partial(_made, file.name, fields, name=name) for name, fields in found.items()}
@@ -133,7 +131,7 @@ def _made(
 ) -> Camera:
     """Make a camera of what a file says; raises FormatError."""
     given, line = {"model": None, **fields}, fields.get("line", 0)
-    try:
+    with _placed(source, "" if line else name, line):
         if "colmap" in fields:
             given |= _of_colmap(fields["colmap"], fields["numbers"], fields.get("size") or size)
             warn(f"{source}: the centre of its first pixel is 0.5, 0.5: 0.5 is taken off cx and cy")
@@ -146,9 +144,19 @@ def _made(
             before, camera = camera.size, camera.scaled(size)
             if before not in (None, camera.size):
                 warn(f"{source}: K is scaled from {' x '.join(map(str, before))} to {' x '.join(map(str, size))}")
-    except ValueInvalid as error:
-        raise FormatError(f"{name}: {error}" if name and not line else str(error), source=source, line=line) from None
     return camera
+
+
+@contextmanager
+def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
+    """Make one error of whatever numbers of another kind or count than a form has raise; raises FormatError."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        what = str(error) if isinstance(error, ValueInvalid) else f"not as a camera has it ({error})"
+        raise FormatError(f"{name}: {what}" if name else what, source=source, line=line) from None
 
 
 # ---------------------------------------------------------------- which form

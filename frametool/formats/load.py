@@ -573,11 +573,11 @@ CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "ner
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
     """Give a tree the cameras of its files: those in trees of ours, others when one is asked for."""
+    others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
 
     def read_cameras() -> dict[str, Callable[..., Camera]]:
         from frametool.formats.cameras import cameras_of_tree
 
-        others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
         return cameras_of_tree(tree, others)
 
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}

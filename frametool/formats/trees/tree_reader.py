@@ -215,10 +215,10 @@ def camera_fields(value: Any) -> dict[str, Any]:
     for key in known:
         if key not in CAMERA_KEYS:
             raise Misfit(f"unknown key {shown(key)}{alternatives(key, CAMERA_KEYS, 'keys')}", (key,), key=True)
-    if "K" not in known:
+    if known.get("K") is None:
         raise Misfit("a camera without K; it is {model: .., K: [fx, fy, cx, cy], D: [..], size: [w, h]}")
     texts = ("model", "axes")
-    return {key: each if key in texts else numbers_of(each) for key, each in known.items() if each is not None}
+    return {key: str(each) if key in texts else numbers_of(each) for key, each in known.items() if each is not None}
 
 
 def numbers_of(value: Any) -> Any:
