@@ -289,6 +289,8 @@ class ColumnRows:
         """Read the weights of rows; those that are none are bad."""
         if self.layout.time is None or not self._weighs:
             return None
+        if self.plan.gathered is not None and self.plan.gathered.labelled:
+            return np.array(batch.texts(self.layout.time), object)
         weights, nulls = batch.numbers(self.layout.time)
         odd = _either(nulls, not_finite(weights))
         if odd is not None:

@@ -139,7 +139,7 @@ class Run:
             self._doubt_turns(moved)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
-        weights = weights_of(self.block, plan.beside, self._blame) if plan.gathered and plan.beside else None
+        weights = weights_of(self.block, plan, self._blame) if plan.gathered and plan.beside else None
         if self.outside:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
             self.mended = [row for row in self.mended if row not in self.outside]

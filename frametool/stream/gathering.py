@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from frametool.errors import ValueInvalid
 from frametool.grammar.names import EARTH_FRAMES, stamp_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components
@@ -21,10 +22,11 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The poses that were read so far, in metres and as unit quaternions, and a number that stands beside each."""
+    """The poses that were read so far, in metres and as unit quaternions, and a number or text beside each."""
 
-    def __init__(self, *, named: bool = False) -> None:
-        """Begin with none; named: so that `places` says where each was read."""
+    def __init__(self, *, named: bool = False, labelled: bool = False) -> None:
+        """Begin with none; named: so that `places` says where each was read; labelled: by texts beside them."""
+        self.labelled = labelled
         self.places: list[str] = []
         self._lines: list[int] | None = [] if named else None  # of the block that was read last
         self.placed = self.turned = self.uncertain = self.stamped = False
@@ -79,6 +81,16 @@ class Gathered:
         if not len(rows):
             raise ValueInvalid("no poses to take the mean of")
         return Transform.of(*map(np.ascontiguousarray, rows.T))
+
+    def groups(self) -> Iterator[tuple[str, Gathered]]:
+        """Yield the poses by their labels, in the order in which these came."""
+        rows, labels = self.transforms, np.concatenate(self._beside).tolist()
+        for label in dict.fromkeys(labels):
+            at = [row for row, each in enumerate(labels) if each == label]
+            part = copy(self)
+            part._poses = [np.stack(rows.components, -1)[at]]  # noqa: SLF001 - its own
+            part._beside, part.places = [], [self.places[row] for row in at] if self.places else []  # noqa: SLF001
+            yield label, part
 
     @property
     def weights(self) -> Floats | None:

@@ -6,7 +6,7 @@ Stamps are read in bulk, decimal seconds or nanoseconds to integer nanoseconds, 
 from __future__ import annotations
 
 from itertools import zip_longest
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from frametool.grammar.names import in_nanoseconds
 from frametool.stream.request import no_step
 from frametool.stream.row_layout import IDENTITY
 from frametool.stream.stamp_source import read_header_stamp, read_stamp
+from frametool.text.cells import without_quotes
 from frametool.text.digits import ZEROS, first_point, not_digits, read_eight_digits
 from frametool.text.numbers import parse_number
 from frametool.text.parse import LOWEST, parse_floats, trimmed
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Rigid
+    from frametool.stream.evaluate import Plan
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words
@@ -159,10 +161,16 @@ def seconds_before(stamps: Ints, good: Sequence[int], before_ns: int | None, nam
     return seconds
 
 
-def weights_of(block: Block, name: str, blame: Blame) -> Floats:
-    """Return the weights of rows; a row with none, or a negative one, is bad."""
+def weights_of(block: Block, plan: Plan, blame: Blame) -> Any:
+    """Return the weights of rows, or their labels; a row with none, or a negative weight, is bad."""
     if not len(block.places):
         return np.zeros(0)
+    name = plan.beside
+    if plan.gathered is not None and plan.gathered.labelled:
+        cells = without_quotes(block.stamps[0][0]) if block.weights is None else None
+        return block.weights if cells is None else np.array(
+            [cells.text(row).decode().strip() for row in range(len(cells.starts))], object
+        )  # fmt: skip
     weights = _parsed(block.stamps[0][0], name, blame) if block.weights is None else block.weights
     for row in np.flatnonzero(weights < 0.0).tolist():
         blame(row, name, f"weight {weights[row]:g} is negative")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -293,3 +294,29 @@ def test_stamps_that_a_mean_does_not_have_are_told_once(run: Run, stdin: str) ->
     assert run("mean", stdin=stdin).err.count("stamps left out: a mean is of no one time") == 1
     assert "stamps" not in run("mean", stdin="x,y,z\n1,2,3\n").err
     assert "stamps left out" in run("mean", "{stamp: 1, xyz: [1, 2, 3]}").err
+
+
+TAGGED = 'tag,x,y,z\na,1,2,3\n"b, c",5,5,5\na,3,2,3\nb,0,0,0\n"b, c",5,5,6\n'
+
+
+@pytest.mark.parametrize("form", ["csv", "jsonl", "parquet"])
+def test_a_mean_for_each_value_of_a_column_is_that_of_its_rows(run: Run, form: str, tmp_path: Path) -> None:
+    path = str(tmp_path / f"rows.{form}")
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    if form == "csv":
+        Path(path).write_text(TAGGED)
+    else:
+        assert run("convert", "-o", path, "-f", "json" if form == "jsonl" else form, stdin=TAGGED).status == 0
+    found = [json.loads(line) for line in run("mean", path, "--by", "tag", "-f", "json").out.splitlines()]
+    assert [(each["tag"], each["xyz"], each["count"]) for each in found] == [
+        ("a", [2.0, 2.0, 3.0], 2), ("b, c", [5.0, 5.0, 5.5], 2), ("b", [0.0, 0.0, 0.0], 1),
+    ]
+    alone = json.loads(run("mean", "-f", "json", stdin="x,y,z\n5,5,5\n5,5,6\n").out)
+    assert {key: each for key, each in found[1].items() if key != "tag"} == alone
+
+
+def test_a_mean_by_a_column_names_what_is_wrong(run: Run) -> None:
+    assert "no column 'nope'; columns: tag, x, y, z" in run("mean", "--by", "nope", stdin=TAGGED).err
+    assert run("mean", "{xyz: [1, 2, 3]}", "--by", "tag").status == 2
+    assert run("mean", "--by", "tag", "--weights", "x", stdin=TAGGED).status == 2

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import ColumnNames, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 @command_named("mean")
 @argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
 @option("--weights NAME | W,W,..", "column or key of each pose's weight, or the weights of the POSEs", ColumnNames())
+@option("--by NAME", "a mean for each value of this column or key", ColumnNames(), excludes=("weights",))
 @option("--robust", "leave out poses that do not agree with the rest, and tell them")
 @pose_stream_options
 @pose_result_options("poses")
@@ -34,6 +35,7 @@ def command(inputs: Inputs) -> int:
       frametool mean '{xyz: [0, 0, 0]}' '{xyz: [1, 0, 0]}' --weights 1,3
       printf 'x,y,z,weight\\n0,0,0,1\\n4,0,0,3\\n' | frametool mean --weights weight
       frametool mean tag_seen.csv --robust
+      printf 'tag,x,y,z\\n7,0,0,0\\n7,4,0,0\\n9,1,1,1\\n' | frametool mean --by tag
 
     Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
     of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
@@ -46,10 +48,11 @@ def command(inputs: Inputs) -> int:
     """
     task = PoseTask(inputs)
     stream, poses, weights, robust = task.stream, inputs.poses, inputs.weights, inputs.robust
+    from frametool.grammar.result import Result
     from frametool.stream.gathering import Gathered
 
-    gathered = Gathered(named=robust)
-    request = task.request(extra_column=weights, gathered=gathered)
+    gathered = Gathered(named=robust, labelled=inputs.by is not None)
+    request = task.request(extra_column=inputs.by or weights, gathered=gathered)
     status, given = 0, None
     bare, is_inverse = without_inverse(poses[0]) if len(poses) == 1 else ("", False)
     if bare == "-" or (bare and not stream.path and not is_pasted(bare, stream.given)):
@@ -68,8 +71,14 @@ def command(inputs: Inputs) -> int:
         warn("covariances left out: mean's is that of the rows")
     if gathered.stamped:
         warn("stamps left out: a mean is of no one time")
-    result, left_out = _mean(gathered, given, robust=robust)
-    task.output.values([result])
+    if inputs.by is None:
+        result, left_out = _mean(gathered, given, robust=robust)
+        task.output.values([result])
+    else:
+        refuse(bool(poses), "--by is of rows; POSEs have no column")
+        found = [(label, *_mean(each, None, robust=robust)) for label, each in gathered.groups()]
+        task.output.values([Result(each.pose, {inputs.by: label, **each.extras}) for label, each, _ in found])
+        left_out = [line for _, _, lines in found for line in lines]
     most = MOST + (len(left_out) == MOST + 1)
     for line in left_out[:most]:
         warn(line)
