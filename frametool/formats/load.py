@@ -10,6 +10,7 @@ import os
 import re
 from array import array
 from bisect import bisect_left
+from functools import partial
 from importlib import import_module
 from io import BytesIO
 from itertools import islice
@@ -161,6 +162,10 @@ class FrameFile(InputFile):
             report(FormatError(missing, source=self.name))
         if tell:
             self.tell()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Let a tree that still reads cameras of it pass to another process."""
+        return {key: each for key, each in vars(self).items() if key != "stream"}
 
     def _take_cameras(self) -> None:
         """Keep the cameras of a tree of ours, which was read without a fault."""
@@ -574,15 +579,15 @@ CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "ner
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
     """Give a tree the cameras of its files: those in trees of ours, others when one is asked for."""
     others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
-
-    def read_cameras() -> dict[str, Callable[..., Camera]]:
-        from frametool.formats.cameras import cameras_of_tree
-
-        return cameras_of_tree(tree, others)
-
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
-    tree.read_cameras = read_cameras
+    tree.read_cameras = partial(_read_cameras, tree, others)
     return tree
+
+
+def _read_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> dict[str, Callable[..., Camera]]:
+    from frametool.formats.cameras import cameras_of_tree
+
+    return cameras_of_tree(tree, files)
 
 
 def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import pickle
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -217,6 +218,13 @@ def test_another_size_is_told(tmp_path: Path) -> None:
     with pytest.warns(FrametoolWarning, match="K is scaled from 640 x 480 to 320 x 240"):
         assert frametool.load_camera(tmp_path / "cam.yaml", size=(320, 240)).size == (320, 240)
     assert frametool.load_camera(tmp_path / "cam.yaml", size=(640, 480)).size == (640, 480)
+
+
+def test_a_tree_with_cameras_passes_between_processes(tmp_path: Path) -> None:
+    put(tmp_path, FORMS["camchain cam0: plumb_bob"]["files"] | {"robot.yaml": LISTED})
+    for name, frame in (("camchain.yaml", "cam3"), ("robot.yaml", "cam")):
+        tree = frametool.load(tmp_path / name)
+        assert pickle.loads(pickle.dumps(tree)).camera(frame).mapping() == tree.camera(frame).mapping()  # noqa: S301
 
 
 def test_sensor_files_of_euroc(tmp_path: Path) -> None:
