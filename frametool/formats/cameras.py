@@ -140,11 +140,17 @@ def _made(
         if "moved" in fields:
             scale, shift = fields["moved"]
             camera = camera.resampled(scale, shift, camera.size)
-        if size is not None:
-            before, camera = camera.size, camera.scaled(size)
-            if before not in (None, camera.size):
-                warn(f"{source}: K is scaled from {' x '.join(map(str, before))} to {' x '.join(map(str, size))}")
-    return camera
+        return resized(camera, size, source)
+
+
+def resized(camera: Camera, size: Sequence[int] | None, source: str) -> Camera:
+    """Return the camera of its picture in another size, which is told; raises ValueInvalid for another shape."""
+    if size is None or camera.size == tuple(size):
+        return camera
+    made, known = camera.scaled(size), camera.size
+    if known:
+        warn(f"{source}: K is scaled from {known[0]} x {known[1]} to {size[0]} x {size[1]}")
+    return made
 
 
 @contextmanager

@@ -70,7 +70,7 @@ def test_a_size_may_be_given_for_the_camera_of_a_tree(run: Run) -> None:
     half = run("project", RIG, "cam_front", "lidar", "--size", "160,120", "-f", "json", "5", "0", "-1")
     u, v = json.loads(run("project", RIG, "cam_front", "lidar", "-f", "json", "5", "0", "-1").out)["pixel"]
     assert json.loads(half.out)["pixel"] == pytest.approx([0.5 * (u + 0.5) - 0.5, 0.5 * (v + 0.5) - 0.5])
-    assert half.err == "frametool: note: K is scaled from 320 x 240 to 160 x 120\n"
+    assert half.err == f"frametool: warning: {RIG}: K is scaled from 320 x 240 to 160 x 120\n"
 
 
 @pytest.mark.parametrize("name", [name for name, each in FORMS.items() if "undistort" in each])

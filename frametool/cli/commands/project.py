@@ -110,11 +110,12 @@ def command(inputs: Inputs) -> int:
     task = CameraTask(inputs, "TREE CAMERA")
     overlay = None
     if inputs.image is not None:
+        from frametool.formats.cameras import resized
         from frametool.view.overlay import Overlay
 
         refuse_existing(inputs.output, force=inputs.force)
         overlay = Overlay(inputs.image, inputs.output)
-        task.scale(overlay.size)
+        task.camera = resized(task.camera, overlay.size, inputs.image)
     task.camera = task.rectified()
     if task.camera.size is None and not inputs.quiet:
         say("note: the camera has no size, in_image is empty; --size W,H gives it one")
@@ -156,7 +157,8 @@ class CameraTask:
             raise click.UsageError(f"write the clouds of {path} as files first: apply -o '{{stamp_ns}}.pcd'")
         self.way: Way | None = None
         self.rest: tuple[str, ...] = inputs.arguments
-        self.name = (inputs.camera or "").rpartition(":")[2] if not is_inline(inputs.camera or "") else ""
+        _, colon, name = (inputs.camera or "").rpartition(":")
+        self.name = name if colon and not is_inline(inputs.camera) else ""
         if inputs.camera is None or _names_tree(self.rest):
             *before, _ = names = named.split()
             if len(self.rest) < len(names):
@@ -169,18 +171,18 @@ class CameraTask:
     def _camera(self) -> Camera:
         """Return the camera in the axes of its frame, as its pixels are wanted."""
         inputs, tree = self.inputs, None if self.way is None else self.way.tree
-        if tree is not None and inputs.camera is None:
-            camera = tree.camera(self.name, inputs.size)
-        else:
-            from frametool.formats.cameras import load_camera
+        from frametool.formats.cameras import load_camera, resized
 
+        if tree is not None and inputs.camera is None:
+            camera = resized(tree.camera(self.name, inputs.size), inputs.size, inputs.arguments[0])
+        else:
             camera = load_camera(inputs.camera, model=inputs.model, size=inputs.size)
             if not (is_inline(inputs.camera) and "axes" in inputs.camera):
                 camera = camera.changed(axes=self._axes_in(tree))  # those of a file are of its own frame
         if inputs.camera_axes:
             camera = camera.changed(axes=inputs.camera_axes)
             inputs.forms_read = (*inputs.forms_read, ("", ("camera_axes",)))
-        return self._scaled(camera, inputs.size)
+        return camera
 
     def _axes_in(self, tree: FrameTree | TransformBuffer | None) -> str:
         """Return the axes of the camera's frame as the tree says, optical where it says nothing."""
@@ -193,19 +195,6 @@ class CameraTask:
         """Return the camera of the rectified picture, if that is wanted."""
         inputs = self.inputs
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
-
-    def scale(self, size: tuple[int, int] | None) -> None:
-        """Take the picture in another size."""
-        self.camera = self._scaled(self.camera, size)
-
-    def _scaled(self, camera: Camera, size: tuple[int, int] | None) -> Camera:
-        before = camera.size
-        if size is None or before == size:
-            return camera
-        made = camera.scaled(size)
-        if before is not None and not self.inputs.quiet:
-            say(f"note: K is scaled from {before[0]} x {before[1]} to {size[0]} x {size[1]}")
-        return made
 
     def request(self, frame_column: str | None, formula: Formula, shown: Shown) -> Request:
         """Return what is done with rows."""
