@@ -23,9 +23,9 @@ from frametool.stream.faults import BadRows, Fault
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from frametool.cli.commands.apply import Way
     from frametool.cli.output import Output
     from frametool.cli.streaming import Stream
-    from frametool.geometry.types import Rigid
     from frametool.recordings.messages import PointCloud
 
 PLACES: dict[str, Callable[[PointCloud], str]] = {
@@ -36,6 +36,7 @@ PLACES: dict[str, Callable[[PointCloud], str]] = {
     "frame": lambda cloud: cloud.frame,
 }  # {NAME} in -o -> what stands there
 _HEAD = 64
+_WRITTEN = ", ".join(writers("arrays"))
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 
@@ -54,13 +55,11 @@ class BagOfClouds:
         stream.inputs.ask("input_path")
         self.stream = stream
         if output.path in (None, "-") or not holds_arrays(output.told or ""):
-            forms = ", ".join(writers("arrays"))
-            raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {forms}")
+            raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {_WRITTEN}")
         self.pattern = str(output.path)
-        for place in re.findall(r"\{(\w*)\}", self.pattern):
-            if place not in PLACES:
-                known = ", ".join(f"{{{each}}}" for each in PLACES)
-                raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
+        for place in {*re.findall(r"\{(\w*)\}", self.pattern)} - {*PLACES}:
+            known = ", ".join(f"{{{each}}}" for each in PLACES)
+            raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
         self.tally = Tally()
         chosen = inputs().topics
         with ExitStack() as opened:
@@ -71,13 +70,12 @@ class BagOfClouds:
         inputs().leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
         self.names: dict[str, int] = {}
 
-    def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None) -> int:
-        """Move and write cloud after cloud; return the exit status.
-
-        pose_of: the pose that moves what is given in a frame at a time
-        """
+    def run(self, way: Way, *, alone: bool) -> int:
+        """Move and write cloud after cloud; return the exit status.  alone: there is nothing else to do."""
         from frametool.recordings.messages import read_clouds
 
+        refuse(way.uncertain, "--covariance: clouds have no place for one")
+        refuse(not alone, "the clouds of a bag move at their own stamps, from their own frames; no records")
         bad = self.stream.policy(self.path, "message")
         inputs().refuse_idle()
         count = points = 0
@@ -88,23 +86,23 @@ class BagOfClouds:
                 if isinstance(cloud, FormatError):
                     bad.take([Fault(cloud.line, "", cloud.message)])
                     continue
-                points += self._write(cloud, pose_of, bad)
+                points += self._write(cloud, way, bad)
             for told in self.tally.told():
                 once(f"{self.path}: {told.message}", told.rule, FrametoolWarning)
         if not count:
             raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
         if not self.stream.inputs.quiet:
             files = f"{len(self.names)} {'file' if len(self.names) == 1 else 'files'}"
-            where = f" in {target}" if target else ""
+            where = f" in {way.target}" if way.target else ""
             say(f"{self.path}: {points} points{where}, metres, in {files} ({', '.join(self.topics)})")
         return bad.finish(count)
 
-    def _write(self, cloud: PointCloud, pose_of: Callable[[str | None, int | None], Rigid], bad: BadRows) -> int:
+    def _write(self, cloud: PointCloud, way: Way, bad: BadRows) -> int:
         """Write one cloud; return how many points it has, 0 where the message is bad."""
         from frametool.stream.column_stream import moved_cloud
 
         try:
-            pose = pose_of(cloud.frame or None, cloud.stamp_ns)
+            pose = way.from_frame(cloud.frame or None, cloud.stamp_ns)
         except FrametoolError as error:
             bad.take([Fault.of(cloud.number, "", error)])
             return 0
@@ -151,16 +149,8 @@ class SeveralClouds:
         if self.frames and len(self.frames) != len(self.paths):
             raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
 
-    def refuse_beside(self, *, is_more: bool) -> None:
-        """Raise a usage error where the command line has more to move, or to do, than the clouds."""
-        refuse(is_more, "several clouds are moved whole; no records, --covariance or --explain beside them")
-
-    def run(self, pose_of: Callable[[str | None, int | None], Rigid], target: str | None, *, has_source: bool) -> int:
-        """Move all and write them as one; return the exit status.
-
-        pose_of: the pose that moves what is given in a frame
-        has_source: whether all are given in one frame, or moved by one pose
-        """
+    def run(self, way: Way, *, alone: bool) -> int:
+        """Move all and write them as one; return the exit status.  alone: there is nothing else to do."""
         from frametool.cli.trees import answers
         from frametool.documents.source import InputFile
         from frametool.formats.detect import detect
@@ -169,10 +159,12 @@ class SeveralClouds:
         from frametool.stream.request import Operation, Request
         from frametool.stream.run import run
 
-        if has_source == bool(self.frames):
+        is_more = way.uncertain or not alone
+        refuse(is_more, "several clouds are moved whole; no records, --covariance or --explain beside them")
+        if way.has_source == bool(self.frames):
             both = "SOURCE is one frame for all, --frames one for each; give one of them"
             each = f"say what each cloud is given in: --frames A,B (one for each of the {len(self.paths)}), or SOURCE"
-            raise click.UsageError(both if has_source else each)
+            raise click.UsageError(both if way.has_source else each)
         on_error = self.stream.inputs.on_error
         with ExitStack() as opened:
             planned = []
@@ -183,17 +175,14 @@ class SeveralClouds:
                 if "arrays" not in FORMATS[form].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[form].summary}, no cloud; {hint}", source=path)
-                columns = import_module(FORMATS[form].reader).open_columns(
-                    file, Options(Tally(), Topics(), answers=answers())
-                )
-                request = Request(Operation(left=pose_of(frame or None, None), moves=True), on_error=on_error)
+                reading = Options(Tally(), Topics(), answers=answers())
+                columns = import_module(FORMATS[form].reader).open_columns(file, reading)
+                request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
                 planned.append((columns, request, path))
             into = self.output.told or form
             if not holds_arrays(into):
-                forms = ", ".join(writers("arrays"))
-                raise click.UsageError(f"several clouds become one cloud: -o all.ply, or -f; forms: {forms}")
-            if self.output.path is None and self.output.told is None:
-                raise click.UsageError("several clouds become one file: give -o all.ply")
+                raise click.UsageError(f"several clouds become one cloud: -o all.ply, or -f; forms: {_WRITTEN}")
+            refuse(self.output.path is self.output.told is None, "several clouds become one file: give -o all.ply")
             merged = MergedClouds(planned, self.output.style.in_form(into))
             status = 0
             with writing(self.output.path, force=self.output.force) as write:
@@ -203,14 +192,16 @@ class SeveralClouds:
                 for piece in merged.writer.end():
                     write(piece)
         if not self.stream.inputs.quiet:
-            where = f" in {target}" if target else ""
+            where = f" in {way.target}" if way.target else ""
             froms = f", from {', '.join(self.frames)}" if self.frames else ""
             say(f"{len(self.paths)} clouds{where} as one{froms}; metres")
         return status
 
 
-def clouds_of(stream: Stream, output: Output) -> BagOfClouds | None:
-    """Return the clouds of a bag if -i names one whose messages are no records."""
+def clouds_of(stream: Stream, output: Output) -> BagOfClouds | SeveralClouds | None:
+    """Return several clouds, or those of a bag if -i names one whose messages are no records."""
+    if len(stream.paths) > 1:
+        return SeveralClouds(output, stream)
     if not stream.path or not is_bag(stream.path):
         return None
     if not holds_arrays(output.told or "") and stream.messages() is not None:

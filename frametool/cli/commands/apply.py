@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from frametool.cli import options
-from frametool.cli.cloud_files import SeveralClouds, clouds_of
+from frametool.cli.cloud_files import clouds_of
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
@@ -65,21 +65,14 @@ def command(inputs: Inputs) -> int:
     """
     task = PoseTask(inputs, "points", "trajectory")
     stream, output, plan = task.stream, task.output, task.plan
-    several = SeveralClouds(output, stream) if len(stream.paths) > 1 else None
-    clouds = clouds_of(stream, output) if stream.path and several is None else None
+    clouds = clouds_of(stream, output)
     if inputs.pose is None:
         way, rest = way_by_tree(inputs, numbers=bool(stream.given_place))
     else:
         way, rest = _way_by_pose(inputs, task), inputs.arguments
     is_stream = rest in ((), ("-",))
     if clouds is not None:
-        refuse(way.uncertain, "--covariance: clouds have no place for one")
-        if not is_stream or plan is not None:
-            raise click.UsageError("the clouds of a bag move at their own stamps, from their own frames; no records")
-        return clouds.run(way.from_frame, way.target)
-    if several is not None:
-        several.refuse_beside(is_more=way.uncertain or plan is not None or not is_stream)
-        return several.run(way.from_frame, way.target, has_source=way.has_source)
+        return clouds.run(way, alone=is_stream and plan is None)
     kind = _kind(inputs)
     if plan is not None:
         records = list(sources_of(rest, kind))
