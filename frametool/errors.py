@@ -6,6 +6,7 @@
                        its source, line and column
       Unanswered       a form that leaves open what an option says   2
       BadAnswer        an option that does not fit the file          2
+      Misused          arguments or columns that do not fit          2
       BadTopology      cycle, two parents, a frame in itself         1
       LookupFailed                                                   4
         UnknownFrame   NotConnected
@@ -133,6 +134,12 @@ class Unanswered(FormatError):
 
 class BadAnswer(FormatError):
     """Report an option about a file that does not fit it, as a joint that the robot does not have."""
+
+    exit_code = 2
+
+
+class Misused(FormatError):
+    """Report arguments or options that do not fit each other or the columns of a table."""
 
     exit_code = 2
 

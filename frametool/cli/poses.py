@@ -17,11 +17,10 @@ import click
 
 from frametool.cli.command import misuse, refuse
 from frametool.documents.source import Source, decode, read_text
-from frametool.errors import FormatError, ValueInvalid, heard_by, shown, warn
+from frametool.errors import FormatError, Misused, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import INDICES, NotARotation, Reading
 from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
-from frametool.stream.faults import Misused
 from frametool.text.numbers import parse_length
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.documents.source import InputFile
-from frametool.errors import FormatError, ValueInvalid, warn
+from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, describe, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
@@ -22,7 +22,7 @@ from frametool.grammar.names import EARTH_FRAMES
 from frametool.stream.block_writer import writer_for
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, Fault, Misused, RowNote
+from frametool.stream.faults import NULL, STOP, Fault, RowNote
 from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of

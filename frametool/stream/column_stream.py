@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, ValueInvalid, listing, warn
+from frametool.errors import FormatError, Misused, ValueInvalid, listing, warn
 from frametool.formats.rows import pcd
 from frametool.formats.rows.column_file import (
     FLOATS,
@@ -26,7 +26,7 @@ from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_column
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, SKIP, STOP, Fault, Misused, RowNote
+from frametool.stream.faults import NULL, SKIP, STOP, Fault, RowNote
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POSE, Shape

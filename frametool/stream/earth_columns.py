@@ -10,7 +10,7 @@ import re
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, ValueInvalid, shown, warn
+from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.geometry.earth import AXES as AXES_AT
 from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, UNSAID, UTM, ZONE, Earth, Place, kernels
 from frametool.geometry.representations import HEADING, POSITIONS, Notation
@@ -29,7 +29,7 @@ from frametool.grammar.place import (
     coordinate,
     not_on_ellipsoid,
 )
-from frametool.stream.faults import ZONES, Misused, RowNote
+from frametool.stream.faults import ZONES, RowNote
 from frametool.stream.header import Columns, Header, PoseColumns, find_positions, find_rotations, listed, places_named
 from frametool.stream.row_layout import POINT, VECTOR, place_of
 from frametool.text.numbers import parse_number

@@ -111,12 +111,6 @@ class RowsSkipped(FrametoolError):
     exit_code = ROWS_SKIPPED
 
 
-class Misused(FormatError):
-    """Report arguments or options that do not fit each other or the columns of a table."""
-
-    exit_code = 2
-
-
 class BadRows:
     """Report bad rows as they come, count them, and say how the run ends.
 

@@ -10,11 +10,10 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, ValueInvalid, bare, did_you_mean, listing, shown
+from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
 from frametool.geometry.representations import NAMED, ROTATIONS, UPPER_ROWS
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.names import COLUMN_WORDS, NORMALS
-from frametool.stream.faults import Misused
 from frametool.stream.row_layout import POINT, POSE, SIX, TWIST, WRENCH, Shape, six_names
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS
 

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
 from frametool.documents.source import Source
-from frametool.errors import BadAnswer, FormatError, ValueInvalid, bare, did_you_mean, first_of, listing, shown, warn
+from frametool.errors import (
+    BadAnswer,
+    FormatError,
+    Misused,
+    ValueInvalid,
+    bare,
+    did_you_mean,
+    first_of,
+    listing,
+    shown,
+    warn,
+)
 from frametool.formats.robots.joints import find_joint_columns
 from frametool.formats.robots.model import TURNING, JointValue
 from frametool.formats.table import FORMATS
@@ -20,7 +31,7 @@ from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
 from frametool.ros import messages
 from frametool.ros.message_stream import Message, line_texts, read_messages
-from frametool.stream.faults import Fault, Misused
+from frametool.stream.faults import Fault
 from frametool.stream.record_text import without_noise
 from frametool.stream.row_layout import POSE
 from frametool.stream.splitter import Splitter

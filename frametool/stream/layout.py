@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from frametool.stream.faults import Misused
+from frametool.errors import Misused
 from frametool.stream.text_parts import Const, In, Instead, Out, Word
 
 if TYPE_CHECKING:

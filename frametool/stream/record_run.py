@@ -9,6 +9,7 @@ from frametool.errors import (
     FormatError,
     FrametoolError,
     LookupFailed,
+    Misused,
     NoDataAt,
     ValueInvalid,
     alternatives,
@@ -32,7 +33,7 @@ from frametool.recordings.copy import (
 )
 from frametool.recordings.made import SECONDS_ROS2
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
-from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
+from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, RowsSkipped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frametool.errors import FormatError, ValueInvalid, alternatives, shown
+from frametool.errors import FormatError, Misused, ValueInvalid, alternatives, shown
 from frametool.grammar.names import (
     EARTH_FRAMES,
     NAME_KEYS,
@@ -19,7 +19,6 @@ from frametool.grammar.names import (
 )
 from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.stream.evaluate import Plan
-from frametool.stream.faults import Misused
 from frametool.stream.header import (
     XYZ,
     PoseColumns,

@@ -7,11 +7,11 @@ from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, FrametoolError, listing
+from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMAL_NAMES, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import Fault, Misused, RowNote
+from frametool.stream.faults import Fault, RowNote
 from frametool.stream.rows import written
 from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import (

@@ -14,8 +14,7 @@ import click
 from frametool import __version__
 from frametool.cli.command import WithHelp, show_help
 from frametool.cli.sink import writing
-from frametool.errors import SHOWN, any_near, did_you_mean, shown
-from frametool.stream.faults import Misused
+from frametool.errors import SHOWN, Misused, any_near, did_you_mean, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

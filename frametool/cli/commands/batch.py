@@ -18,15 +18,15 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
-from frametool.cli.shell_words import NAME, goes_on, has_words, split
 from frametool.cli.stderr import TROUBLES, BatchLine, say, say_error, telling_of, wants_json, words_of
 from frametool.documents.source import MOST_CHARACTERS, UTF16, ReadCache, decode, opened
-from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, alternatives
+from frametool.errors import FileProblem, FormatError, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.grammar.rotation_spelling import ROTATION_KEYS
 from frametool.ros.messages import LISTS
-from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, Misused, RowsSkipped
+from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
 from frametool.stream.record import POINT_KEYS
 from frametool.stream.row_layout import PARTS
+from frametool.text.shell_words import NAME, goes_on, has_words, split
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -9,8 +9,8 @@ from random import Random
 
 import pytest
 
-from frametool.cli.shell_words import goes_on, split
-from frametool.stream.faults import Misused
+from frametool.errors import Misused
+from frametool.text.shell_words import goes_on, split
 
 VALUES = {"x": '{"xyz": [1, 2]}', "y_1": "it's"}
 PIECES = [

@@ -14,7 +14,7 @@ import os
 import re
 from typing import TYPE_CHECKING
 
-from frametool.stream.faults import Misused
+from frametool.errors import Misused
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
