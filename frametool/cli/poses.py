@@ -18,10 +18,8 @@ import click
 from frametool.cli.command import misuse, refuse
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, Misused, ValueInvalid, heard_by, shown, warn
-from frametool.grammar.pose import Pose
-from frametool.grammar.readers import INDICES, NotARotation, Reading
-from frametool.grammar.rotation_spelling import read_spelled, rotation_of, spelled
-from frametool.text.numbers import parse_length
+from frametool.grammar.pose import Pose, pose_of_numbers
+from frametool.grammar.readers import NotARotation, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -116,9 +114,6 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     source = Source(name, decode(data, name))
     found = in_grammar(source, given, normalize=request.normalize, points=request.operation.moves)
     return found, BufferedReader(BytesIO(data))
-
-
-ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 
 
 def _inverted(text: str) -> re.Match[str] | None:
@@ -372,49 +367,7 @@ def misuse_unless_rotations(reading: Reading) -> Iterator[None]:
 
 
 def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
-    """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
-
-    Raises click.UsageError for what is no such list of numbers, ValueInvalid for what is no rotation.
-    """
-    form = _form_of(texts, request.given)
-    whole, size = form.representation.whole, len(form.representation.columns)
+    """Read bare numbers; raises click.UsageError for what is no such list, ValueInvalid for what is no rotation."""
     reading = Reading(Source(INLINE, ""), degrees=request.degrees, normalize=request.normalize)
     with misuse_unless_rotations(reading):
-        if whole and len(texts) == ROWS_OF_A_POSE:
-            from frametool.grammar.pasted import matrix_pose
-            from frametool.grammar.pose import read_pose
-
-            return read_pose(matrix_pose([list(texts)], form, told=request.given is not None) or {}, reading)
-        if whole and len(texts) == len(whole.columns):
-            return Pose(*read_spelled(form, texts, INDICES, reading))
-        refuse(len(texts) not in form.counts, f"{form.counted}; found {len(texts)}")
-        x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-        rotation = rotation_of(form, texts[-size:], INDICES, reading)
-    return Pose((x, y, z) if len(texts) > size else None, rotation)
-
-
-def source_from_numbers(texts: Sequence[str], given: Notation | None) -> Source:
-    """Write bare numbers, read by `pose_from_numbers` before, as the mapping that says the same."""
-    from frametool.documents.json import dump
-    from frametool.documents.source import Verbatim
-
-    form = _form_of(texts, given)
-    whole = form.representation.whole
-    size = len(texts) if whole and len(texts) == len(whole.columns) else len(form.representation.columns)
-    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
-    numbers: Any = list(map(Verbatim, texts))  # the texts stand in the places of numbers, and are read as such
-    mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
-    mapping[form.representation.name + unit] = spelled(form, numbers[-size:])
-    return Source(INLINE, dump(mapping))
-
-
-def _form_of(texts: Sequence[str], given: Notation | None) -> Notation:
-    """Settle what bare numbers are; only a matrix is known by their count."""
-    from frametool.geometry.representations import REPRESENTATIONS, notation
-
-    if given is not None:
-        return given
-    if len(texts) in (9, ROWS_OF_A_POSE, 16):
-        return notation("matrix")
-    choices = ", ".join(REPRESENTATIONS)
-    raise click.UsageError(f"{len(texts)} numbers do not say what they are; add --from with one of {choices}")
+        return pose_of_numbers(texts, request.given, reading)

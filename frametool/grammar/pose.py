@@ -12,8 +12,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, shown
-from frametool.geometry.representations import ROTATIONS
+from frametool.geometry.representations import REPRESENTATIONS, ROTATIONS, notation
 from frametool.grammar.readers import (
+    INDICES,
     NAME_KEYS,
     PARENT_NAMES,
     Misfit,
@@ -34,6 +35,9 @@ from frametool.grammar.rotation_spelling import (
     is_position,
     is_rotation,
     read_rotation,
+    read_spelled,
+    rotation_of,
+    spelled,
 )
 from frametool.text.numbers import NotFinite, parse_length, parse_number
 
@@ -41,6 +45,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from frametool.geometry.place import Spot
+    from frametool.geometry.representations import Notation
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Quaternion, Vector
@@ -296,3 +301,51 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
         named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
         choices = ", ".join([*ROTATIONS][:MOST_CHOICES])
         raise Misfit(f"{named}; a pose has xyz and one rotation: {choices}", (unknown[0],), key=True)
+
+
+_ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
+
+
+def pose_of_numbers(texts: Sequence[str], given: Notation | None, reading: Reading) -> Pose:
+    """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
+
+    Raises NotARotation for what is no rotation, ValueInvalid for what is no such list of numbers.
+    """
+    form = _form_of(texts, given)
+    whole, size = form.representation.whole, len(form.representation.columns)
+    if whole and len(texts) == _ROWS_OF_A_POSE:
+        from frametool.grammar.pasted import matrix_pose
+
+        return read_pose(matrix_pose([list(texts)], form, told=given is not None) or {}, reading)
+    if whole and len(texts) == len(whole.columns):
+        return Pose(*read_spelled(form, texts, INDICES, reading))
+    if len(texts) not in form.counts:
+        raise ValueInvalid(f"{form.counted}; found {len(texts)}")
+    x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
+    rotation = rotation_of(form, texts[-size:], INDICES, reading)
+    return Pose((x, y, z) if len(texts) > size else None, rotation)
+
+
+def mapping_of_numbers(texts: Sequence[str], given: Notation | None) -> str:
+    """Write bare numbers, read by `pose_of_numbers` before, as the mapping that says the same."""
+    from frametool.documents.json import dump
+    from frametool.documents.source import Verbatim
+
+    form = _form_of(texts, given)
+    whole = form.representation.whole
+    size = len(texts) if whole and len(texts) == len(whole.columns) else len(form.representation.columns)
+    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
+    numbers: Any = list(map(Verbatim, texts))  # the texts stand in the places of numbers, and are read as such
+    mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
+    mapping[form.representation.name + unit] = spelled(form, numbers[-size:])
+    return dump(mapping)
+
+
+def _form_of(texts: Sequence[str], given: Notation | None) -> Notation:
+    """Settle what bare numbers are; only a matrix is known by their count."""
+    if given is not None:
+        return given
+    if len(texts) in (9, _ROWS_OF_A_POSE, 16):
+        return notation("matrix")
+    choices = ", ".join(REPRESENTATIONS)
+    raise ValueInvalid(f"{len(texts)} numbers do not say what they are; add --from with one of {choices}")

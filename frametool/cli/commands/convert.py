@@ -11,10 +11,11 @@ from frametool.cli import options, poses
 from frametool.cli.command import Command, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask, one_argument, pose_stream_options
 from frametool.cli.stderr import say
+from frametool.documents.source import Source
 from frametool.errors import ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import REPRESENTATIONS, Notation, notation
-from frametool.grammar.pose import Pose
+from frametool.grammar.pose import Pose, mapping_of_numbers
 from frametool.grammar.result import Result, Style
 from frametool.text.numbers import parse_angle, parse_number
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frametool.cli.output import Output
-    from frametool.documents.source import Source
     from frametool.explain.operations import OtherAxes
     from frametool.stream.request import Operation
 
@@ -116,7 +116,7 @@ def command(inputs: Inputs) -> int:
         refuse(len(found) != 1, f"--explain derives one pose, found {len(results)}")
         if not sources:
             own = (values, request.given) if values else (list(map(repr, found[0].components[3:])), notation("xyzw"))
-            sources = [poses.source_from_numbers(*own)]
+            sources = [Source(poses.INLINE, mapping_of_numbers(*own))]
         change = _named_change(axes, world, operation) if values else None
         return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)
     output.values(results)
