@@ -5,13 +5,15 @@ Values as results: the mappings that machine formats write and read back, and th
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.parser import RADIAN, frame_text
 from frametool.calc.rules import in_radians
-from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, Term, Type
+from frametool.calc.values import ANGLES, LIST, NUMBER, PLAIN_NUMBER, POINT, POSE, TREE, TWIST, VECTOR, Term, Type
 from frametool.errors import ValueInvalid, printable, shown
+from frametool.formats.table import FORMATS, is_trajectory
 from frametool.frames.lookups import Frames
 from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.rotation import Rotation
@@ -21,7 +23,7 @@ from frametool.grammar.result import Result
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from frametool.geometry.types import Array, Components
     from frametool.grammar.result import Style
@@ -226,3 +228,41 @@ def line_of_value(term: Term, style: Style) -> str:
     if type_.kind == ANGLES:
         return f"rpy  {text(*numbers)}  rad{frame}\n     {text(*(each * DEGREES for each in numbers))}  deg\n"
     return f"linear  {text(*numbers[:3])}  m\nangular  {text(*numbers[3:])}  rad{frame}\n"  # a twist
+
+
+def machine_text(term: Term, style: Style) -> str:
+    """Write one value as a document or line of a machine format."""
+    result = plain_result(term, style)
+    if isinstance(result, Result) and is_trajectory(style.form):
+        from frametool.stream.writers import write_poses
+
+        return write_poses([result], style)
+    module = import_module(FORMATS[style.form].writer)
+    if isinstance(result, Result):
+        return str(module.write_poses([result], style))
+    if term.type.kind not in (POINT, VECTOR) and style.form not in ("json", "yaml"):
+        raise ValueInvalid(f"{style.form} has no form for {term.type.named}; write it as text, json, yaml or csv")
+    return str(module.write_points([result], style))
+
+
+def machine_table(terms: Sequence[Term], style: Style) -> str:
+    """Write values as a table."""
+    from frametool.calc.rows import NAMES, RESULT
+
+    module = import_module(FORMATS["csv"].writer)
+    results = [plain_result(term, style) for term in terms]
+    if results and all(isinstance(each, Result) for each in results):
+        return str(module.write_poses(results, style))
+    rows: list[dict[str, Any]] = []
+    for term, result in zip(terms, results, strict=True):
+        if isinstance(result, Result):
+            raise ValueInvalid("a table holds poses or other values; write json or yaml")
+        if isinstance(result, float):
+            rows.append({RESULT: result})
+        elif style.place is not None and term.type.kind == POINT:
+            rows.append(result)
+        else:
+            *frame, (key, numbers) = result.items()
+            names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
+            rows.append(dict(frame) | dict(zip(names, numbers, strict=True)))
+    return str(module.write_points(rows, style))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.calc.evaluate import AXES, PLACED, evaluate_line, once_a_block
+from frametool.calc.evaluate import AXES, PLACED, evaluate_line, literal, once_a_block, term_of_pose
 from frametool.calc.parser import RADIAN, CalcError, columns_of, needs_time, reads_row
 from frametool.calc.rules import in_radians
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
@@ -18,6 +18,11 @@ from frametool.documents.source import opened
 from frametool.errors import FormatError, FrametoolError, ValueInvalid
 from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.representations import notation
+from frametool.grammar.names import may_be_on_earth
+from frametool.grammar.pose import COVARIANCE_KEYS
+from frametool.grammar.readers import Misfit
+from frametool.grammar.readers import tell as tell_notes
+from frametool.ros.messages import LISTS
 from frametool.stream.faults import BadRow
 from frametool.stream.gathering import Gathered
 from frametool.stream.request import Request
@@ -29,6 +34,7 @@ if TYPE_CHECKING:
 
     from frametool.calc.evaluate import Scope
     from frametool.calc.parser import Line
+    from frametool.documents.source import Source
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.grammar.result import Style
 
@@ -187,3 +193,29 @@ def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> T
         raise FormatError("no rows in it", source=path) from None
     type_, size = (Type(POSE), 7) if gathered.turned else (Type(POINT), 3)
     return Term(Type(LIST), (), items=tuple(Term(type_, row[:size]) for row in rows))
+
+
+def values_of_document(source: Source, scope: Scope) -> Term | None:
+    """Read the poses or points of a document; None for a tree."""
+    from frametool.documents.document import parse_documents
+    from frametool.stream.record_values import read_poses
+
+    documents = [document.value for document in parse_documents(source.text, source.name)]
+    if any(type(each) is dict and not {"frames", *LISTS}.isdisjoint(each) for each in documents):
+        return None
+    alone = documents[0] if len(documents) == 1 and type(documents[0]) is dict else {}
+    if not PLACED.keys().isdisjoint(alone) or any(map(may_be_on_earth, alone)):
+        try:
+            scope.leave_out(not COVARIANCE_KEYS.isdisjoint(alone))
+            reading = scope.reading(source)
+            found = literal(alone, reading)
+        except Misfit as misfit:
+            raise misfit.placed(source, 0) from None
+        tell_notes(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
+        return found
+    poses = read_poses(source, Request(degrees=scope.degrees, normalize=scope.normalize))
+    if not poses:
+        raise FormatError("nothing in it", source=source.name)
+    scope.leave_out(any(pose.covariance for pose in poses))
+    items = tuple(map(term_of_pose, poses))
+    return items[0] if len(items) == 1 else Term(Type(LIST), (), items=items)

@@ -10,13 +10,12 @@ import os
 import re
 import sys
 from contextlib import contextmanager, suppress
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from frametool.calc.api import line_of_value, plain_result
-from frametool.calc.evaluate import PLACED, Scope, evaluate_line, literal, read_line, term_of_pose
+from frametool.calc.api import line_of_value, machine_table, machine_text, plain_result
+from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import BETWEEN_WORDS, Completer
 from frametool.calc.parser import LONGEST, CalcError
 from frametool.calc.rules import wanted
@@ -27,19 +26,14 @@ from frametool.cli.poses import source_of
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say_error, tell
 from frametool.cli.trees import load_tree
-from frametool.documents.source import HEAD, Source, decode, opened
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, heard_by
-from frametool.formats.table import FORMATS, is_trajectory
-from frametool.grammar.names import may_be_on_earth
-from frametool.grammar.pose import COVARIANCE_KEYS
-from frametool.grammar.readers import Misfit
-from frametool.grammar.readers import tell as tell_notes
+from frametool.documents.source import HEAD, decode, opened
+from frametool.errors import FormatError, FrametoolError, heard_by
+from frametool.formats.table import FORMATS
 from frametool.grammar.result import Result, Style
-from frametool.ros.messages import LISTS
 from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from click.shell_completion import CompletionItem
 
@@ -68,9 +62,11 @@ def file_named_in(text: str, scope: Scope) -> Term | None:
 
 def named_file(path: str, scope: Scope) -> Term:
     """Read a file for a name in expressions; `-` is standard input.  Raises FileProblem, FormatError."""
+    from frametool.calc.rows import poses_of_table, values_of_document
+
     if path == "-":
         source = source_of("-")
-        if found := _values(source, scope):
+        if found := values_of_document(source, scope):
             return found
         from frametool.formats.load import load_sources
 
@@ -80,38 +76,9 @@ def named_file(path: str, scope: Scope) -> Term:
     with opened(path) as file:  # what is neither a table nor a document may be a tree
         form = detect(file.read(HEAD), "tree", "rows", "records", name=path, otherwise="yaml")[0]
     if "rows" in FORMATS[form].reads:
-        from frametool.calc.rows import poses_of_table
-
         return poses_of_table(path, form, normalize=scope.normalize, degrees=scope.degrees)
-    found = _values(source_of(path), scope) if "records" in FORMATS[form].reads else None
+    found = values_of_document(source_of(path), scope) if "records" in FORMATS[form].reads else None
     return found or Term(Type(TREE), (), tree=load_tree(path, streams=True))
-
-
-def _values(source: Source, scope: Scope) -> Term | None:
-    """Read the poses or points of a document; None for a tree."""
-    from frametool.documents.document import parse_documents
-    from frametool.stream.record_values import read_poses
-    from frametool.stream.request import Request
-
-    documents = [document.value for document in parse_documents(source.text, source.name)]
-    if any(type(each) is dict and not {"frames", *LISTS}.isdisjoint(each) for each in documents):
-        return None
-    alone = documents[0] if len(documents) == 1 and type(documents[0]) is dict else {}
-    if not PLACED.keys().isdisjoint(alone) or any(map(may_be_on_earth, alone)):
-        try:
-            scope.leave_out(not COVARIANCE_KEYS.isdisjoint(alone))
-            reading = scope.reading(source)
-            found = literal(alone, reading)
-        except Misfit as misfit:
-            raise misfit.placed(source, 0) from None
-        tell_notes(source, [note._replace(path=(0, *note.path)) for note in reading.notes])
-        return found
-    poses = read_poses(source, Request(degrees=scope.degrees, normalize=scope.normalize))
-    if not poses:
-        raise FormatError("nothing in it", source=source.name)
-    scope.leave_out(any(pose.covariance for pose in poses))
-    items = tuple(map(term_of_pose, poses))
-    return items[0] if len(items) == 1 else Term(Type(LIST), (), items=items)
 
 
 class Expression(Text):
@@ -139,11 +106,11 @@ def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
     """
     values = (item for term in terms for item in (term.items if term.type.kind == LIST else (wanted(term),)))
     if style.form == "csv":
-        yield _csv(list(values), style)
+        yield machine_table(list(values), style)
         return
     before = ""
     for value in values:
-        text = _for_a_person(value, style) if style.form == "text" else _machine(value, style)
+        text = _for_a_person(value, style) if style.form == "text" else machine_text(value, style)
         if before and style.form == "yaml":
             yield "---\n"
         elif before and style.form == "text" and (before.count("\n") > 1 or text.count("\n") > 1):
@@ -168,44 +135,6 @@ def _for_a_person(term: Term, style: Style) -> str:
             from frametool.formats.trees.written_poses import write_points
         return str(write_points([result], style))
     return line_of_value(term, style)
-
-
-def _machine(term: Term, style: Style) -> str:
-    """Write one value as a document or line of a machine format."""
-    result = plain_result(term, style)
-    if isinstance(result, Result) and is_trajectory(style.form):
-        from frametool.stream.writers import write_poses
-
-        return write_poses([result], style)
-    module = import_module(FORMATS[style.form].writer)
-    if isinstance(result, Result):
-        return str(module.write_poses([result], style))
-    if term.type.kind not in (POINT, VECTOR) and style.form not in ("json", "yaml"):
-        raise ValueInvalid(f"{style.form} has no form for {term.type.named}; write it as text, json, yaml or csv")
-    return str(module.write_points([result], style))
-
-
-def _csv(terms: Sequence[Term], style: Style) -> str:
-    """Write values as a table."""
-    from frametool.calc.rows import NAMES, RESULT
-
-    module = import_module(FORMATS["csv"].writer)
-    results = [plain_result(term, style) for term in terms]
-    if results and all(isinstance(each, Result) for each in results):
-        return str(module.write_poses(results, style))
-    rows: list[dict[str, Any]] = []
-    for term, result in zip(terms, results, strict=True):
-        if isinstance(result, Result):
-            raise ValueInvalid("a table holds poses or other values; write json or yaml")
-        if isinstance(result, float):
-            rows.append({RESULT: result})
-        elif style.place is not None and term.type.kind == POINT:
-            rows.append(result)
-        else:
-            *frame, (key, numbers) = result.items()
-            names = [name + "_deg" * (key == "rpy_deg") for name in NAMES[term.type.kind]]
-            rows.append(dict(frame) | dict(zip(names, numbers, strict=True)))
-    return str(module.write_points(rows, style))
 
 
 def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:

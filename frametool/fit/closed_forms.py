@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from itertools import chain
-from math import degrees, log, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from math import degrees, hypot, log, sqrt
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
     from frametool.fit.least_squares import Mask, Rows
     from frametool.geometry.types import Array, Numbers
+    from frametool.grammar.result import Result
+    from frametool.stream.gathering import Gathered
 
 
 FEWEST_POSES = 3  # of two poses nobody knows which is wrong
@@ -291,3 +293,43 @@ def _points(given: Numbers, name: str) -> Array:
     validation.all_finite((xyz,), name)
     require_near(xyz, name)
     return xyz
+
+
+def mean_of_rows(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
+    """Return the mean of what was gathered, with its spread, and what to say of each pose that was left out."""
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result, uncertain
+
+    transforms = gathered.transforms
+    weights = gathered.weights if given is None else given
+    extras: dict[str, Any] = {"count": len(transforms)}
+    left_out: list[str] = []
+    if robust:
+        found = solve_mean(transforms, weights=weights)
+        mean, spread = found.transform, found.spread
+        heavy = None if weights is None else [weights[at] for at in found.used.nonzero()[0].tolist()]
+        covariance = covariance_of(transforms[found.used], mean, heavy)
+        extras["used"] = int(found.used.sum())
+        for row in found.left_out.nonzero()[0].tolist():
+            metres, radians = (hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
+            off = f"{1e3 * metres:.1f} mm {degrees(radians):.2f} deg"
+            left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
+    else:
+        mean, spread = mean_and_spread(transforms, weights)
+        covariance = covariance_of(transforms, mean, weights)
+    pose = Pose.of(mean.components)
+    if gathered.placed:
+        extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
+    if gathered.turned:
+        extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": degrees(spread.angle_rms)}
+        extras |= {"angle_max": spread.angle_max, "angle_max_deg": degrees(spread.angle_max)}
+    if covariance is not None:
+        if gathered.placed:
+            roots = [sqrt(covariance[at, at]) for at in range(3)]
+            extras |= dict(zip(("std_x", "std_y", "std_z"), roots, strict=True))
+        if gathered.turned:
+            angle = sqrt(covariance[3:, 3:].trace())
+            extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
+        extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
+    position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
+    return Result(Pose(position, rotation, None, gathered.frame), extras), left_out

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
-
 import click
 
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
@@ -14,10 +11,6 @@ from frametool.cli.poses import is_inline, is_pasted, poses_from, without_invers
 from frametool.errors import ValueInvalid, warn
 from frametool.stream.faults import MOST, ROWS_SKIPPED
 from frametool.text.numbers import parse_number
-
-if TYPE_CHECKING:
-    from frametool.grammar.result import Result
-    from frametool.stream.gathering import Gathered
 
 
 @command_named("mean")
@@ -71,12 +64,14 @@ def command(inputs: Inputs) -> int:
         warn("covariances left out: mean's is that of the rows")
     if gathered.stamped:
         warn("stamps left out: a mean is of no one time")
+    from frametool.fit.closed_forms import mean_of_rows
+
     if inputs.by is None:
-        result, left_out = _mean(gathered, given, robust=robust)
+        result, left_out = mean_of_rows(gathered, given, robust=robust)
         task.output.values([result])
     else:
         refuse(bool(poses), "--by is of rows; POSEs have no column")
-        found = [(label, *_mean(each, None, robust=robust)) for label, each in gathered.groups()]
+        found = [(label, *mean_of_rows(each, None, robust=robust)) for label, each in gathered.groups()]
         task.output.values([Result(each.pose, {inputs.by: label, **each.extras}) for label, each, _ in found])
         left_out = [line for _, _, lines in found for line in lines]
     most = MOST + (len(left_out) == MOST + 1)
@@ -93,45 +88,3 @@ def _numbers(weights: str) -> list[float]:
         return [parse_number(text.strip()) for text in weights.split(",")]
     except ValueInvalid as error:
         raise click.UsageError(f"--weights: {error}; of POSEs they are numbers, of rows the name of a column") from None
-
-
-def _mean(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
-    """Return the mean of what was gathered, with its spread, and what to say of each pose that was left out."""
-    from frametool.fit.closed_forms import covariance_of, solve_mean
-    from frametool.geometry.spread import mean_and_spread
-    from frametool.grammar.pose import Pose
-    from frametool.grammar.result import Result, uncertain
-
-    transforms = gathered.transforms
-    weights = gathered.weights if given is None else given
-    extras: dict[str, Any] = {"count": len(transforms)}
-    left_out: list[str] = []
-    if robust:
-        found = solve_mean(transforms, weights=weights)
-        mean, spread = found.transform, found.spread
-        heavy = None if weights is None else [weights[at] for at in found.used.nonzero()[0].tolist()]
-        covariance = covariance_of(transforms[found.used], mean, heavy)
-        extras["used"] = int(found.used.sum())
-        for row in found.left_out.nonzero()[0].tolist():
-            metres, radians = (math.hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
-            off = f"{1e3 * metres:.1f} mm {math.degrees(radians):.2f} deg"
-            left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
-    else:
-        mean, spread = mean_and_spread(transforms, weights)
-        covariance = covariance_of(transforms, mean, weights)
-    pose = Pose.of(mean.components)
-    if gathered.placed:
-        extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
-    if gathered.turned:
-        extras |= {"angle_rms": spread.angle_rms, "angle_rms_deg": math.degrees(spread.angle_rms)}
-        extras |= {"angle_max": spread.angle_max, "angle_max_deg": math.degrees(spread.angle_max)}
-    if covariance is not None:
-        if gathered.placed:
-            roots = [math.sqrt(covariance[at, at]) for at in range(3)]
-            extras |= dict(zip(("std_x", "std_y", "std_z"), roots, strict=True))
-        if gathered.turned:
-            angle = math.sqrt(covariance[3:, 3:].trace())
-            extras |= {"std_angle": angle, "std_angle_deg": math.degrees(angle)}
-        extras |= uncertain((covariance if gathered.turned else covariance[:3, :3]).ravel().tolist())
-    position, rotation = pose.position if gathered.placed else None, pose.rotation if gathered.turned else None
-    return Result(Pose(position, rotation, None, gathered.frame), extras), left_out
