@@ -281,6 +281,18 @@ def test_a_rotation_is_given_in_its_axes(axes: str, run: Callable[..., Any]) -> 
         assert matrix(each) == pytest.approx(base(axes) @ YAW, abs=8 * EPS)
 
 
+@pytest.mark.parametrize("axes", ["enu", "ned", "grid", "ecef"])
+def test_a_rotation_is_turned_into_the_axes_of_a_fixed_origin(axes: str, run: Callable[..., Any]) -> None:
+    record = {"lat": LAT, "lon": LON, "alt": ALT, "rpy": [0.1, -0.2, 0.7]}
+    rows = table("lat,lon,alt,roll,pitch,yaw", [(LAT, LON, ALT, 0.1, -0.2, 0.7)])
+    asked = ("convert", "--to", "enu,quaternion", "--local-axes", axes, "--origin", json.dumps({"lat": LAT - 3, "lon": LON + 5, "alt": 0}))
+    results = [run(*asked, "-f", "json", json.dumps(record)), run(*asked, stdin=json.dumps(record) + "\n")]
+    turned = [list(json.loads(each.out)["quaternion"].values()) for each in results]
+    turned += [[float(cell) for name, cell in csv.DictReader(io.StringIO(run(*asked, stdin=rows).out)).__next__().items() if name[0] == "q"]]
+    for each in turned:
+        assert matrix(each) == pytest.approx(base("enu", LAT - 3, LON + 5).T @ base(axes) @ YAW, abs=8 * EPS)
+
+
 @pytest.mark.parametrize(("axes", "yaw"), [("enu", 90.0 - 30.0), ("ned", 30.0), ("grid", 90.0 - 30.0)])
 def test_a_heading_is_clockwise_from_the_north_of_its_axes(axes: str, yaw: float, run: Callable[..., Any]) -> None:
     place = {"lat": LAT, "lon": LON, "alt": ALT, "axes": axes}
