@@ -14,7 +14,7 @@ from functools import partial
 from importlib import import_module
 from io import BytesIO
 from itertools import islice
-from operator import lt
+from operator import gt, lt
 from os import PathLike
 from types import MappingProxyType
 from typing import Any, BinaryIO, NamedTuple
@@ -263,6 +263,7 @@ class TreeBuilder:
         self._replaced: list[Replaced] = []
         self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
         self._moves: set[str] = set()
+        self._late: set[str] = set()  # children whose samples are told to go back in time
         self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were taken in one piece
         self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
         self.covariances: dict[str, Components] = {}  # child -> how uncertain its edge is
@@ -349,6 +350,9 @@ class TreeBuilder:
             known = Samples(parent, child, array("q", stamps_ns), (), array("q", placed.samples.lines))
             self._whole.setdefault(child, []).append(SamplesOfFile(placed.file, known))
             return
+        if child not in self._late and any(map(gt, stamps_ns, islice(stamps_ns, 1, None))):
+            self._late.add(child)
+            warn(f"{placed.file.name}: stamps of {shown(child)} are out of order; sorted")
         for at, (stamp_ns, pose) in enumerate(zip(stamps_ns, components, strict=True)):
             self.add(parent, child, pose, stamp_ns, placed.place(at))
 

@@ -70,7 +70,8 @@ class Trajectory(NamedTuple):
         stamps = np.array([], np.int64) if self.stamps_ns is None else self.stamps_ns
         doubled = len(stamps) - len(np.unique(stamps))
         said = [f"{name}: stamps are out of order; sorted"] * bool((np.diff(stamps) < 0).any())
-        return said + [f"{name}: {doubled} poses have the stamp of another; the last counts"] * bool(doubled)
+        have = "pose has" if doubled == 1 else "poses have"
+        return said + [f"{name}: {doubled} {have} the stamp of another; the last counts"] * bool(doubled)
 
     def in_order(self) -> Trajectory:
         """Return it sorted by its stamps, of equal ones the last."""

@@ -178,7 +178,7 @@ def test_order_and_equal_stamps_are_told(run: Run) -> None:
     files = FILES | {"odd.tum": "".join([lines[1], lines[0], *lines[1:]]).encode()}
     done = run("compare", "drone-ref.tum", "odd.tum", files=files)
     assert "odd.tum: stamps are out of order; sorted" in done.err
-    assert "odd.tum: 1 poses have the stamp of another; the last counts" in done.err
+    assert "odd.tum: 1 pose has the stamp of another; the last counts" in done.err
     assert "160 of 160 poses paired" in done.out
 
 

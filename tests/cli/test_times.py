@@ -70,7 +70,14 @@ def test_resample_warns_of_stamps_out_of_order_and_doubled_as_compare_does(run: 
         assert done.status == 0
         assert len(done.out.splitlines()) == 5
         assert "warning: odd.tum: stamps are out of order; sorted\n" in done.err
-        assert "warning: odd.tum: 1 poses have the stamp of another; the last counts\n" in done.err
+        assert "warning: odd.tum: 1 pose has the stamp of another; the last counts\n" in done.err
+
+
+def test_a_trajectory_whose_stamps_go_back_is_looked_up_with_a_warning(run: Run) -> None:
+    for text, warnings in ((ODD, 1), (ODD * 3000, 1), ("".join(f"{stamp} {stamp} 0 0 0 0 0 1\n" for stamp in (1, 2, 2, 4)), 0)):
+        done = run("lookup", "odd.tum", "world", "body", "--at", "3.5", "-f", "json", files={"odd.tum": text}) if warnings else run("tree", "odd.tum", files={"odd.tum": text})
+        assert done.err.count("warning: odd.tum: stamps of 'body' are out of order; sorted\n") == warnings
+        assert (done.status, '"xyz": [3.5, 0.0, 0.0]' in done.out) == (0, bool(warnings))
 
 
 @pytest.mark.parametrize(("times", "warnings"), [("0\n1\n2\n", 0), ("0\n2\n1\n", 1), ("0\n1\n1\n", 1)])
