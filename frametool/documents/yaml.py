@@ -200,7 +200,8 @@ def _message(error: MarkedYAMLError, line: str, column: int) -> str:
         return f'nothing can begin with {shown(word[0])} here; quote the name: "{name}"'
     if word == ":" and problem == "did not find expected key":
         return "an empty key; write a name before the colon"
-    begun = f" begun at line {error.context_mark.line + 1}" if error.context_mark else ""
+    above = error.problem_mark.line - error.context_mark.line if error.problem_mark and error.context_mark else 0
+    begun = f" begun {above} line{'s' * (above > 1)} above" if above else ""  # a record does not know its line in a file
     return problem + (_HINTS.get(problem) or (f", {context}{begun}" if context else ""))
 
 

@@ -87,7 +87,8 @@ REFUSED = {
     "[" * 991 + "]" * 991: "f:1:991: nested deeper than 990 levels",
     '{"a":' * 200_000: "f:1:4951: nested deeper than 990 levels",
     "- " * 5000: "f:1:1981: nested deeper than 990 levels",
-    "a: [1, 2": "f:1:9: did not find expected ',' or ']', while parsing a flow sequence begun at line 1",
+    "a: [1, 2": "f:1:9: did not find expected ',' or ']', while parsing a flow sequence",
+    "x: 1\na: [1,\n  2": "f:3:4: did not find expected ',' or ']', while parsing a flow sequence begun 1 line above",
 }
 
 
