@@ -160,7 +160,9 @@ def translated(source: Source, error: Exception) -> FormatError:
     """Make our error of the parser's: lower case, placed, with a hint where one is known."""
     if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
         line = mark.line + 1
-        message = _message(error, line_of(source.text, line), mark.column + 1)
+        begin = error.context_mark.index if error.context_mark else mark.index
+        above = source.text[begin : mark.index].rstrip().count("\n")
+        message = _message(error, line_of(source.text, line), mark.column + 1, above)
         return error_at(source, mark.index, message + _suspicion(source, line))
     if odd := re.search(_UNREADABLE, source.text):
         code = f"U+{ord(odd[0]):04X}"
@@ -185,8 +187,8 @@ def _one_line(text: str) -> str:
     return " ".join(text.split()).lower()
 
 
-def _message(error: MarkedYAMLError, line: str, column: int) -> str:
-    """Say what is wrong at a column of a line, after the parser's problem and context."""
+def _message(error: MarkedYAMLError, line: str, column: int, above: int) -> str:
+    """Say what is wrong at a column of a line, after the parser's problem and its context, lines above."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
     if "maximum nesting depth" in problem:  # of libyaml, which looks some way ahead
         return too_much(DEEPEST)
@@ -200,8 +202,7 @@ def _message(error: MarkedYAMLError, line: str, column: int) -> str:
         return f'nothing can begin with {shown(word[0])} here; quote the name: "{name}"'
     if word == ":" and problem == "did not find expected key":
         return "an empty key; write a name before the colon"
-    above = error.problem_mark.line - error.context_mark.line if error.problem_mark and error.context_mark else 0
-    begun = f" begun {above} line{'s' * (above > 1)} above" if above else ""  # a record does not know its line in a file
+    begun = f" begun {above} line{'s' * (above > 1)} above" if above else ""  # a record knows no line of its file
     return problem + (_HINTS.get(problem) or (f", {context}{begun}" if context else ""))
 
 
