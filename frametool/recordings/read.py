@@ -9,6 +9,7 @@ import shutil
 from bisect import bisect_left
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from heapq import merge
 from io import BufferedReader, BytesIO, FileIO
 from operator import itemgetter
 from pathlib import Path, PurePath
@@ -35,6 +36,8 @@ NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 RECORD_HEAD = 9  # bytes
 RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # what a record begins with, and a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
+LENGTH = Struct("<I")  # of ROS 1 bags (wiki.ros.org/Bags/Format/2.0), with what the headers of their records say
+OF_MESSAGE, OF_CONNECTION, CONNECTION = b"\4\0\0\0op=\2", b"\4\0\0\0op=\7", b"\x09\0\0\0conn="
 
 
 @dataclass(eq=False, slots=True)
@@ -275,7 +278,7 @@ class Bag1File:
         """Read its index."""
         from rosbags.rosbag1.reader import Reader, decompressors
 
-        self.reader = opened.enter_context(Reader(path))
+        self.reader: Any = opened.enter_context(Reader(path))
         self._connections = {each.id: each for each in self.reader.connections}
         self.channels = {number: self._channel(each) for number, each in self._connections.items()}
         used = {id(each.decompressor) for each in self.reader.chunks.values()}
@@ -296,11 +299,30 @@ class Bag1File:
         return sum(count for each in counts for number, count in each.items() if number not in others)
 
     def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
-        """Yield the messages on some channels, or on all."""
-        channels = self.channels
-        some = [each for number, each in self._connections.items() if wanted is None or channels[number] in wanted]
-        for each, log_ns, data in self.reader.messages(some):
-            yield Message(channels[each.id], log_ns, data, log_ns)
+        """Yield the messages on some channels, or on all: as the library does, which makes an object of each header."""
+        some = [number for number, each in self.channels.items() if wanted is None or each in wanted]
+        before, chunk = -1, b""
+        for log_ns, place, begin in merge(*(self.reader.indexes[number] for number in some)):
+            if place != before:
+                before, about = place, self.reader.chunks[place]
+                self.reader.bio.seek(about.datapos)
+                chunk = about.decompressor(self.reader.bio.read(about.datasize))
+            header, data, end = _record1(chunk, begin)
+            while OF_CONNECTION in header:
+                header, data, end = _record1(chunk, end)
+            if OF_MESSAGE not in header:
+                raise ValueError("no message where the index has one")
+            (number,) = LENGTH.unpack_from(header, header.index(CONNECTION) + len(CONNECTION))
+            yield Message(self.channels[number], log_ns, data, log_ns)
+
+
+def _record1(chunk: bytes, begin: int) -> tuple[bytes, bytes, int]:
+    """Return header and data of a record of a ROS 1 bag, and where it ends."""
+    middle = begin + LENGTH.size + LENGTH.unpack_from(chunk, begin)[0]
+    end = middle + LENGTH.size + LENGTH.unpack_from(chunk, middle)[0]
+    if end > len(chunk):
+        raise ValueError("a record is longer than its chunk")
+    return chunk[begin + LENGTH.size : middle], chunk[middle + LENGTH.size : end], end
 
 
 class RecordingReader:
