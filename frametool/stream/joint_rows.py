@@ -145,7 +145,7 @@ def names_in(begin: bytes, form: str, source: str, *, header: bool = True) -> li
     Raises FormatError where nothing has a name.
     """
     if "records" in FORMATS[form].reads:
-        return _keys(begin, form, source)
+        return keys_in(begin, form, source, "a key for each joint, or JointState messages")
     if echoed(begin):
         return _echoed_names(begin, source)
     from frametool.stream.table import open_table
@@ -184,15 +184,15 @@ def _echoed_names(begin: bytes, source: str) -> list[str]:
         raise FormatError(str(misfit), source=source, line=1) from None
 
 
-def _keys(begin: bytes, form: str, source: str) -> list[str]:
-    """Return the keys of the first record, those further in with dots."""
+def keys_in(begin: bytes, form: str, source: str, wanted: str) -> list[str]:
+    """Return the keys of the first record, those further in with dots; wanted: what a record has."""
     part = next(iter(Splitter(form).parts(begin).parts), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
     documents = parse_documents(without_noise(text) if form == "yaml" else text, source)
     value: Any = documents[0].value if documents else {}
     value = value[0] if type(value) is list and value else value
     if type(value) is not dict:
-        raise FormatError("expected a mapping with a key for each joint, or JointState messages", source=source, line=1)
+        raise FormatError(f"expected a mapping with {wanted}", source=source, line=1)
     inner = value["msg"] if messages.is_envelope(value) else value
     if messages.is_joint_state(inner):
         return [joint for joint, *_ in messages.positions(inner)]

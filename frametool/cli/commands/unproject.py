@@ -17,7 +17,7 @@ from frametool.errors import FormatError, listing
 from frametool.formats.detect import detect
 from frametool.formats.table import FORMATS
 from frametool.geometry.rigid import EXACT
-from frametool.stream.joint_rows import names_in
+from frametool.stream.joint_rows import keys_in
 from frametool.text.numbers import parse_length, parse_number
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components
 
 FAR = ("depth", "range")
+WANTED = "a key pixel, or u and v"
 PIXEL = ("pixel.0", "pixel.1")
 DEPTH = '"depth"'
 
@@ -109,11 +110,13 @@ def _records(arguments: Sequence[str]) -> Iterator[Source]:
 def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     """Return the names of the columns of the stream, or its keys; those of the first record where there are some."""
     if records:
-        return names_in(records[0].text.encode(), "yaml", records[0].name)
-    begin, stream = task.stream.opened().peek(), task.stream
+        return keys_in(records[0].text.encode(), "yaml", records[0].name, WANTED)
+    stream = task.stream
+    stream.read_clouds_as_rows()
+    begin = stream.opened().peek()
     form = stream.within or stream.told_form() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")[0]
     if "records" in FORMATS[form].reads:
-        return names_in(begin, form, stream.name)
+        return keys_in(begin, form, stream.name, WANTED)
     from frametool.stream.table import open_table
 
     table, _ = open_table(begin, form, header=stream.inputs.header, source=stream.name)
@@ -127,7 +130,7 @@ def _columns(inputs: Inputs, names: Sequence[str], source: str) -> Sequence[str]
         if len(columns) not in (2, 3):
             raise click.UsageError("--columns names those of u and v, and of a depth if there is one")
         return columns
-    if names[:1] == ("1",):
+    if names[:2] == ("1", "2"):  # without names
         return names[:3]
     if not ({"u", "v"} <= {*names} or "pixel" in names):
         message = f"no columns u and v among: {listing(names)}; name them with --columns"
