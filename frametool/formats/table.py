@@ -304,7 +304,7 @@ FORMATS = {
             ("text", r'(?m)^(?:\{\s*|[ \t]+)"(?=\w+":\s*\[)(?:T_[A-Za-z]\w*_\w|[A-Za-z]\w*_T_\w)'),
             ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
         ),
-        conventions="target<-source as each key says; metres; intrinsics are not kept",
+        conventions="target<-source as each key says; metres; intrinsics: frametool project",
         required_options=("direction", "frames"),
     ),
     "kalibr": _read_tree(
