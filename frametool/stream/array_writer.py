@@ -196,7 +196,7 @@ def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
     if kind is None or kind.kind not in WHOLE:
         return False
     return all(
-        abs(number) < EXACT
+        -EXACT < number < EXACT  # of the least int64 there is no absolute value
         for part in parts
         for number in ([part.min(), part.max()] if _is_typed(part) and part.size else map(int, _numbers(part)))
     )

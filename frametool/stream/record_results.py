@@ -17,7 +17,7 @@ from frametool.stream.record_text import column_in, without_noise
 from frametool.stream.record_values import ROUNDED, Teller, plain, results
 from frametool.stream.request import Memory
 from frametool.stream.run import tell_of_rounding
-from frametool.stream.splitter import Splitter
+from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.stream.template import nulled
 from frametool.text.lines import read_blocks
 
@@ -107,6 +107,8 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
         teller.counts[ROUNDED] += mended
         yield Rows(batches, values)
         line += block.count(b"\n", at)
+    if splitter.layout == ARRAY and splitter.is_open:
+        bad.take([Fault(line - block.endswith(b"\n"), "", NO_END)])
     tell_of_rounding(bad.source, teller.counts[ROUNDED], rows)
     bad.finish(rows)
 

@@ -15,7 +15,7 @@ from frametool.stream.answers import Outside
 from frametool.stream.faults import SKIP, STOP, Fault, RowNote
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.run import Outcome
-from frametool.stream.splitter import ARRAY, Splitter
+from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.text.lines import Pieces, read_blocks
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
     if held and not (is_open and on_error == STOP):
         yield Outcome(held, ())
     if is_open:
-        fault = Fault(-1 if ended else 0, "", "the array does not end: its ] is missing")
+        fault = Fault(-1 if ended else 0, "", NO_END)
         yield Outcome(b"" if on_error == STOP else b"]\n", (fault,))
 
 

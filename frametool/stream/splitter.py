@@ -15,6 +15,7 @@ from frametool.text.lines import whole_lines
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+NO_END = "the array does not end: its ] is missing"
 DOCUMENTS, LINES, VALUES, ARRAY = "documents", "lines", "values", "array"
 MARK = b"\xef\xbb\xbf"
 MUCH = 1 << 20  # bytes of one unfinished value from which it is looked at only when twice as much has come
@@ -63,6 +64,7 @@ class Splitter:
         """Take `json` or `yaml`."""
         self.layout = DOCUMENTS if form == "yaml" else ""
         self._looked = 0
+        self.is_open = True  # whether the end of an array has yet to come
 
     def whole(self, text: bytes) -> int:
         """Return how many bytes of what has come are whole records; called with more until some are."""
@@ -99,7 +101,9 @@ class Splitter:
         self.layout = self.layout or _layout_of(text, final=True)
         if self.layout == LINES:
             return Parts([part for line in _LINE.finditer(text) for part in self._line(text, *line.span())])
-        return self._values(text, final=True, match=match)
+        found = self._values(text, final=True, match=match)
+        self.is_open = self.is_open and not found.closed
+        return found
 
     def _line(self, text: bytes, start: int, end: int) -> list[Part]:
         """Return the record of a line, or several."""

@@ -109,3 +109,15 @@ def test_a_comma_that_is_missing_between_records_is_an_error(run: Callable[..., 
     assert done.err == f"frametool: stdin:{2 + between.count(chr(10))}: a comma is missing before this record\n"
     left = run(command, "--on-error", "skip", stdin=text)
     assert (left.status, len(json.loads(left.out))) == (3, 2)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 200])
+@pytest.mark.parametrize("sink", ["json", "yaml", "csv", "npy"])
+def test_an_array_that_was_cut_is_told_by_every_command(count: int, sink: str, run: Callable[..., Any]) -> None:
+    records = ",\n".join([f'{{"xyz": [{row}, 2, 3], "t": {row}}}' for row in range(count)])
+    (cut, whole), place = (f"[\n{records}", f"[\n{records}\n]\n\n"), f"a.json:{max(count, 0) + 1}"
+    written = ("convert", "--to", "quaternion", "-i", "a.json", "-f", sink, "-o", "out", "--force")
+    for command in (written, ("mean", "a.json"), ("compare", "--align", "none", "a.json", "a.json"))[: 3 if count > 1 else 1]:
+        refused = run(*command, files={"a.json": cut})
+        assert (refused.status in (1, 2), f"{place}: the array does not end: its ] is missing" in refused.err) == (True, True), refused.err
+        assert "does not end" not in run(*command, files={"a.json": whole}).err
