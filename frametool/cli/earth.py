@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import inputs, refuse
+from frametool.cli.command import inputs, misuse, refuse
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
-from frametool.errors import FormatError, ValueInvalid
+from frametool.errors import FormatError
 from frametool.geometry.place import UTM, Earth, Origin, Place, kernels
 from frametool.geometry.representations import POSITIONS, Notation
 from frametool.geometry.transverse_mercator import zone_number
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Vector
 
 FIRST = "first"
-INLINE = "argument"
+ASKED = {"origin": "origin", "axes": "local_axes", "zone": "zone"}  # field -> option
 
 
 def earth() -> Earth:
@@ -33,10 +33,8 @@ def earth() -> Earth:
     said = inputs()
     if said.earth is None:
         zone, origin = said.peek("zone"), said.peek("origin")
-        try:
+        with misuse("--zone: "):
             number = None if zone is None else zone_number(zone)
-        except ValueInvalid as error:
-            raise click.UsageError(f"--zone: {error}") from None
         said.earth = SaidEarth(None if origin is None else _origin(origin), said.peek("local_axes") or "", number)
     return said.earth
 
@@ -44,23 +42,11 @@ def earth() -> Earth:
 class SaidEarth(Earth):
     """What options say of places on the Earth; each counts as asked for where it is looked at."""
 
-    @property
-    def origin(self) -> Origin | None:
-        """Return what --origin says."""
-        inputs().ask("origin")
-        return self[0]
-
-    @property
-    def axes(self) -> str:
-        """Return what --local-axes says."""
-        inputs().ask("local_axes")
-        return self[1]
-
-    @property
-    def zone(self) -> float | None:
-        """Return what --zone says."""
-        inputs().ask("zone")
-        return self[2]
+    def __getattribute__(self, name: str) -> Any:
+        """Ask for the option of a field."""
+        if name in ASKED:
+            inputs().ask(ASKED[name])
+        return super().__getattribute__(name)
 
 
 def _origin(text: str) -> Origin:

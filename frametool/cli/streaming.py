@@ -300,7 +300,7 @@ class Stream:
         request = request._replace(by_default=not output.notations)
         converted = FormatConverter(form, request, output.style.in_form(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.inputs.header)
-        return outcomes, lambda: ", " * bool(converted.tally.about) + converted.tally.about
+        return outcomes, lambda: converted.tally.assumed
 
     def _as_text(self, stream: Any, form: str, request: Request, _output: Output) -> tuple[Generator[Outcome], None]:
         """Put the results where the numbers stood; all other text stays."""

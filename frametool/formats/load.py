@@ -124,10 +124,8 @@ class FrameFile(InputFile):
 
     @property
     def stated(self) -> str:
-        """Say what a file that was read means, if its form is not one of ours: directions, units, what was assumed."""
-        states, about = FORMATS[self.form].conventions, self.tally.about
-        said = f"{self.described}{', ' if about else ''}{about}" if states or about else ""
-        return f"{said}; {states}" if states else said
+        """Say what was assumed of a file that was read, or left out; "" where it says all itself."""
+        return f"{self.name}: {self.tally.assumed}" if self.tally.assumed else ""
 
     def edges(
         self, report: Report = stop, *, tell: bool = True, normalize: bool = False

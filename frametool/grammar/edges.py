@@ -122,21 +122,21 @@ class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
     __slots__ = (
-        "about", "axes", "drawn", "has_joints", "names", "noise", "notes", "others", "projected", "rough",
+        "assumed", "axes", "drawn", "has_joints", "names", "noise", "notes", "others", "projected", "rough",
         "unknown_joints",
     )  # fmt: skip
 
     def __init__(self) -> None:
         """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
 
-        about: what this file holds and what was taken for granted, told beside what its form means
+        assumed: what the file does not say and was taken for granted, with the option that says it, or was left out
         axes: frame -> the axes of the camera it is, `optical` or `opengl`
         drawn: of a file without poses, child -> how often its edge comes
         projected: how far the worst matrix was from a rotation, in forms that round them
         has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
         each with the error that says so, for another file may have them
         """
-        self.about = ""
+        self.assumed = ""
         self.axes: dict[str, str] = {}
         self.drawn: dict[str, str] = {}
         self.has_joints = False

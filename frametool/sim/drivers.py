@@ -16,7 +16,7 @@ from frametool.geometry.transform import Transform
 from frametool.sim.turtle import PI, SIZE, TICK_NS, TurtlePose, Twist, wrapped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     MakeLeader = Callable[[], "Leader"]
     TimedTwist = tuple[int, Twist]
@@ -326,3 +326,23 @@ def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
 def _ahead(pose: TurtlePose) -> TurtlePose:
     """Return the place 2 m ahead."""
     return pose._replace(x=math.cos(pose.theta) * 2.0 + pose.x, y=math.sin(pose.theta) * 2.0 + pose.y)
+
+
+# what terminals send for the arrow keys, in both of their modes
+ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
+
+
+def keys_in(data: bytes) -> Iterator[bytes]:
+    """Split what a terminal sent into keys: escape sequences of arrows, and single letters."""
+    at = 0
+    while at < len(data):
+        width = 3 if data[at : at + 2] in (b"\x1b[", b"\x1bO") else 1
+        yield data[at : at + width]
+        at += width
+
+
+def meaning_of(key: bytes, *, headings: bool) -> Twist | Heading | None:
+    """Return what a key commands; None for a key that means nothing."""
+    if len(key) == 3:
+        return KEYS.get(ARROWS.get(key[2:], ""))
+    return HEADINGS.get(key.decode("latin-1").lower()) if headings else None

@@ -63,7 +63,8 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     refuse(holds_arrays(form), f"rows of joints are a table of text, records or messages, not {form}")
     names = names_in(begin, form, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
-    file.tally.about = f"{len(rows.columns)} of {len(rows.joints)} joints from the rows"
+    if left := len(rows.joints) - len(rows.columns):
+        file.tally.assumed = f"{left} of {len(rows.joints)} joints at 0 (--joint NAME=VALUE)"
     state([file])
     echo_form = "" if form in RECORDS else echoed(begin)
     if not echo_form:

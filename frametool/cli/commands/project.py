@@ -7,18 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli import options
 from frametool.cli.cloud_files import is_bag
 from frametool.cli.command import Inputs, Text, argument, command_named, option, together
 from frametool.cli.commands.apply import Way, begins_number, is_record, sources_of, way_by_tree
-from frametool.cli.options import (
-    TIME,
-    ColumnNames,
-    offset_option,
-    pose_options,
-    reading_options,
-    result_options,
-    rules_options,
-)
 from frametool.cli.output import Output
 from frametool.cli.poses import is_inline, values_of
 from frametool.cli.sink import refuse_existing, writing
@@ -78,13 +70,14 @@ camera_options = together(
     option("--first-pixel C", "centre of the first pixel; 0.5: COLMAP", parse_number, default=0.0),
     option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files"),
     stream_options,
-    pose_options,
-    result_options("points"),
-    option("--time-column NAME", "column or key of each row's own time", ColumnNames(), excludes=("at",), under="Time"),
-    option("--at TIME", "all at this time  [default: latest]", TIME, under="Time"),
-    rules_options,
-    offset_option,
-    reading_options(streams=True, camera_axes=_AXES),
+    options.pose_options,
+    options.result_options("points"),
+    option("--time-column NAME", "column or key of each row's own time", options.ColumnNames(), excludes=("at",),
+           under="Time"),
+    option("--at TIME", "all at this time  [default: latest]", options.TIME, under="Time"),
+    options.rules_options,
+    options.offset_option,
+    options.reading_options(streams=True, camera_axes=_AXES),
 )
 
 
@@ -92,7 +85,7 @@ camera_options = together(
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE CAMERA [SOURCE]] [X Y Z | RECORD]..")
 @option("--range", "add range, the distance from the camera", name="ranged")
 @option("--image FILE", "draw over this picture: -o FILE.svg, .html, .png", requires=("output",))
-@option("--frame-column NAME", "column with each row's frame, without SOURCE", ColumnNames())
+@option("--frame-column NAME", "column with each row's frame, without SOURCE", options.ColumnNames())
 @camera_options
 def command(inputs: Inputs) -> int:
     """Add to points the pixels at which a camera sees them.

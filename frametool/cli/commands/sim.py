@@ -27,7 +27,7 @@ from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.formats.table import by_suffix
 from frametool.frames.stamps import BILLION
-from frametool.sim.drivers import HEADINGS, KEYS, FollowController, Heading, Mailbox
+from frametool.sim.drivers import FollowController, Mailbox, keys_in, meaning_of
 from frametool.sim.scene import Scene, duration_ns, tutorial
 from frametool.sim.scene_file import read_scene
 
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.sim.drivers import MakeLeader
-    from frametool.sim.turtle import Twist
 
 INSTEAD = "pipe key names into frametool sim follow --leader -"
 SUBCOMMANDS = {
@@ -159,8 +158,6 @@ def run(inputs: Inputs) -> None:
     output.run(chosen)
 
 
-# what terminals send for the arrow keys, in both of their modes
-ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 QUIT = b"qQ\x04"
 
 
@@ -212,22 +209,6 @@ def _listen(mailbox: Mailbox, headings: bool) -> None:
             if key in QUIT:
                 mailbox.close()
                 return
-            command = meaning(key, headings=headings)
+            command = meaning_of(key, headings=headings)
             if command is not None:
                 mailbox.post(command)
-
-
-def keys_in(data: bytes) -> Iterator[bytes]:
-    """Split what a terminal sent into keys: escape sequences of arrows, and single letters."""
-    at = 0
-    while at < len(data):
-        width = 3 if data[at : at + 2] in (b"\x1b[", b"\x1bO") else 1
-        yield data[at : at + width]
-        at += width
-
-
-def meaning(key: bytes, *, headings: bool) -> Twist | Heading | None:
-    """Return what a key commands; None for a key that means nothing."""
-    if len(key) == 3:
-        return KEYS.get(ARROWS.get(key[2:], ""))
-    return HEADINGS.get(key.decode("latin-1").lower()) if headings else None

@@ -348,7 +348,6 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
     links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
     posture = JointState.of(links, options)
-    options.tally.about = ", ".join(filter(None, (options.answers.dh, options.tally.about)))
     yield from posture.edges(links)
 
 

@@ -87,7 +87,7 @@ class JointState:
         self.told = set(self.given)
         self._follow(fail)
         options.tally.has_joints = True
-        options.tally.about = options.tally.about or self._about()
+        options.tally.assumed = options.tally.assumed or self._about()
 
     @classmethod
     def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> JointState:

@@ -243,12 +243,12 @@ def blocks(
 def describe(options: Options, form: Poses, count: int, *, named: bool = True) -> None:
     """Keep what was taken for granted of a trajectory, to be told beside the name of its file."""
     parent, child = options.answers.names(*form.frames)
-    said = [f"{count} {'pose' if count == 1 else 'poses'}" + f" of {child} in {parent} (--frames)" * named]
+    said = []
+    if named and not options.answers.frames:
+        said.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
     if form.counted and not options.answers.stamps:
         said.append(f"seconds are {form.counted} (--stamps)")
-    if axes := options.answers.camera_axes or form.axes:
-        said.append(f"{axes} axes" + " (--camera-axes)" * bool(options.answers.camera_axes))
-    options.tally.about = ", ".join(said)
+    options.tally.assumed = ", ".join(said)
 
 
 def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Options) -> tuple[Any, Components]:

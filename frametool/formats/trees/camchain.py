@@ -52,10 +52,7 @@ def read(file: FrameFile, options: Options) -> Iterator[Edge]:
 
     def take(value: Any, reading: Reading) -> list[Edge]:
         matrices = Matrices(as_mapping(value, expected), naming, options.answers, reading)
-        edges = matrices.edges(options.tally, f"no pose in it: {nothing}")
-        if is_sensor:
-            options.tally.about = f"the pose of {naming.alone}"
-        return edges
+        return matrices.edges(options.tally, f"no pose in it: {nothing}")
 
     yield from document_edges(made_ordinary(file), options, take, TAGS)
 

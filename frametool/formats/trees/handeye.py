@@ -60,7 +60,6 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         reading.here = (key,)
         pose = within((key,), as_mapping, calibration[key], "the pose of the camera")
         components = within((key,), _pose, pose, reading)
-        options.tally.about = f"the pose of {shown(child)} in {shown(parent)}"
         yield Edge(parent, child, components, path=(key,))
 
     yield from document_edges(file, options, take)

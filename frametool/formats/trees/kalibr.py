@@ -101,7 +101,6 @@ def _named(edges: list[Edge], options: Options, lines: dict[str, int]) -> Iterat
     if len(told := options.answers.frames) > len(frames):
         raise BadAnswer(f"--frames names {len(told)} frames, there are {len(frames)}: {', '.join(frames)}")
     names = dict(zip(frames, options.answers.names(*frames), strict=True))
-    options.tally.about = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
     for each in edges:
         line = lines[str(each.path[0])]
         yield each._replace(parent=names[each.parent or ""], child=names[each.child], line=line, path=())

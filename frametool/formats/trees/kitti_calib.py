@@ -150,10 +150,10 @@ class Calibration:
         elif "velo_to_cam" in base or "delta_f" in self.fields:
             parent, child = "cam0", "velo"
             rect = "R_rect_00 of calib_cam_to_cam turns it to cam0_rect"
-            self.options.tally.about = f"cam0<-velo, cam0 as it is before rectification ({rect})"
+            self.options.tally.assumed = f"cam0<-velo (--frames), cam0 as it is before rectification ({rect})"
         elif "imu_to_velo" in base:
             parent, child = "velo", "imu"
-            self.options.tally.about = "velo<-imu"
+            self.options.tally.assumed = "velo<-imu (--frames)"
         else:
             message = (
                 "R: and T: do not say between which frames; give --frames cam0,velo (of calib_velo_to_cam) or velo,imu"
@@ -183,7 +183,6 @@ class Calibration:
         names = dict.fromkeys(RECTIFICATIONS, "cam0") | {f"R_rect_0{i}": name for i, name in enumerate(CAMERAS)}
         for name, camera in names.items():
             if field := self.fields.get(name):
-                self.options.tally.about = f"{name}: {camera}_rect<-{camera}; P0 .. P3 are about rectified cameras"
                 yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *self._turn(name, field.texts)), field.line
 
     def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:

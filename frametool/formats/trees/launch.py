@@ -55,20 +55,15 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield what each call publishes, and note what could not be read."""
-    count = unread = 0
     for action in _actions(file):
         if action.unread:
-            unread += action.unread.startswith(publisher.CALL)
             options.tally.note_each(action.unread, action.line)
         elif edge := publisher.read_edge(action.arguments, file, options, action.line, action.column):
-            count += 1
             if action.conditions:
                 conditions = " and ".join(dict.fromkeys(action.conditions))
                 message = f"frame {shown(edge.child)} is published under a condition: {conditions}"
                 options.tally.note_each(message, action.line)
             yield edge
-    calls = "1 static transform" if count == 1 else f"{count} static transforms"
-    options.tally.about = calls + (f" ({unread} not read)" if unread else "")
 
 
 def _actions(file: InputFile) -> Iterator[Action]:

@@ -424,10 +424,9 @@ class Matrices:
         if not self.poses:
             raise Misfit(nothing)
         edges = edges_of(self.poses, self.reading)
-        tally.about = f"{len(edges)} {'pose' if len(edges) == 1 else 'poses'}"
         if self.left:
             verb = "is no pose" if len(self.left) == 1 else "are no poses"
-            tally.about += f"; {first_of(self.left, MOST_TOLD)} {verb}"
+            tally.assumed = f"{first_of(self.left, MOST_TOLD)} {verb}"
         return edges
 
     def _of_block(self, block: MatrixBlock) -> Iterator[Stated]:

@@ -88,9 +88,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
                 reading.refuse(misfit.below(*here))
 
     yield from document_edges(file, options, take)
-    default = f" in {bare(base)}{'' if frames else ' (--frames says another)'}" if told else ""
-    others = f"; {', '.join(map(bare, left))} left out" if left else ""
-    options.tally.about = f"{count} {'pose' if count == 1 else 'poses'}{default}{others}"
+    assumed = [f"{count} {'pose' if count == 1 else 'poses'} in {bare(base)} (--frames says another)"] if told and not frames else []
+    options.tally.assumed = "; ".join(assumed + ([f"{', '.join(map(bare, left))} left out"] if left else []))
 
 
 def _entry(

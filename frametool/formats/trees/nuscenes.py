@@ -45,10 +45,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         if "sensor_token" in known:
             yield from _sensors(records, ego, _channels(file), reading, options)
         elif {"translation", "rotation", "timestamp"} <= known.keys():
-            options.tally.about = f"{len(records)} poses of {ego}"
             yield from _ego_poses(records, world, ego, reading)
         elif "channel" in known:
-            options.tally.about = "names of sensors"
             yield Edge(None, ego, IDENTITY)
         else:
             raise Misfit("no poses in this table of nuScenes: they are in calibrated_sensor.json and ego_pose.json")
@@ -78,19 +76,11 @@ def _sensors(
         name = (channels or {}).get(sensor, sensor)
         poses.setdefault(name, {}).setdefault(pose, (str(record.get("token")), (index,)))
     several = [name for name, found in poses.items() if len(found) > 1]
-    options.tally.about = _about(len(poses), several, named=channels is not None)
+    unnamed = [] if channels is not None else [f"sensors are called by their tokens ({NAMES} has the names: --with it)"]
+    options.tally.assumed = ", ".join(unnamed + [f"those of several poses as {bare(each)}/TOKEN" for each in several[:1]])
     for name, found in poses.items():
         for pose, (token, path) in found.items():
             yield Edge(ego, f"{name}/{token}" if len(found) > 1 else name, pose, path=path)
-
-
-def _about(count: int, several: list[str], *, named: bool) -> str:
-    told = f"{count} sensor{'s' * (count != 1)}"
-    if not named:
-        told += f" called by their tokens ({NAMES} has the names: --with it)"
-    if several:
-        told += f", those of several poses as {bare(several[0])}/TOKEN"
-    return told
 
 
 def _ego_poses(records: list[Any], world: str, ego: str, reading: Reading) -> Iterator[Edge]:
