@@ -232,8 +232,8 @@ class Stream:
         if request.gathered is not None:
             outcomes = request.gathered.placing(outcomes, bad.place)
         status = self._write(outcomes, output, bad, gathers=request.gathered is not None)
-        if about is not None and (states := FORMATS[form].conventions) and not self.inputs.quiet:
-            say(f"{self.name}: {FORMATS[form].summary}{about()}; {states}")
+        if about is not None and (assumed := about()) and not self.inputs.quiet:
+            say(f"{self.name}: {assumed}")
         return status
 
     def _detected(self, begin: bytes, *, is_table: bool, quiet: bool = False) -> str:
@@ -284,9 +284,7 @@ class Stream:
             into = import_module(FORMATS[output.told].writer)
         style = output.style.in_form(output.told or form)
         request = request._replace(by_default=not output.notations)
-        outcomes = run_columns(opened, request, style, source=self.name, into=None if into is module else into)
-        now = f", now in {request.result_frame}" if request.result_frame and request.operation.moves else ""
-        return outcomes, lambda: now
+        return run_columns(opened, request, style, source=self.name, into=None if into is module else into), None
 
     def _as_poses(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write the results of rows, or of poses that no table holds, in another form."""

@@ -21,9 +21,33 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Components, Numbers, Quaternion
 
 _new_batched = object.__new__
+OTHER_NAMES = {  # of SciPy and others, and what is called so here; of a Transform also by way of its rotation
+    "from_quat": "from_quaternion", "as_quat": "as_quaternion", "from_dcm": "from_matrix", "as_dcm": "as_matrix",
+    "inv": "inverse", "magnitude": "angle", "translation": "xyz", "from_translation": "from_parts",
+}  # fmt: skip
 
 
-class Batched:
+def no_attribute(owner: type, name: str) -> AttributeError:
+    """Return the error for an attribute that is not there, with what it is called here."""
+    own = OTHER_NAMES.get(name, name)
+    if own not in dir(owner):
+        through = f"from_parts({own[5:]}=..)" if own.startswith("from_") else f"rotation.{own}"
+        own = through if own in dir(Rotation) else name
+    message = f"{owner.__name__} has no attribute {name!r}" + f"; it has {own}" * (own != name)
+    return AttributeError(message, name=name, obj=owner)
+
+
+class Naming(type):
+    """Names what is called otherwise elsewhere where an attribute of the class is missing."""
+
+    if not TYPE_CHECKING:  # a checker finds what is missing by itself
+
+        def __getattr__(cls, name: str) -> Any:
+            """Raise AttributeError."""
+            raise no_attribute(cls, name)
+
+
+class Batched(metaclass=Naming):
     """One item, or an array of them of any shape; frozen."""
 
     __slots__ = ("_components",)
@@ -36,6 +60,12 @@ class Batched:
         made = _new_batched(cls)
         made._components = components  # noqa: SLF001 - its own class
         return made
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise AttributeError, with what it is called here."""
+            raise no_attribute(type(self), name)
 
     @property
     def shape(self) -> tuple[int, ...]:

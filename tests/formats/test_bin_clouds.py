@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 KITTI = np.array([[1, 2, 3, 0.5], [4, 5, 6, 0.25]], "<f4").tobytes()
 NUSCENES = np.array([[1, 2, 3, 55, 0], [4, 5, 6, 20, 31]], "<f4").tobytes()
-STATED = "float32, metres, frame of the lidar; only --in tells it from other .bin"
 
 
 @pytest.mark.parametrize(
@@ -30,7 +29,7 @@ def test_points_are_read_as_a_file_as_an_argument_and_from_a_pipe(run: Run, form
     told = ("--in", form, "-f", "csv")
     done = run("convert", "-i", "a.pcd.bin", *told, files={"a.pcd.bin": data})
     assert (done.status, done.out) == (0, rows)
-    assert done.err.endswith(f"; {STATED}\n")
+    assert done.err == ""
     assert run("convert", *told, stdin=data).out == rows
     if data:
         assert run("convert", "a.pcd.bin", *told).out == rows

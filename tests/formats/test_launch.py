@@ -338,12 +338,8 @@ def test_frames_that_move_are_not_written_as_static_but_as_they_stood_at_a_time(
     assert "--x 0.5 " in run("tree", "a.yaml", "-f", "launch", "--at", "0.5").out
 
 
-def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:
-    done = run("lookup", "a.launch", "base", "cam", files={"a.launch": f"<launch>{NODE.format(FLAGS)}</launch>"})
-    assert done.err == (
-        "frametool: a.launch: launch file, 1 static transform; "
-        "parent<-child, metres, radians; angles yaw pitch roll where they have no flags\n"
-    )
+def test_what_says_all_of_itself_is_read_without_a_word(run: Callable[..., Any]) -> None:
+    assert run("lookup", "a.launch", "base", "cam", files={"a.launch": f"<launch>{NODE.format(FLAGS)}</launch>"}).err == ""
 
 
 def test_reading_a_launch_file_in_xml_loads_neither_numpy_nor_the_reader_of_python(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_names_may_come_from_another_folder(run: Callable[..., Any], tmp_path: P
     assert "name: CAM_FRONT" in run("tree", "calibrated_sensor.json", "--with", "other/sensor.json").out
     alone = run("tree", "calibrated_sensor.json")
     assert "name: s1" in alone.out
-    assert "1 sensor called by their tokens (sensor.json has the names: --with it)" in alone.err
+    assert "sensors are called by their tokens (sensor.json has the names: --with it)" in alone.err
 
 
 def test_the_vehicle_moves_by_microseconds(tmp_path: Path) -> None:

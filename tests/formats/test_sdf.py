@@ -482,7 +482,6 @@ def test_models_too_deep_inside_one_another_are_refused_in_a_line(tmp_path: Path
 def test_what_was_read_is_said_once(run: Callable[..., Any]) -> None:
     text = f"<sdf version='1.9'>{model(A_AND_B + JOINT.format('revolute', '<axis><limit><upper>1</upper><lower>-1</lower></limit></axis>'))}</sdf>"
     done = run("lookup", "a.sdf", "m", "m::b", files={"a.sdf": text})
-    states = "parent<-child, metres, radians unless degrees; frames are model::link"
-    assert done.err == f"frametool: a.sdf: SDF of Gazebo, 1 joint at 0 (--joint NAME=VALUE); {states}\n"
+    assert done.err == "frametool: a.sdf: 1 joint at 0 (--joint NAME=VALUE)\n"
     assert "joint 'j' is beyond its limits -1 .. 1 rad, 2" in run("lookup", "a.sdf", "m", "m::b", "-j", "j=2").err
     assert json.loads(run("lookup", "a.sdf", "m::a", "m::j", "-f", "json", "--quiet").out)["name"] == "m::j"

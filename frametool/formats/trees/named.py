@@ -88,8 +88,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
                 reading.refuse(misfit.below(*here))
 
     yield from document_edges(file, options, take)
-    assumed = [f"{count} {'pose' if count == 1 else 'poses'} in {bare(base)} (--frames says another)"] if told and not frames else []
-    options.tally.assumed = "; ".join(assumed + ([f"{', '.join(map(bare, left))} left out"] if left else []))
+    count_of = f"{count} {'pose' if count == 1 else 'poses'}"
+    assumed = f"{count_of} in {bare(base)} (--frames says another)" if told and not frames else ""
+    others = f"{', '.join(map(bare, left))} left out" if left else ""
+    options.tally.assumed = "; ".join(filter(None, (assumed, others)))
 
 
 def _entry(

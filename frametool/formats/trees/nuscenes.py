@@ -77,7 +77,8 @@ def _sensors(
         poses.setdefault(name, {}).setdefault(pose, (str(record.get("token")), (index,)))
     several = [name for name, found in poses.items() if len(found) > 1]
     unnamed = [] if channels is not None else [f"sensors are called by their tokens ({NAMES} has the names: --with it)"]
-    options.tally.assumed = ", ".join(unnamed + [f"those of several poses as {bare(each)}/TOKEN" for each in several[:1]])
+    more = [f"those of several poses as {bare(each)}/TOKEN" for each in several[:1]]
+    options.tally.assumed = ", ".join(unnamed + more)
     for name, found in poses.items():
         for pose, (token, path) in found.items():
             yield Edge(ego, f"{name}/{token}" if len(found) > 1 else name, pose, path=path)
