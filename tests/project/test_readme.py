@@ -38,7 +38,7 @@ HELP_EXAMPLES = [
 ]
 
 
-STATED = re.compile(r"frametool: \S+: .*; .*<-")  # what a file of another form was taken for
+STATED = re.compile(r"frametool: \S+: .*\(--")  # what was assumed of a file
 
 
 @pytest.fixture(scope="module")

@@ -63,8 +63,7 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     refuse(holds_arrays(form), f"rows of joints are a table of text, records or messages, not {form}")
     names = names_in(begin, form, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
-    if left := len(rows.joints) - len(rows.columns):
-        file.tally.assumed = f"{left} of {len(rows.joints)} joints at 0 (--joint NAME=VALUE)"
+    file.tally.assumed = ""  # rows say where each joint on the way is
     state([file])
     echo_form = "" if form in RECORDS else echoed(begin)
     if not echo_form:
