@@ -26,6 +26,7 @@ COLUMN_WORDS = {
     **{f"{word}_{axis}": f"q{axis}" for word in ("qvec", "quat", "rot", "q") for axis in "xyzw"},
 }
 NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
+RATES = r"(?i)[vw][xyz](?:[ _\[(].*)?"  # what is called velocity_x, omega_x looks like a second position and is refused
 NORMAL_NAMES = frozenset(sum(NORMALS, ()))
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FormatError, FrametoolError, Misused, listing
+from frametool.errors import FormatError, FrametoolError, Misused, listing, warn
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMAL_NAMES, stamp_places
+from frametool.grammar.names import NORMAL_NAMES, RATES, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import Fault, RowNote
 from frametool.stream.rows import written
@@ -29,7 +30,7 @@ from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator, Sequence
 
     from frametool.stream.evaluate import Plan
     from frametool.stream.layout import Layout
@@ -72,8 +73,16 @@ def begin_table(stream: ByteStream, form: str, request: Request, *, source: str,
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, form, header=header, source=source)
     table = as_trajectory(table, form, request, source)
+    if request.operation.turns and not request.columns:
+        _warn_of_vectors(table.names or (), source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
+
+
+def _warn_of_vectors(names: Sequence[str], source: str) -> None:
+    """Warn of velocities and rates beside poses whose axes change: no name says in which frame they are given."""
+    if found := [name for name in names if re.fullmatch(RATES, name)]:
+        warn(f"{source}: {listing(found, 9)} keep to the old axes: poses and covariances turn alone")
 
 
 def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:

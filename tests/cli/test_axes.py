@@ -197,3 +197,17 @@ def test_a_hint_about_euler_axes_names_both_readings(run: Run, name: str, both: 
 
 def test_a_hint_about_an_order_names_both_orders(run: Run) -> None:
     assert "did you mean 'xyzw' or 'wxyz'?" in run("convert", "--from", "xwyz", "1", "0", "0", "0").err
+
+
+LOG = "stamp,x,y,z,qx,qy,qz,qw,{}\n1,1,2,-3,0,0,0,1,4,5,6\n"
+
+
+@pytest.mark.parametrize("names", ["vx,vy,vz", "wx,wy,wz", "vx [m/s],vy [m/s],vz [m/s]", "vx_mps,vy_mps,vz_mps"])
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_velocities_beside_poses_whose_axes_change_are_told_to_stay(run: Any, names: str, form: str) -> None:
+    text = LOG.format(names)
+    done = run("convert", "--all-axes", "ros_from_aircraft", "-f", form, stdin=text)
+    assert (done.status, done.err.count("keep to the old axes: poses and covariances turn alone")) == (0, 1)
+    assert names.split(",", maxsplit=1)[0] in done.err
+    assert "old axes" not in run("convert", "--to", "rpy", "-f", form, stdin=text).err
+    assert "old axes" not in run("convert", "--all-axes", "ros_from_aircraft", stdin=LOG.format("a,b,c")).err
