@@ -84,7 +84,7 @@ def load_camera(
     first, *others = known
     if name is None and any(known[each].args != known[first].args for each in others):
         raise FormatError(f"several cameras; {text}:NAME chooses one; cameras: {listing(known)}", source=file.name)
-    if name is not None and name not in known and (number := re.fullmatch(r"P?0?(\d)", name)):
+    if name is not None and name not in known and (number := re.fullmatch(r"(?:P|cam)?0?(\d)", name)):
         name = next((each for each in (f"cam{number[1]}", f"cam{number[1]}_rect") if each in known), name)
     if name is not None and name not in known:
         raise FormatError(f"no camera {shown(name)}{alternatives(name, known, 'cameras')}", source=file.name)

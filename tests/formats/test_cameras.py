@@ -244,6 +244,12 @@ def test_cameras_of_kitti_by_each_of_their_names(tmp_path: Path) -> None:
     put(tmp_path, FORMS["KITTI odometry cam0"]["files"])
     for name in ("cam2", "P2", "02", "2"):
         assert frametool.load_camera(tmp_path / "calib.txt", name).numbers[0] == 708.2104
+    text = (tmp_path / "calib.txt").read_text().replace("Tr:", "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam:")
+    put(tmp_path, {"000000.txt": text})  # of the objects, whose projections are about rectified frames
+    assert frametool.load_camera(tmp_path / "000000.txt", "cam2").numbers[0] == 708.2104
+    assert frametool.load(tmp_path / "000000.txt").camera("cam2_rect").numbers[0] == 708.2104
+    with pytest.raises(ValueInvalid, match="cam0 has no intrinsics"):
+        frametool.load(tmp_path / "000000.txt").camera("cam0")
     tree = frametool.load(tmp_path / "calib.txt", frames=("left",))
     assert tree.camera("left").numbers[0] == 708.2104
 
