@@ -106,7 +106,7 @@ def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = N
 def _middle(poses: Transform, roots: Array) -> Transform:
     """Return the pose that the others are nearest to, by the medians of metres and radians."""
     count = len(poses)
-    tried = range(count) if count <= MOST_TRIED else next(draws(1, MOST, count))
+    tried = range(count) if count <= MOST_TRIED else next(draws(1, MOST_TRIED, count))
 
     def apart(at: int) -> float:
         return sum(log(max(np.median(roots[:, 0] * off), LEAST)) for off in poses[at].distance(poses))
