@@ -63,7 +63,7 @@ class Stream:
         self._tell = partial(say_error, in_json=inputs.peek("format_name") == "json")
         self.inputs = inputs
         given = inputs.peek("input_path")
-        self.paths: Sequence[str] = given if isinstance(given, tuple) else (given,) if given else ()
+        self.paths: Sequence[str] = given if isinstance(given, tuple) else () if given is None else (given,)
         self.path: str | None = self.paths[0] if self.paths else None
         if self.path == "-":
             self.path = None

@@ -20,7 +20,7 @@ from functools import cached_property
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import LONGEST_NAME, FileProblem, FormatError, bare, cells, shown
+from frametool.errors import LONGEST_NAME, FileProblem, FormatError, cells, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
@@ -219,7 +219,7 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
             noted[name] = states_of(name)
         return open(path, "rb", buffering=HEAD)
     except OSError as error:
-        told = name if len(name) <= LONGEST_NAME else bare(name)
+        told = name if 0 < len(name) <= LONGEST_NAME else shown(name)
         raise FileProblem(f"{told}: {(error.strerror or str(error)).lower()}{_instead_of_a_file(name)}") from None
     except ValueError as error:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None

@@ -100,6 +100,7 @@ def test_a_few_records_need_no_numpy() -> None:
         (["convert", "--to", "rpy,rpy"], b"qx,qy,qz,qw\n0,0,0,1\n", 2, b"frametool: --to: columns pitch, roll"),
         (["convert", "--to", "quaternion,xyzw"], b"roll,pitch,yaw\n0,0,0\n", 2, b"frametool: --to: columns qw"),
         (["relative", "--consecutive"], b"x,y,z,angle\n0,0,0,1\n", 2, b"frametool: columns angle would stand twice"),
+        ([*MOVE, "-i", ""], b"x,y,z\n1,2,3\n", 5, b"frametool: '': no such file or directory"),
         ([*MOVE, "-i", "no.csv"], b"", 5, b"frametool: no.csv: no such file or directory"),
         ([*MOVE, "-i", "a.csv", "1", "2", "3"], b"", 2, b"frametool: apply: -i FILE and arguments are two inputs; give one"),
         (["invert", "--in", "cvs"], b"", 2, b"frametool: invert: invalid value for '--in'"),
