@@ -34,6 +34,12 @@ PART = 10_000  # rows that are drawn at once
 GROWTH = 1.2  # of memory from a quarter of the rows to all
 ROOT = Path(__file__).parents[2]
 RIG = str(ROOT / "examples" / "cameras.yaml")
+MEASURE = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, check=True)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime, used.ru_maxrss)
+"""  # in a small process: the memory of a process counts that of the one it was forked from
 COMMANDS = {
     "apply": ["apply", RIG, "cam_front", "lidar"],
     "project": ["project", RIG, "cam_front", "lidar"],
@@ -80,16 +86,11 @@ def sweep(count: int) -> Any:
 
 def spent(arguments: list[str], path: Path) -> tuple[float, float]:
     """Give the processor seconds of a command on a file, the least of some rounds, and its memory in MB."""
+    line = [sys.executable, "-c", MEASURE, sys.executable, "-m", "frametool", *arguments, "-i", str(path), "--quiet"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    seconds, memory = [], 0.0
-    for _ in range(ROUNDS):
-        line = [sys.executable, "-m", "frametool", *arguments, "-i", str(path), "--quiet"]
-        process = subprocess.Popen(line, stdout=subprocess.DEVNULL, env=environment)
-        _, status, usage = os.wait4(process.pid, 0)
-        assert status == 0, line
-        seconds.append(usage.ru_utime + usage.ru_stime)
-        memory = max(memory, usage.ru_maxrss / 1024)
-    return min(seconds), memory
+    found = [subprocess.run(line, capture_output=True, text=True, env=environment, check=True).stdout for _ in range(ROUNDS)]
+    seconds, memory = zip(*(map(float, each.split()) for each in found), strict=True)
+    return min(seconds), max(memory) / 1024
 
 
 def commands(count: int) -> list[str]:
@@ -121,7 +122,7 @@ def main(count: int) -> None:
         cv2 = None
     drawn = np.random.default_rng(0)
     points = np.column_stack([drawn.uniform(-5, 5, count), drawn.uniform(-5, 5, count), drawn.uniform(4, 30, count)])
-    missed = commands(count)  # first: the memory of a process counts that of the one it was forked from
+    missed = commands(count)
     print(f"{count} points, ns each    to pixels   OpenCV  times  to points   comes back to  from OpenCV (px)")
     for camera in CAMERAS:
         pixels, depth = camera.project(points)
