@@ -380,8 +380,10 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
         body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *shown))
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
     widths = [max(map(len, column)) for column in zip(TITLES, *shown, strict=True)]
-    aligned = ([f"{line[0]:<{widths[0]}}", *map(str.rjust, line[1:], widths[1:])] for line in (TITLES, *shown))
-    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)
+    gap = "\n" if sum(widths) + 2 * len(widths[1:]) > WIDTH else "  "  # numbers may stand below their name
+    width = widths[0] if gap != "\n" else 0
+    aligned = ((line[0].ljust(width), "  ".join(map(str.rjust, line[1:], widths[1:]))) for line in (TITLES, *shown))
+    return "".join(f"{gap.join(line)}\n" for line in aligned)
 
 
 def _best(column: Sequence[Any]) -> float | None:
