@@ -156,8 +156,8 @@ class SeveralClouds:
         from frametool.formats.detect import detect
         from frametool.grammar.edges import Options, Tally, Topics
         from frametool.stream.column_stream import MergedClouds
+        from frametool.stream.faults import run
         from frametool.stream.request import Operation, Request
-        from frametool.stream.run import run
 
         is_more = way.uncertain or not alone
         refuse(is_more, "several clouds are moved whole; no records, --covariance or --explain beside them")

@@ -30,7 +30,7 @@ UNSURE = 1.2  # times too small: given sigmas of which it is told
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
     """Solve the tree that the measurements of files mean, beside what is fixed."""
     from frametool.fit.measured_tree import solve_tree
-    from frametool.view.pose_text import ProgressBar
+    from frametool.view.progress import ProgressBar
 
     measurements = _measurements(inputs, files)
     fixed = _fixed_edges(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else {}

@@ -83,9 +83,8 @@ def say_warning(message: str, rule: str = "") -> None:
     if rule in ("slash", "by-size"):
         import click
 
-        from frametool.cli.command import inputs
-
-        said = click.get_current_context().meta if not inputs().quiet else {"by-size": True, "slash": True}
+        context = click.get_current_context()
+        said = context.meta if not context.params.get("quiet") else {"by-size": True, "slash": True}
         if said.get(rule):
             return
         said[rule] = rule == "by-size"

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 
     from frametool.cli.output import Output
+    from frametool.stream.faults import Outcome
     from frametool.stream.request import Request
-    from frametool.stream.run import Outcome
 
     About = Callable[[], str] | None  # what else there is to say of a form
 
@@ -371,8 +371,8 @@ class Stream:
         """Write what becomes of each block as it comes, unless somebody gathers it; return the exit status."""
         from contextlib import closing, nullcontext
 
-        from frametool.stream.run import run
-        from frametool.view.pose_text import ProgressBar
+        from frametool.stream.faults import run
+        from frametool.view.progress import ProgressBar
 
         with (
             nullcontext(lambda _: None) if gathers else output.opened() as write,

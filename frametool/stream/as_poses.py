@@ -22,12 +22,11 @@ from frametool.grammar.names import EARTH_FRAMES
 from frametool.stream.block_writer import writer_for
 from frametool.stream.column_stream import ColumnRows, move_along
 from frametool.stream.evaluate import Plan, Run, State
-from frametool.stream.faults import NULL, STOP, Fault, RowNote
+from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote, notes_of
 from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
 from frametool.stream.writers import LEARNED

@@ -26,13 +26,12 @@ from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_column
 from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, SKIP, STOP, Fault, RowNote
+from frametool.stream.faults import NULL, SKIP, STOP, Fault, Outcome, RowNote, notes_of
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
-from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import Naming, Table, unnamed
 from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
 from frametool.stream.table_stream import moves_in_time, settle_stamps

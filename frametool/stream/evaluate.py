@@ -13,6 +13,7 @@ from frametool.geometry import arrays, floats, uncertainty
 from frametool.geometry.batch_validation import read_rotations
 from frametool.grammar.names import in_nanoseconds
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
+from frametool.stream.layout import Const, In, Instead, Out, Word
 from frametool.stream.request import PAIR, START, thing_pose
 from frametool.stream.row_layout import (
     FLAT,
@@ -35,7 +36,6 @@ from frametool.stream.stamp_columns import (
     stamps_of,
     weights_of,
 )
-from frametool.stream.text_parts import Const, In, Instead, Out, Word
 from frametool.text.numbers import parse_number, read_number_or_angle
 from frametool.text.parse import half_units, parse_floats
 from frametool.text.spans import Spans
@@ -46,11 +46,11 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
     from frametool.stream.gathering import Gathered
+    from frametool.stream.layout import Piece
     from frametool.stream.request import Operation
     from frametool.stream.row_layout import Target
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
-    from frametool.stream.text_parts import Piece
     from frametool.text.spans import Flags, Floats, Ints
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Components
     from frametool.grammar.pose import Pose
+    from frametool.stream.faults import Outcome
     from frametool.stream.row_layout import Shape
-    from frametool.stream.run import Outcome
     from frametool.text.spans import Flags, Floats
 
 

@@ -72,6 +72,7 @@ KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 SIX_NUMBERS = 6  # of a twist or a wrench
+MOST_LETTERS = 2
 QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
@@ -599,14 +600,14 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     if (rotations and position) or KNOWN.issuperset(value):
         return
     wanted = {*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)} - LISTED_WORDS
-    unknown = islice((key for key in value if key not in KNOWN and not _is_number(value[key])), MOST_COMPARED)
+    unknown = islice((key for key in value if key not in KNOWN and not _is_letter(key, value[key])), MOST_COMPARED)
     if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
 
 
-def _is_number(value: Any) -> bool:
-    """Return True for a number, which is no misspelt list of them."""
-    return type(value) is str and value[:1] in NUMBER_BEGINS and " " not in value
+def _is_letter(key: str, value: Any) -> bool:
+    """Return True for a number under a letter or two, as px and ry, which is no misspelt list of them."""
+    return len(key) <= MOST_LETTERS and type(value) is str
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record

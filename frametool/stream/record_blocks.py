@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 
 from frametool.stream.answers import Outside
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, STOP, Fault, RowNote
+from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_cuts import RecordCutter, block_of, in_order, plan_of
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
 from frametool.stream.rows import texts_as_rows, written
-from frametool.stream.run import Outcome
 from frametool.stream.splitter import ARRAY, Part
 from frametool.stream.template import Template
 from frametool.text.spans import framed

@@ -9,12 +9,12 @@ import numpy as np
 
 from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
+from frametool.stream.layout import In, Renamed
 from frametool.stream.record import KEYS_REMEDY
 from frametool.stream.record_text import attempt, column_in
 from frametool.stream.rows import Block
 from frametool.stream.splice import quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part
-from frametool.stream.text_parts import In, Renamed
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 

@@ -12,11 +12,10 @@ from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import NoResult
-from frametool.stream.faults import NULL, STOP, Fault
+from frametool.stream.faults import NULL, STOP, Fault, tell_of_rounding
 from frametool.stream.record_text import column_in, without_noise
 from frametool.stream.record_values import ROUNDED, Teller, plain, results
 from frametool.stream.request import Memory
-from frametool.stream.run import tell_of_rounding
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.stream.template import nulled
 from frametool.text.lines import read_blocks

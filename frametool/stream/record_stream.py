@@ -12,9 +12,8 @@ from frametool import sizes
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream import stamp_source
 from frametool.stream.answers import Outside
-from frametool.stream.faults import SKIP, STOP, Fault, RowNote
+from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
 from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
-from frametool.stream.run import Outcome
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
 from frametool.text.lines import Pieces, read_blocks
 

@@ -22,13 +22,13 @@ from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
 from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
+from frametool.stream.layout import Const, Word
 from frametool.stream.record import placed, value_at
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 from frametool.stream.splice import refuse_member, target_of
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.template import cut, edits_of, filled, json_documents, rest_of, used_keys
-from frametool.stream.text_parts import Const, Word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation
     from frametool.geometry.types import Components, Namespace, Number, Rigid
     from frametool.stream.gathering import Gathered
+    from frametool.stream.layout import Word
     from frametool.stream.row_layout import Unit
     from frametool.stream.stamp_source import Timed
-    from frametool.stream.text_parts import Word
 
 RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 START, PREVIOUS = "start", "previous"  # rows before that a row is compared with

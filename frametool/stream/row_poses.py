@@ -20,12 +20,11 @@ from frametool.grammar.names import in_nanoseconds, stamp_places
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, Fault
+from frametool.stream.faults import NULL, Fault, notes_of
 from frametool.stream.header import listed
 from frametool.stream.layout import NAMED, New
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, Shape
 from frametool.stream.rows import chosen
-from frametool.stream.run import notes_of
 from frametool.stream.stamp_columns import NOWHERE, read_stamps
 from frametool.stream.table import UNCLOSED, Naming, at_other_times, coded, table_block, unnamed
 from frametool.stream.table_plan import has_vectors, plan_table, with_vectors

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.text_parts import Const, IfLocked, In, Instead, Out, Word
+from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Word
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, shortest_spans
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from frametool.errors import FrametoolError
-    from frametool.stream.text_parts import Piece
+    from frametool.stream.layout import Piece
     from frametool.text.spans import Floats, Ints
 
 

@@ -17,9 +17,9 @@ from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
+from frametool.stream.layout import Const, IfLocked, Item, Out, Renamed, Word
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
-from frametool.stream.text_parts import Const, IfLocked, Item, Out, Renamed, Word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from frametool.documents.document import Node
     from frametool.geometry.place import Place
     from frametool.stream.answers import Entry
+    from frametool.stream.layout import Piece
     from frametool.stream.record import Name, Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
-    from frametool.stream.text_parts import Piece
 
 MARK = "\0"
 SAMPLE = (0.5, 0.5, 0.5, 0.5)

@@ -12,9 +12,8 @@ from frametool.errors import FormatError, FrametoolError, Misused, listing, warn
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMAL_NAMES, RATES, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import Fault, RowNote
+from frametool.stream.faults import Fault, Outcome, RowNote, notes_of
 from frametool.stream.rows import written
-from frametool.stream.run import Outcome, notes_of
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     COMMENT,

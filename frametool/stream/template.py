@@ -20,10 +20,10 @@ from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
+from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word
 from frametool.stream.record import POINT_KEYS, STALE
 from frametool.stream.row_layout import PARTS, POSE
 from frametool.stream.splice import OURS, Splicer
-from frametool.stream.text_parts import Const, IfLocked, In, Out, Renamed, Word
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from frametool.errors import Finding
     from frametool.grammar.readers import Path
     from frametool.stream.answers import Answer, Entry
+    from frametool.stream.layout import Piece
     from frametool.stream.record import Record
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
     from frametool.stream.splice import Edit
     from frametool.stream.stamp_source import Timed
-    from frametool.stream.text_parts import Piece
 
     Names: TypeAlias = tuple[str | None, str | None]
     Span: TypeAlias = tuple[int, int]

@@ -27,12 +27,11 @@ from frametool.grammar.result import Result, Style
 from frametool.ros.messages import body_of
 from frametool.stream import stamp_columns
 from frametool.stream.as_poses import FormatConverter
-from frametool.stream.faults import BadRows
+from frametool.stream.faults import BadRows, Outcome, run
 from frametool.stream.header import listed
 from frametool.stream.record_results import stream_rows
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import RowPoses, block_of
-from frametool.stream.run import Outcome, run
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
 

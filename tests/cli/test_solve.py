@@ -549,7 +549,7 @@ USAGE: tuple[tuple[str, str], ...] = (
     ("--hand-eye a b --fix c", "--fix and --hand-eye exclude each other"),
     ("--points a b --without c:1", "--without and --points exclude each other"),
     ("--hand-eye samples.json --max-gap 5ms --quiet", "--max-gap has no effect here"),
-    ("--hand-eye samples.json --in csv --dh modified --quiet", "--in, --dh have no effect here"),
+    ("--hand-eye samples.json --dh modified --quiet", "--dh has no effect here"),
     ("--hand-eye a b c", "--hand-eye takes GRIPPER TARGET, or one file of SAMPLES, found 3 files"),
     ("--points a", "--points takes two files, A B, found 1"),
     ("--points points_a.csv points_b.csv --topic d --quiet", "--topic has no effect here"),

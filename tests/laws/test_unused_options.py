@@ -88,6 +88,7 @@ VALUES = {
     "given": "rpy", "columns": "x", "time_column": "t", "origin": "{lat: 48, lon: 11, alt: 5}", "zone": "32N", "recorded_frames": "a,b",
     "topics": "/tf", "messages": "pose", "more": "drive.yaml", "on_error": "skip", "output": "out.json", "find": "1,2,3", "axes": "optical",
     "world": "ned_from_enu", "all_axes": "unity_from_ros", "fixed": "map", "format_name": "json", "input_path": "walk.tum", "form": "json",
+    "stop": "0.2",
 }  # fmt: skip
 # these hold whether or not there is something that they are about: what is said, what is tolerated, how a number is spelt, when it is
 FREE = {

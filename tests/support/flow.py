@@ -20,12 +20,11 @@ from frametool.geometry.representations import notation
 from frametool.grammar.readers import Reading
 from frametool.grammar.result import Style
 from frametool.stream.answers import Entry, answer
-from frametool.stream.faults import MOST, BadRows
+from frametool.stream.faults import MOST, BadRows, run
 from frametool.stream.record import find_records
 from frametool.stream.record_stream import run_records
 from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Operation, Request
-from frametool.stream.run import run
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_columns import parse_stamps
 from frametool.stream.stamp_source import read_stamp

@@ -19,7 +19,7 @@ from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Tally
 from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP
-from frametool.view.pose_text import ProgressBar
+from frametool.view.progress import ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,0 +1,61 @@
+"""How far a job is: a bar on stderr, if that is a terminal and the job takes longer than two seconds."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from typing import Self
+
+PATIENCE = 2.0  # seconds before anything is shown
+
+
+class ProgressBar:
+    """Show how far a job is, if stderr is a terminal and the job takes longer than two seconds."""
+
+    def __init__(self, total: int | None, *, quiet: bool, counted: str = "rows") -> None:
+        """Start the clock; `total` is the number of bytes, if it is known; counted: what is done, "" if only that."""
+        self.total, self._counted = total, counted
+        self.rows = self.size = 0
+        self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()
+        self._start = time.monotonic()
+        self._bar: Any = None
+
+    def __enter__(self) -> Self:
+        """Wait for the first block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Clear the line."""
+        if self._bar is not None:
+            with suppress(OSError):  # a terminal that has gone does not change what the data is worth
+                self._bar.stop()
+
+    def advance(self, rows: int, size: int) -> None:
+        """Count what was done."""
+        self.rows += rows
+        self.size += size
+        seconds = time.monotonic() - self._start
+        if self._hidden or seconds < PATIENCE:
+            return
+        if self._bar is None:
+            self._bar = _bar(self.total, self._counted)
+            self._bar.start()
+            self._task = self._bar.add_task("", total=self.total, rows="0", rate="")
+        with suppress(OSError):
+            self._bar.update(self._task, completed=self.size, rows=f"{self.rows:,}", rate=f"{self.rows / seconds:,.0f}")
+
+
+def _bar(total: int | None, counted: str) -> Any:
+    from rich import progress
+
+    from frametool.view.pose_text import coloured_console
+
+    text = f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s" if counted else "solving"
+    columns: list[Any] = [progress.TextColumn(text)]
+    if total:
+        columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
+    return progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)
