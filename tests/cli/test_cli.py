@@ -285,6 +285,7 @@ WRONG = {
     ("loookup arm.yaml a b", 2): "no command 'loookup'; did you mean 'lookup'?",
     ("transform arm.yaml a b", 2):
         "no command 'transform'; `frametool --help` lists all, `frametool help WORD` searches",
+    ("arm.yaml base tip", 2): "no command 'arm.yaml'; a file follows a command: frametool tree arm.yaml",
     ("lookup arm.yaml base", 2):
         "lookup: missing argument 'SOURCE'; usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
     ("lookup arm.yaml base tip --presicion 3", 2):

@@ -90,7 +90,8 @@ class Group(WithHelp, click.Group):
         """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
             otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
-            hint = any_near(cmd_name, self.table, otherwise)
+            example = f"; a file follows a command: frametool tree {shown(cmd_name)[1:-1]}"
+            hint = example if os.path.isfile(cmd_name) else any_near(cmd_name, self.table, otherwise)
             raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
         return found
