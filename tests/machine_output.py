@@ -14,6 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 GOLDEN = ROOT / "tests" / "golden" / "machine_output.jsonl"
 
+FITS = {"solve", "compare", "align", "mean"}  # by LAPACK, whose last digits are the processor's
 HALF = "0.7071067811865476"
 STREAMS = {
     "": "",

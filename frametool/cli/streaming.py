@@ -414,7 +414,7 @@ def _opened(path: str | None) -> BufferedReader:
     try:
         return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
-        raise FileProblem(f"{path}: {(error.strerror or str(error)).lower()}") from None
+        raise FileProblem(f"{path or repr(path)}: {(error.strerror or str(error)).lower()}") from None
 
 
 def _form_of(path: str) -> str:

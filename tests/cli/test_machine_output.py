@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from console import split
-from machine_output import COMMANDS, GOLDEN, ROOT, STREAMS
+from machine_output import COMMANDS, FITS, GOLDEN, ROOT, STREAMS
 
 from frametool.cli.commands import COMMANDS as NAMES
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     Run = Callable[..., Outcome]
 
 STORED = [json.loads(line) for line in GOLDEN.read_text().splitlines()]
-FITS = {"solve", "compare", "align", "mean"}  # by LAPACK, whose last digits are the processor's
 SILENT = {"help", "view", "record"}  # nothing for machines; pictures and recordings have tests of their own
 
 

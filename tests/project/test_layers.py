@@ -112,7 +112,7 @@ MOST_LINES = {  # code lines of a room, and behind it what is aimed at; a featur
     "ros": 1_101,  # with recordings 1 900
     "recordings": 1_376,
     "fit": 2_488,  # 2 200
-    "view": 2_248,  # 1 800
+    "view": 2_250,  # 1 800
     "explain": 1_216,  # 1 000
 }
 MOST_IN_ALL = 45_326  # 44 837 and what `project` took, which may be 1 000; the aim is 37 000

@@ -89,10 +89,9 @@ class Group(WithHelp, click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import one command, or say which ones there are."""
         if cmd_name not in self.table:
-            otherwise = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
-            example = f"; a file follows a command: frametool tree {shown(cmd_name)[1:-1]}"
-            hint = example if os.path.isfile(cmd_name) else any_near(cmd_name, self.table, otherwise)
-            raise click.UsageError(f"no command {shown(cmd_name)}{hint}", ctx)
+            rest = f"`{ctx.command_path} --help` lists all, `frametool help WORD` searches"
+            hint = f"; a file follows a command: frametool tree {cmd_name}" * os.path.isfile(cmd_name)
+            raise click.UsageError(f"no command {shown(cmd_name)}{hint or any_near(cmd_name, self.table, rest)}", ctx)
         found: click.Command = import_module(self.table[cmd_name][0]).command
         return found
 
