@@ -136,10 +136,7 @@ def _with_separator(text: bytes, start: int, end: int, problem: str = "") -> Par
 
 
 def _layout_of(text: bytes, *, final: bool) -> str:
-    """Tell how JSON is laid out by its first lines; "" where they have not come yet.
-
-    A first line that is cut off, before one that is whole, is a broken line rather than the begin of a long value.
-    """
+    """Tell how JSON is laid out by its first lines; "" where they have not come yet."""
     body = text.removeprefix(MARK).lstrip()
     if body.startswith(b"["):
         following = body[1:].lstrip(b" \t\r")[:1]
@@ -153,11 +150,21 @@ def _layout_of(text: bytes, *, final: bool) -> str:
         return ARRAY  # its first item is no record: lists of numbers hold no objects
     if problem is not None:
         return LINES
+    return _layout_of_cut(body, rest, final=final)
+
+
+def _layout_of_cut(body: bytes, rest: bytes, *, final: bool) -> str:
+    """Tell whether a first line that ends within a value goes on in the rest, or is broken."""
     second, end, _ = rest.partition(b"\n")
     if not (end or final):
         return ""
+    if not second.startswith(b"{"):
+        return VALUES if rest.strip() else LINES
     second = second.rstrip(b" \t\r")
-    return LINES if second.startswith(b"{") and _value(second.decode("latin-1"), 0) == (len(second), "") else VALUES
+    if _value(second.decode("latin-1"), 0) == (len(second), ""):
+        return LINES
+    _, problem = _value(body.decode("latin-1"), 0)
+    return VALUES if problem == "" else "" if problem is None and not final else LINES
 
 
 def _value(text: str, at: int) -> tuple[int, str | None]:

@@ -94,3 +94,15 @@ def test_a_bad_record_has_one_place_whatever_is_written(form: str, repeated: int
 def said_in(err: str) -> list[str]:
     """Return the messages of errors, for machines or for people."""
     return [json.loads(line)["message"] if line[:1] == "{" else line.removeprefix("frametool: ") for line in err.splitlines()]
+
+
+@pytest.mark.parametrize("lines", [['{"k":1,"point":[1,'], ['{"point":[1,2', '{"point":[3'], ['{"point":[1,2', '{"point":[3', GOOD.strip()]])
+def test_cut_lines_are_skipped_one_by_one(lines: list[str]) -> None:
+    result = flow("".join(f"{line}\n" for line in lines).encode(), MOVE._replace(on_error="skip"), "json")
+    assert (result.status, result.text.count(b"point")) == (3, lines.count(GOOD.strip()))
+    assert result.told[-1] == f"in: {len(lines) - lines.count(GOOD.strip())} of {len(lines)} rows skipped"
+
+
+def test_a_value_over_several_lines_that_is_cut_ends_the_run() -> None:
+    result = flow(b'{\n "point": [1, 2, 3]\n}\n{\n "point": [1,', MOVE._replace(on_error="skip"), "json")
+    assert (result.status, result.text.count(b"point"), result.told) == (1, 1, ["in:4: not JSON: it is cut off"])
