@@ -588,6 +588,8 @@ def _model_of(model: str | None, count: int, own: dict[str, float]) -> tuple[str
     if model is None:
         fitting = [each for each, row in CAMERA_MODELS.items() if {*row.parameters} == own.keys()] or ["pinhole"]
         fitting = [each for each in fitting if count in CAMERA_MODELS[each].coefficients] or fitting
+        if count and not own and count not in {each for row in CAMERA_MODELS.values() for each in row.coefficients}:
+            raise ValueInvalid(f"no model has {count} coefficients in D; there are 4, 5, 8 or 12")
         if len(fitting) > 1 and count == 4:
             raise ValueInvalid(f"4 coefficients: {' or '.join(f'--model {each}' for each in fitting)}")
         model = fitting[0]

@@ -234,6 +234,8 @@ def test_prefix_makes_room_beside_columns_of_these_names(run: Run) -> None:
         (["unproject", "--camera", PINHOLE, "--ground", "map", "1", "2"], 2, "needs TREE"),
         (["unproject", "--camera", PINHOLE, "1", "2", "3", "4"], 2, "U V or U V DEPTH, found 4"),
         (["unproject", "rig.yaml", "map"], 2, "name TREE, TARGET and CAMERA"),
+        (["project", "-5", "1", "2"], 2, "name TREE and CAMERA, or give --camera"),
+        (["project", "--camera", "{K: [1, 1, 1, 1], D: [1, 2, 3]}", "1", "2", "3"], 1, "no model has 3 coefficients in D"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_in_one_line(run: Run, arguments: list[str], status: int, words: str) -> None:

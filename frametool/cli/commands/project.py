@@ -154,7 +154,7 @@ class CameraTask:
         self.name = name if colon and not is_inline(inputs.camera) else ""
         if inputs.camera is None or _names_tree(self.rest):
             *before, _ = names = named.split()
-            if len(self.rest) < len(names):
+            if len(self.rest) < len(names) or begins_number(self.rest[0]):
                 raise click.UsageError(f"name {', '.join(before)} and CAMERA, or give --camera FILE[:NAME]")
             self.name = self.rest[len(before)]
             self.way, self.rest = way_by_tree(inputs, numbers=True)
