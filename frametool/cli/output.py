@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
     from frametool.frames.lookups import Frames, FrameTree
     from frametool.grammar.pose import Pose
-    from frametool.stream.record_results import Rows
+    from frametool.stream.record_results import BlockResults
     from frametool.stream.record_values import Value
     from frametool.stream.request import Operation
     from frametool.stream.row_poses import RowPoses
@@ -200,7 +200,7 @@ class Output:
             raise ValueInvalid(f"{self.style.form} holds things of one kind, found poses among others")
         return block_of_points([each for each in found if not isinstance(each, Result)])
 
-    def rows(self, blocks: Iterator[Rows]) -> None:
+    def rows(self, blocks: Iterator[BlockResults]) -> None:
         """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
         good = self._before_a_fault(blocks)
         if self.style.form == "csv":
@@ -223,7 +223,7 @@ class Output:
         else:
             self.values(chain(first, values))
 
-    def _before_a_fault(self, blocks: Iterator[Rows]) -> Iterator[Rows]:
+    def _before_a_fault(self, blocks: Iterator[BlockResults]) -> Iterator[BlockResults]:
         """Yield blocks up to an error, which is raised when they are written."""
         try:
             yield from blocks
@@ -357,7 +357,7 @@ def _batched(values: Iterator[Value]) -> Iterator[list[Value]]:
     return iter(lambda: list(islice(values, BLOCK)), [])
 
 
-def _in_blocks(rows: Rows) -> Iterator[list[Value] | RowPoses]:
+def _in_blocks(rows: BlockResults) -> Iterator[list[Value] | RowPoses]:
     """Yield the results of a block of records as one block of poses, or as values, many together."""
     posed = rows.posed()
     return _batched(rows.in_order()) if posed is None else iter([posed])

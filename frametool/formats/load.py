@@ -113,14 +113,9 @@ class FrameFile(InputFile):
         return (*row.required_options, *["frames"] * bool(self.topics.chosen))
 
     @property
-    def described(self) -> str:
-        """Return what the file was taken for."""
-        return f"{self.name}: {FORMATS[self.form].summary}"
-
-    @property
     def known(self) -> str:
         """Return what the file was taken for, and by what it was known, unless that was told."""
-        return f"{self.described}{f', known by {self.known_by}' if self.known_by else ''}"
+        return f"{self.name}: {FORMATS[self.form].summary}{f', known by {self.known_by}' if self.known_by else ''}"
 
     @property
     def stated(self) -> str:
@@ -579,7 +574,7 @@ CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "ner
 
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
-    """Give a tree the cameras of its files: those in trees of ours, others when one is asked for."""
+    """Add to a tree the cameras of its files: those in trees of ours, others when one is asked for."""
     others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
     tree.read_cameras = partial(_read_cameras, tree, others)

@@ -37,7 +37,7 @@ def no_attribute(owner: type, name: str) -> AttributeError:
     return AttributeError(message, name=name, obj=owner)
 
 
-class Naming(type):
+class OtherNames(type):
     """Names what is called otherwise elsewhere where an attribute of the class is missing."""
 
     if not TYPE_CHECKING:  # a checker finds what is missing by itself
@@ -47,7 +47,7 @@ class Naming(type):
             raise no_attribute(cls, name)
 
 
-class Batched(metaclass=Naming):
+class Batched(metaclass=OtherNames):
     """One item, or an array of them of any shape; frozen."""
 
     __slots__ = ("_components",)

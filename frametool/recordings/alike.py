@@ -32,7 +32,7 @@ class Varies(Exception):
     """Stop at a part of a message that has no fixed place."""
 
 
-class Layout(NamedTuple):
+class MessageLayout(NamedTuple):
     """Where the numbers of messages stand, what all of them share, and the text around the numbers on their lines."""
 
     numbers: np.dtype[Any]
@@ -107,7 +107,7 @@ class _Reader:
         return dumps(self.data[begin + 4 : self.at].rstrip(b"\0").decode(), ensure_ascii=False)
 
 
-def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> Layout | None:
+def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> MessageLayout | None:
     """Return how messages lie that are like one; None unless it becomes the line that the full reader makes of it."""
     reader = _Reader(types, data)
     if reader.aligned and data[:2] != CDR_LE:
@@ -121,5 +121,5 @@ def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> Layou
     places, codes = zip(*reader.places, strict=True)
     names = [f"f{at}" for at in range(len(codes))]
     numbers: Any = {"names": names, "formats": codes, "offsets": places, "itemsize": len(data)}
-    made = Layout(np.dtype(numbers), [(part, data[part]) for part in reader.shared], texts)
+    made = MessageLayout(np.dtype(numbers), [(part, data[part]) for part in reader.shared], texts)
     return made if made.lines([data]) == line else None

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options, Tally
-    from frametool.recordings.alike import Layout
+    from frametool.recordings.alike import MessageLayout
     from frametool.recordings.made import MessageTypes
     from frametool.recordings.read import Channel, Message, RecordingReader
 
@@ -253,7 +253,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     """Yield each message, or each pose of a list, as a line, many together; an error comes behind the lines before."""
     held: list[bytes] = []
     number = 1
-    layouts: dict[Any, Layout | None] = {}
+    layouts: dict[Any, MessageLayout | None] = {}
     try:
         for stretch in _stretches(reader.messages(channels)):
             for (channel, _), run in groupby(stretch, lambda each: (each.channel, len(each.data))):
@@ -287,7 +287,7 @@ def _stretches(messages: Iterator[Message]) -> Iterator[list[Message]]:
 
 
 def _lines(
-    types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, Layout | None]
+    types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, MessageLayout | None]
 ) -> Iterator[tuple[bytes, int]]:
     """Yield the lines of messages of one length, and of how many: all at once where they lie alike.
 

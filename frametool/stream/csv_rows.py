@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frametool.grammar.result import Style
-    from frametool.stream.record_rows import Batch
+    from frametool.stream.record_rows import RecordBatch
     from frametool.text.spans import Flags
 
 SPLITTING = np.isin(np.arange(256), [*b'",\\\r\n'])  # a text with one of these is no cell as it is
@@ -25,7 +25,7 @@ SPLITTING = np.isin(np.arange(256), [*b'",\\\r\n'])  # a text with one of these 
 
 def merged(
     lines: Sequence[tuple[int, bytes]],
-    batches: Sequence[Batch],
+    batches: Sequence[RecordBatch],
     texts: Sequence[Mapping[str, Any]],
     columns: Sequence[str],
     style: Style,
@@ -36,7 +36,7 @@ def merged(
     return written([*groups, texts_as_rows(lines)] if lines else groups)
 
 
-def _rows(batch: Batch, cells: Mapping[str, Any], columns: Sequence[str], style: Style) -> list[Spans]:
+def _rows(batch: RecordBatch, cells: Mapping[str, Any], columns: Sequence[str], style: Style) -> list[Spans]:
     """Return the text of the rows of a batch."""
     size, width = len(batch.places), batch.results.shape[1]
     numbers = number_spans(batch.results, style.precision, b"," * width) if width else None
@@ -54,7 +54,7 @@ def _rows(batch: Batch, cells: Mapping[str, Any], columns: Sequence[str], style:
     return [*parts, _constant(b"\n", size)]
 
 
-def _cells(batch: Batch, value: Any, style: Style) -> Spans:
+def _cells(batch: RecordBatch, value: Any, style: Style) -> Spans:
     """Return what stands in place of a cell with marks in each row."""
     size = len(batch.places)
     if value == STAMP_NS and batch.stamps_ns is not None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from frametool.grammar.result import Style
-    from frametool.stream.record_results import Rows
+    from frametool.stream.record_results import BlockResults
 
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
 
@@ -29,7 +29,7 @@ class CsvTable:
         self.waiting = SpooledTemporaryFile(sizes.TABLE)  # noqa: SIM115 - closed with the table
         self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
 
-    def pieces(self, blocks: Iterable[Rows]) -> Iterator[bytes]:
+    def pieces(self, blocks: Iterable[BlockResults]) -> Iterator[bytes]:
         """Yield the table of all blocks."""
         with self.waiting:
             for block in blocks:
@@ -43,7 +43,7 @@ class CsvTable:
                 missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
                 yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
 
-    def _add(self, block: Rows) -> None:
+    def _add(self, block: BlockResults) -> None:
         """Add the rows of a block."""
         singles = [(place, cells_of(value, self.style)) for place, value in block.values]
         found: list[tuple[int, Iterable[str]]] = list(singles)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
@@ -292,7 +293,7 @@ def plain_pose(names: Sequence[str], *, affixed: bool) -> PoseColumns:
 
     Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
     """
-    header, full, bare = Header(names), Header(names), ("", "")
+    header, bare = copy(full := Header(names)), ("", "")
     header.found = {word: {bare: spots[bare]} for word, spots in header.found.items() if bare in spots}
     positions = find_positions(header) or (find_positions(full) if affixed else [])
     rotations = find_rotations(header, None) or (find_rotations(full, None) if affixed else [])

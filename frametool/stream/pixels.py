@@ -77,7 +77,7 @@ class Seen:
         return f"{rows}: {', '.join(parts)}" if parts else ""
 
 
-class Projection(Seen):
+class PixelsOfPoints(Seen):
     """The pixel and the depth of each point, whether it is in the image, and its distance if that is wanted."""
 
     def __init__(
@@ -124,7 +124,7 @@ class Projection(Seen):
         self.counts.update({INSIDE: within, OUTSIDE: seen - within} if sized else {UNSIZED: seen})
 
 
-class Unprojection(Seen):
+class PointsOfPixels(Seen):
     """What pixels see: a ray from the camera, a point on it, or the pixel of another picture.
 
     columns: of u and v, then of how far away it is

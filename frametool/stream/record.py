@@ -72,7 +72,6 @@ KNOWN = frozenset((*POSE_KEYS, *POINT_KEYS, *PARENT_KEYS, *NAME_KEYS))
 XYZ = ("x", "y", "z")
 MOST_KEYS = 8  # named in a message
 SIX_NUMBERS = 6  # of a twist or a wrench
-MOST_LETTERS = 2
 QUATERNION = (*XYZ, "w")
 USED = KNOWN.difference(NAME_KEYS).union(ROTATION_KEYS, (AXES_KEY, "sigma"), COVARIANCES, *PARTS.values())
 NUMBER_BEGINS = frozenset("+-.0123456789n")  # n: of nan
@@ -607,7 +606,7 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
 
 def _is_letter(key: str, value: Any) -> bool:
     """Return True for a number under a letter or two, as px and ry, which is no misspelt list of them."""
-    return len(key) <= MOST_LETTERS and type(value) is str
+    return not key[2:] and type(value) is str
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from frametool.grammar.result import Style
     from frametool.stream.faults import BadRows
-    from frametool.stream.record_rows import Batch, RecordRows
+    from frametool.stream.record_rows import RecordBatch, RecordRows
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
     from frametool.stream.row_poses import RowPoses
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
 
 
-class Rows(NamedTuple):
+class BlockResults(NamedTuple):
     """What the records of a block became: rows of those that are alike, and single results, each with its place."""
 
-    batches: Sequence[Batch]
+    batches: Sequence[RecordBatch]
     values: list[tuple[int, Value]]
 
     def posed(self) -> RowPoses | None:
@@ -58,7 +58,7 @@ class Rows(NamedTuple):
         yield from map(itemgetter(1), found)
 
 
-def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows) -> Iterator[Rows]:
+def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows) -> Iterator[BlockResults]:
     """Yield the results of a stream of records, block by block; bad ones are reported as rows are."""
     splitter = Splitter(form)
     operation = request.operation
@@ -68,7 +68,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
     memory, teller = Memory(), Teller(most=1)
     for block in read_blocks(stream, whole=splitter.whole):
         at = 0
-        batches: Sequence[Batch] = ()
+        batches: Sequence[RecordBatch] = ()
         alone, mended = splitter.parts(block).parts if depends or len(block) < sizes.SMALL else [], 0
         if not depends and not 0 < len(alone) <= sizes.FEW:
             from frametool.stream.record_rows import RecordRows
@@ -99,12 +99,12 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
             except FrametoolError as error:
                 fault = Fault.of(line, "", error)
             if fault is not None and (fault.final or bad.on_error == STOP):
-                yield Rows([each.take((each.places < part.start).nonzero()[0]) for each in batches], values)
+                yield BlockResults([each.take((each.places < part.start).nonzero()[0]) for each in batches], values)
             bad.take([fault] if fault else [])
             if bad.count > before and bad.on_error == NULL:
                 values.append((part.start, _no_result(block[part.start : part.end], form, style)))
         teller.counts[ROUNDED] += mended
-        yield Rows(batches, values)
+        yield BlockResults(batches, values)
         line += block.count(b"\n", at)
     if splitter.layout == ARRAY and splitter.is_open:
         bad.take([Fault(line - block.endswith(b"\n"), "", NO_END)])

@@ -73,7 +73,7 @@ class Marked(NamedTuple):
     stamp: tuple[int, int] | None = None
 
 
-class Batch(NamedTuple):
+class RecordBatch(NamedTuple):
     """Results of records that are written alike, one a row.
 
     places: (n,) where each stands; results: (n, k) numbers; parents, names: of their frames, one a row or one for all
@@ -94,13 +94,13 @@ class Batch(NamedTuple):
         stretch, node = self.cut.template.leaves[at]
         return node, Spans(self.data, self.cut.starts[:, stretch] + MARGIN, self.cut.ends[:, stretch] + MARGIN)
 
-    def take(self, rows: Ints) -> Batch:
+    def take(self, rows: Ints) -> RecordBatch:
         """Return some of the rows."""
         size = len(self.places)
         parents, names = ([each[row] for row in rows.tolist()] if len(each) == size else each for each in self[5:7])
         cut = Cut(self.cut.template, self.cut.starts[rows], self.cut.ends[rows])
         stamps = None if self.stamps_ns is None else self.stamps_ns[rows]
-        return Batch(self.marked, cut, self.data, self.places[rows], self.results[rows], parents, names, stamps)
+        return RecordBatch(self.marked, cut, self.data, self.places[rows], self.results[rows], parents, names, stamps)
 
 
 class RecordRows:
@@ -115,7 +115,7 @@ class RecordRows:
         self.left = sizes.LEARNED  # where no records are alike, learning is lost time
         self._plans: dict[Template, tuple[Plan, list[Marked]] | None] = {}
 
-    def of_block(self, text: bytes, told: Mapping[str, int]) -> tuple[list[Batch], list[Part], int]:
+    def of_block(self, text: bytes, told: Mapping[str, int]) -> tuple[list[RecordBatch], list[Part], int]:
         """Return the rows of a block, the records that are none, and how many rotations of rows were normalised.
 
         told: how often things were told, by their rules
@@ -133,7 +133,7 @@ class RecordRows:
                 else:
                     records.add(part, *hit)
         data = framed(text)
-        batches: list[Batch] = []
+        batches: list[RecordBatch] = []
         mended = 0
         for cut in records.by_template():
             made, rows, count = self._of_cut(cut, data, text, told)
@@ -145,7 +145,7 @@ class RecordRows:
 
     def _of_cut(
         self, cut: Cut, data: Bytes, text: bytes, told: Mapping[str, int]
-    ) -> tuple[list[Batch], Sequence[int], int]:
+    ) -> tuple[list[RecordBatch], Sequence[int], int]:
         """Return the rows of one template; those that are odd, and the first that tells something, stay alone."""
         template = cut.template
         is_new = template not in self._plans
@@ -169,14 +169,14 @@ class RecordRows:
         own = Cut(template, cut.starts[rows], cut.ends[rows])
         if not len(rows):
             return [], sorted(left), 0
-        batches: list[Batch] = []
+        batches: list[RecordBatch] = []
         first = 0
         for at, each in enumerate(marked):
             last = first + len(each.numbers)
             becomes = [named.names for pair in names_of(own, at, text) if (named := template.named(at, pair))]
             parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
             times = stamps[at]
-            batch = Batch(
+            batch = RecordBatch(
                 each, own, data, own.starts[:, 0] + at, run.results[good, first:last], parents, names,
                 None if times is None else times[rows],
             )  # fmt: skip
@@ -294,7 +294,7 @@ def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, 
     return read_stamps((*spans,), in_ns=each.stamp[1] if each.stamp else 0)
 
 
-def plain_texts(batch: Batch, at: int) -> list[Any]:
+def plain_texts(batch: RecordBatch, at: int) -> list[Any]:
     """Return a scalar of each record as a plain value."""
     node, cells = batch.leaf(at)
     data = cells.data.tobytes()
@@ -314,7 +314,7 @@ def plain_of(text: str, node: Node) -> Any:
 class Filling:
     """Puts what the rows of a batch say in the place of marks."""
 
-    def __init__(self, batch: Batch) -> None:
+    def __init__(self, batch: RecordBatch) -> None:
         """Take the rows."""
         self.batch = batch
         size = len(batch.places)
@@ -348,7 +348,7 @@ class Filling:
         return self.leaves[mark][row]
 
 
-def values_of(batch: Batch) -> Iterator[Value]:
+def values_of(batch: RecordBatch) -> Iterator[Value]:
     """Yield the rows of a batch as single results; their numbers are position and quaternion."""
     value = batch.marked.value
     filling = Filling(batch)
@@ -366,7 +366,7 @@ def values_of(batch: Batch) -> Iterator[Value]:
         yield Result(own, filling.filled(value.extras, row))
 
 
-def poses_of(batch: Batch) -> RowPoses | None:
+def poses_of(batch: RecordBatch) -> RowPoses | None:
     """Return the rows of a batch as a block of poses; None where they are points, or on the Earth."""
     value, rows = batch.marked.value, range(len(batch.places))
     if not isinstance(value, Result) or None in (value.pose.position, value.pose.rotation) or AS_READ in value.extras:

@@ -76,7 +76,7 @@ MOST_LEAVES = 2000
 """Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
 
 
-class Named(NamedTuple):
+class NamedFrames(NamedTuple):
     """The frames of a result, and all else that their names decide about its text."""
 
     names: Names
@@ -133,7 +133,7 @@ class Template:
         self.stamps = tuple(tuple(map(at.__getitem__, spans)) for spans in self._stamps)
         self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in self._frame_nodes]
         self.leaves = tuple((at[span], node) for span, node in self._leaf_nodes)
-        self._named: dict[tuple[int, Names], Named | None] = {}
+        self._named: dict[tuple[int, Names], NamedFrames | None] = {}
         self.line = text.count("\n", 0, min(self._numbers, default=(0, 0))[0])
 
     def _cuts(self) -> tuple[set[Span], dict[Span, str]]:
@@ -237,7 +237,7 @@ class Template:
         """Return the text of the result."""
         return filled(self.pieces, self.segments(), numbers, locked=locked)
 
-    def named(self, at: int, names: Names) -> Named | None:
+    def named(self, at: int, names: Names) -> NamedFrames | None:
         """Return the frames of the result of an entry that names these frames; None where that is to be read anew."""
         if (at, names) not in self._named:
             if len(self._named) > MOST_NAMES:
@@ -245,7 +245,7 @@ class Template:
             self._named[at, names] = self._find_named(at, names)
         return self._named[at, names]
 
-    def _find_named(self, at: int, names: Names) -> Named | None:
+    def _find_named(self, at: int, names: Names) -> NamedFrames | None:
         entry, request, timed = self.entries[at], self._request, self._request.timed
         record = entry.record
         asked = request.for_kind(record.shape.kind)
@@ -263,7 +263,7 @@ class Template:
             (name == old, name == other, not name) if is_free else (name,)
             for name, old, other, is_free in zip(new, names, names[::-1], free, strict=True)
         )
-        return Named(new, (is_timed, *known))
+        return NamedFrames(new, (is_timed, *known))
 
     def fits(self, at: int, names: Names) -> bool:
         """Return True if the text around these frames is that of the ones that were learned."""

@@ -11,7 +11,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style
 from frametool.stream.csv_table import CsvTable
-from frametool.stream.record_results import Rows
+from frametool.stream.record_results import BlockResults
 
 if TYPE_CHECKING:
     from conftest import Sizes
@@ -29,7 +29,7 @@ SEQUENCES: list[list[Any]] = [
 def table(values: list[Any], most: int) -> str:
     """Write values as a table, so many of them in a block."""
     blocks = (values[first : first + most] for first in range(0, len(values), most))
-    return b"".join(CsvTable(STYLE).pieces(Rows((), [*enumerate(block)]) for block in blocks)).decode()
+    return b"".join(CsvTable(STYLE).pieces(BlockResults((), [*enumerate(block)]) for block in blocks)).decode()
 
 
 @pytest.mark.parametrize("few", [1, 2, 4])

@@ -11,7 +11,7 @@ import pytest
 from flow import Asked, asked, flow
 
 from frametool.geometry.camera import Camera
-from frametool.stream.pixels import Projection, Unprojection
+from frametool.stream.pixels import PixelsOfPoints, PointsOfPixels
 
 GOLDEN = json.loads((Path(__file__).parent.parent / "golden" / "camera.json").read_text())
 CASES = {each["name"]: each for each in GOLDEN["cameras"]}
@@ -26,12 +26,12 @@ def camera_of(case: dict[str, Any]) -> Camera:
 
 
 def projecting(camera: Camera, first: float = 0.0, *, ranged: bool = False, **options: Any) -> Asked:
-    seen = Projection(camera, first, ranged=ranged)
+    seen = PixelsOfPoints(camera, first, ranged=ranged)
     return asked(formula=seen, shown=seen.shown("cam"), moves=True, **options)
 
 
 def unprojecting(camera: Camera, columns: tuple[str, ...], first: float = 0.0, **options: Any) -> Asked:
-    seen = Unprojection(camera, first, columns, **options)
+    seen = PointsOfPixels(camera, first, columns, **options)
     return asked(formula=seen, shown=seen.shown("map"), moves=True, poses=0)
 
 

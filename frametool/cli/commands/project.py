@@ -98,7 +98,7 @@ def command(inputs: Inputs) -> int:
     SOURCE a row names its frame; without TREE points are in the camera's own. With --image FILE -o FILE.svg they are
     drawn over the picture. `frametool help cameras` says more.
     """
-    from frametool.stream.pixels import Projection
+    from frametool.stream.pixels import PixelsOfPoints
 
     task = CameraTask(inputs, "TREE CAMERA")
     overlay = None
@@ -114,7 +114,7 @@ def command(inputs: Inputs) -> int:
         say("note: the camera has no size, in_image is empty; --size W,H gives it one")
     output = Output(inputs, "points", otherwise="yaml") if overlay is None else Undrawn(inputs)
     take = None if overlay is None else overlay.take
-    seen = Projection(task.camera, inputs.first_pixel, ranged=bool(inputs.ranged), take=take)
+    seen = PixelsOfPoints(task.camera, inputs.first_pixel, ranged=bool(inputs.ranged), take=take)
     request = task.request(inputs.frame_column if task.is_stream else None, seen, seen.shown(task.name))
     records = () if task.is_stream else [*sources_of(task.rest, None)]
     status = task.run(request, output, records, seen)

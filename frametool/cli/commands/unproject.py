@@ -51,7 +51,7 @@ def command(inputs: Inputs) -> int:
     Rows with columns u, v, or a key pixel, stay and get origin_x .. ray_z in TARGET; with a depth or range, in a
     column or an option, x, y, z. They are empty beyond the model and above the horizon (help cameras).
     """
-    from frametool.stream.pixels import Unprojection
+    from frametool.stream.pixels import PointsOfPixels
 
     task = CameraTask(inputs, "TREE TARGET CAMERA")
     raw, rectified = task.camera, task.rectified()
@@ -67,7 +67,7 @@ def command(inputs: Inputs) -> int:
     height = inputs.height if inputs.ground else None
     if into is None and inputs.ground:
         task.way = _through(task, inputs.ground)
-    seen = Unprojection(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into)
+    seen = PointsOfPixels(task.camera, inputs.first_pixel, columns, far=far, height=height, into=into)
     request = task.request(None, seen, seen.shown((task.way and task.way.target) or ""))
     if request.timed is not None and height is not None:
         request = request._replace(timed=request.timed._replace(width=2 * EXACT))
@@ -101,7 +101,7 @@ def _records(arguments: Sequence[str]) -> Iterator[Source]:
     numbers = [each for each in arguments if not is_record(each)]
     yield from (Source("argument", each) for each in arguments if is_record(each))
     if len(numbers) not in (0, 2, 3):
-        raise click.UsageError(f"a pixel is U V or U V DEPTH, found {len(numbers)} numbers; more pixels are rows")
+        raise click.UsageError(f"a pixel is U V or U V DEPTH, found {len(numbers)}; more pixels are rows")
     if numbers:
         u, v, *depth = map(parse_length, numbers)
         yield Source("argument", f'{{"pixel": [{u!r}, {v!r}]{"".join(f", {DEPTH}: {each!r}" for each in depth)}}}')
