@@ -64,10 +64,12 @@ class Talk:
         return self.read()
 
     def interrupt(self) -> str:
-        """Press Ctrl-C once the prompt waits for keys: CPython's readline looks for signals only where one ends that wait."""
+        """Press Ctrl-C until there is an answer: CPython's readline misses a signal that arrives just before its select()."""
         while self._state() not in "S?":
             time.sleep(0.01)
         os.write(self.terminal, b"\x03")
+        while not select.select([self.terminal], [], [], 5)[0]:
+            os.write(self.terminal, b"\x03")
         return self.read()
 
     def _state(self) -> str:
