@@ -32,6 +32,13 @@ frames:
   - name: base_link
   - {name: lidar, parent: base_link, position: [0.9, 0, 2], axis_angle: {axis: [0, 0, 3], angle: pi/2}}
 """
+KEYED = """\
+frames:
+  camera_optical: {parent: camera_link, xyzw: [-0.5, 0.5, -0.5, 0.5]}
+  camera_link: {parent: base_link, xyz: {x: 0.1, z: 1.2}, rpy_deg: [0, 15, 0]}
+  base_link:
+    lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}
+"""
 HALF = "0.7071067811865476"
 SIXTEENTH = "{x: 0, y: 0.13052619222005157, z: 0, w: 0.9914448613738104}"
 ROS = f"""\
@@ -82,7 +89,7 @@ def refusal(tmp_path: Path, *texts: str | bytes) -> str:
 FRAME_IDS = LISTED.replace("{name:", "{child_frame_id:").replace("parent:", "frame_id:")
 
 
-@pytest.mark.parametrize("text", [LISTED, FRAME_IDS, ROS, JSON], ids=["list", "frame ids", "ros", "json"])
+@pytest.mark.parametrize("text", [LISTED, FRAME_IDS, KEYED, ROS, JSON], ids=["list", "frame ids", "keys", "ros", "json"])
 def test_all_spellings_make_the_same_tree(tmp_path: Path, text: str) -> None:
     expected, found = tree_of(tmp_path, NESTED), tree_of(tmp_path, text)
     assert set(found.frames) == set(expected.frames)
@@ -151,6 +158,7 @@ REFUSED = {
     "frames: {a: {xyz: [1, 2, 3]}}":
         "0.yaml:1:14: 'xyz' stands where a frame's name is expected: a root has no pose, its keys are its children",
     "frames: {a: {b: {name: c}}}": "0.yaml:1:18: name is given by the nesting; leave it out",
+    "frames: {c: {parent: b, name: d}}": "0.yaml:1:25: the key above is the name; leave it out",
     "frames: {a: {b: {children: [1]}}}": "0.yaml:1:28: expected the children as a mapping by name, found a list",
     "{frams: {}}":
         "0.yaml:1:1: no frame tree: expected frames:, transforms: or an entry with name: and parent:; found the keys 'frams'",

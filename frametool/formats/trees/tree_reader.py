@@ -2,6 +2,7 @@
 
     frames: {base: {lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}}}          nested: a root's keys are its children
     frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
+    frames: {lidar: {parent: base, xyz: [0.9, 0, 2]}}                         by name, any order
     {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
     {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
     {name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}              a place on the Earth, in `ecef`
@@ -114,8 +115,13 @@ def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
     if type(frames) is list:
         yield from _entries(frames, ("frames",), reading)
     elif frames is not None:
-        for root, children in as_mapping(frames, "a mapping of root frames or a list of entries").items():
-            yield from _below_root(root, children, reading)
+        for name, entry in as_mapping(frames, "a mapping of root frames or a list of entries").items():
+            if type(entry) is dict and type(entry.get("parent")) is str:
+                if "name" in entry:
+                    raise Misfit("the key above is the name; leave it out", ("frames", name, "name"), key=True)
+                yield from _entry({**entry, "name": name}, ("frames", name), reading)
+            else:
+                yield from _below_root(name, entry, reading)
 
 
 def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
