@@ -131,10 +131,8 @@ def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
     pending = [(root, children, path)]
     while pending:
         parent, entries, path = pending.pop()
-        if entries is None:
-            continue
         deeper = []
-        for child, entry in _children(entries, path, reading).items():
+        for child, entry in _children({} if entries is None else entries, path, reading).items():
             here = (*path, child)
             yield from _nested(parent, child, entry, here, reading)
             if type(entry) is dict and "children" in entry:
@@ -154,17 +152,15 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
     """Yield the edge of a nested entry, or its samples."""
     reading.here = path
     try:
-        if entry is None:
-            entry = {}
+        entry = {} if entry is None else entry
         if child in POSE_KEYS and type(entry) is not dict:
             raise Misfit(
                 f"{shown(child)} stands where a frame's name is expected: "
                 "a root has no pose, its keys are its children",
                 key=True,
             )
-        for key in as_mapping(entry, f"the pose of frame {shown(child)}"):
-            if key in NAMES:
-                raise Misfit(f"{key} is given by the nesting; leave it out", (key,), key=True)
+        if names := NAMES.intersection(as_mapping(entry, f"the pose of frame {shown(child)}")):
+            raise Misfit(f"{min(names)} is given by the nesting; leave it out", (min(names),), key=True)
         pose = _pose(entry, reading, CHILDREN)
         yield from _edges(entry, pose, _above(pose, parent, entry), child, path, reading)
     except Misfit as misfit:
