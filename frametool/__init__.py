@@ -18,6 +18,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool import covariance as covariance
     from frametool.calc.api import calc as calc
+    from frametool.cli.embedded import Ran as Ran
+    from frametool.cli.embedded import run as run
     from frametool.derivation import explain as explain
     from frametool.earth import earth_pose as earth_pose
     from frametool.earth import ecef_from_lla as ecef_from_lla
@@ -62,6 +64,7 @@ _HOMES = {
     "FollowController": "frametool.sim.drivers",
     "FrameTree": "frametool.frames.lookups",
     "FrametoolError": "frametool.errors",
+    "Ran": "frametool.cli.embedded",
     "Rotation": "frametool.geometry.rotation",
     "Trajectory": "frametool.frames.trajectory",
     "Transform": "frametool.geometry.transform",
@@ -84,6 +87,7 @@ _HOMES = {
     "load_robot": "frametool.formats.robots.urdf",
     "load_trajectory": "frametool.stream.trajectories",
     "resample": "frametool.fit.api",
+    "run": "frametool.cli.embedded",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
     "solve": "frametool.fit.api",

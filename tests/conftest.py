@@ -7,7 +7,6 @@ import os
 import pathlib
 import re
 import shutil
-import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +16,7 @@ from hypothesis import settings
 from sized import set_sizes
 
 from frametool import cli
+from frametool.cli.embedded import reader, streams, writer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -54,20 +54,12 @@ def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Outcom
         monkeypatch.chdir(tmp_path)
         for name, content in (files or {}).items():
             (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
-        errors = {"out": "strict", "err": "backslashreplace"}  # as Python opens them
-        streams = {name: io.TextIOWrapper(io.BytesIO(), "utf-8", errors=each) for name, each in errors.items()}
         data = stdin.encode() if isinstance(stdin, str) else stdin
         raw = io.BytesIO(data) if isinstance(data, bytes) else data
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(raw), "utf-8"))
-        monkeypatch.setattr(sys, "stdout", streams["out"])
-        monkeypatch.setattr(sys, "stderr", streams["err"])
-        status = cli.run(list(arguments))
-        texts = {}
-        for name, stream in streams.items():
-            stream.flush()
-            stream.seek(0)
-            texts[name] = stream.read()
-        return Outcome(status, texts["out"], texts["err"])
+        out, err = io.BytesIO(), io.BytesIO()
+        with streams(reader(raw), writer(out), writer(err, "backslashreplace")):
+            status = cli.run(list(arguments))
+        return Outcome(status, out.getvalue().decode(), err.getvalue().decode())
 
     return call
 
@@ -114,4 +106,4 @@ def tool(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Tool:
     from oracles_of_use import Tool
 
     monkeypatch.chdir(tmp_path)
-    return Tool(monkeypatch)
+    return Tool()

@@ -19,8 +19,9 @@ class Terminated(BaseException):
 
 
 class _Signals:
-    """What the handler knows: whether there is what to clean up, a line is being written, and Ctrl-C came meanwhile."""
+    """Whether the process is ours, there is what to clean up, a line is being written, and Ctrl-C came meanwhile."""
 
+    owns_process = False
     cleans_up = False
     writing = False
     interrupted = False
@@ -47,6 +48,7 @@ STATE = _Signals()
 
 def with_signals(run: Callable[[list[str]], int], arguments: list[str]) -> int:
     """Run the program with its signals taken over; one that is ignored, as SIGHUP under nohup, stays ignored."""
+    STATE.owns_process = True
     caught = [each for each in ENDING if signal.getsignal(each) not in (signal.SIG_IGN, None)]
     try:
         for number in caught:
@@ -65,10 +67,11 @@ def clean_up() -> None:
 
 
 def die_of(name: str) -> int:
-    """End as a program that does not catch the signal, so that the caller sees what happened."""
+    """End as a program that does not catch the signal, so that the caller sees it; within another program return."""
     number = getattr(signal, name, None)
     if number is None:  # SIGPIPE on Windows
         return 1
-    signal.signal(number, signal.SIG_DFL)
-    os.kill(os.getpid(), number)
+    if STATE.owns_process:
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
     return 128 + int(number)  # where the signal is blocked: what a shell would say

@@ -37,7 +37,7 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
     of a pipe is gone; what a check finds wrong.
     """
-    if path is None or path == "-":
+    if path in (None, "-", "/dev/stdout"):
         yield writer_into(sys.stdout.buffer, "standard output")
     elif (number := _own_stream(path)) is not None or is_special(path):
         with problems_of(path):

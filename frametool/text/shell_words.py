@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from frametool.errors import Misused
@@ -23,7 +24,7 @@ NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 _DOLLAR = rf"\$(?:{NAME}|\{{[^}}]*\}}|[$({{0-9@*\#?!-])?"
 _TOKEN = re.compile(
     rf"""(?xs)
-      (?P<blank> [ \t\r\n]+)
+      (?P<blank> (?:[ \t\r\n]|\\\n)+)
     | (?P<plain> [^ \t\r\n\\'"#$|&;<>`]+ | \#)
     | '(?P<single> [^']*)'
     | "(?P<double> (?:[^"\\]|\\.)*)"
@@ -60,6 +61,12 @@ def goes_on(line: str) -> bool:
     """Return True for a line that ends in a backslash which no other one takes and which is in no comment."""
     backslashes = len(line) - len(line.rstrip("\\"))
     return backslashes % 2 == 1 and any(token.end() == len(line) for token, _ in _tokens(line))
+
+
+def pipeline(line: str) -> list[str]:
+    """Return the commands of a line between its bars."""
+    bars = [token.start() for token, _ in _tokens(line) if token[0] == "|"]
+    return [line[begin + 1 : end] for begin, end in pairwise([-1, *bars, len(line)])]
 
 
 def split(line: str, value_of: Callable[[str], str]) -> list[str]:

@@ -10,17 +10,15 @@ import io
 import os
 import re
 import subprocess
-import sys
-import warnings
-from contextlib import ExitStack, chdir, contextmanager
+from contextlib import ExitStack, chdir
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
 from unittest import mock
 
 from frametool import cli
+from frametool.cli.embedded import Terminal, reader, streams, writer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
 PROGRAMS = {"cat", "cut", "echo", "grep", "head", "printf", "sed", "seq", "sort", "tail", "true", "wc"}
@@ -49,13 +47,6 @@ class Stage(NamedTuple):
 
     words: list[str]
     redirections: list[str]
-
-
-class Terminal(io.BytesIO):
-    """What appears on a screen."""
-
-    def isatty(self) -> bool:
-        return True
 
 
 def parsed(line: str) -> list[tuple[str, list[Stage]]]:
@@ -142,7 +133,7 @@ class _Shell:
                 elif sign == "<":
                     stdin = files.enter_context(open(self._value(target), "rb", buffering=0))
                 else:
-                    streams[number or "1"] = files.enter_context(open(self._value(target), "wb", buffering=0))
+                    streams[number or "1"] = files.enter_context(open(self._value(target), "wb"))
             return self._command([self._value(word) for word in stage.words], stdin, streams["1"], streams["2"])
 
     def _command(self, words: list[str], stdin: Any, out: Any, err: Any) -> int:
@@ -174,26 +165,5 @@ class _Shell:
 
 def frametool(words: list[str], stdin: Any, out: Any, err: Any) -> int:
     """Run the command line in this process on streams as a process has them; what it changes is changed back."""
-    limit = sys.getrecursionlimit()
-    with (
-        io.TextIOWrapper(io.BufferedReader(stdin), "utf-8") as reader,
-        _writer(out, line_buffering=out.isatty()) as writer,
-        _writer(err, line_buffering=True, errors="backslashreplace") as errors,
-        mock.patch.multiple(sys, stdin=reader, stdout=writer, stderr=errors),
-        mock.patch.dict(os.environ),
-        warnings.catch_warnings(),
-    ):
-        try:
-            return cli.run(words)
-        finally:
-            sys.setrecursionlimit(limit)
-
-
-@contextmanager
-def _writer(raw: Any, **options: Any) -> Iterator[io.TextIOWrapper]:
-    """Write text into what stays open for others."""
-    text = io.TextIOWrapper(io.BufferedWriter(raw), "utf-8", **options)
-    try:
-        yield text
-    finally:
-        text.detach().detach()  # which flushes
+    with streams(reader(stdin), writer(out), writer(err, "backslashreplace")), mock.patch.dict(os.environ):
+        return cli.run(words)

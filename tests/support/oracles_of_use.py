@@ -11,18 +11,16 @@ import json
 import os
 import random
 import signal
-import sys
 from collections import deque
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool import cli
+from frametool.cli.embedded import reader, streams, writer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
-
-    import pytest
 
 CASES = int(os.environ.get("FUZZ", "300"))
 FIRST = int(os.environ.get("FUZZ_SEED", "0"))
@@ -57,25 +55,16 @@ class _Out(io.BytesIO):
 class Tool:
     """The command line in this process, with the oracles that hold for every use of it."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Set streams of its own for each run."""
-        self._patch = monkeypatch
-
     def __call__(self, *arguments: str, stdin: bytes = b"") -> Ending:
         """Run a command and check what must hold of every run."""
-        out, err = io.TextIOWrapper(_Out(), "utf-8"), io.TextIOWrapper(io.BytesIO(), "utf-8", errors="backslashreplace")
-        self._patch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(io.BytesIO(stdin)), "utf-8"))
-        self._patch.setattr(sys, "stdout", out)
-        self._patch.setattr(sys, "stderr", err)
+        out, err = _Out(), io.BytesIO()
         try:
-            with _limited_work():
+            with _limited_work(), streams(reader(io.BytesIO(stdin)), writer(out), writer(err, "backslashreplace")):
                 status = cli.run(list(arguments))
         except BaseException as error:
             error.add_note(f"FUZZ_SEED={last[0]} FUZZ=1: frametool {arguments}")
             raise
-        out.flush()
-        err.flush()
-        ending = Ending(status, out.buffer.getvalue(), err.buffer.getvalue().decode())
+        ending = Ending(status, out.getvalue(), err.getvalue().decode())
         check(arguments, ending)
         return ending
 

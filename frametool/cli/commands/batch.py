@@ -9,7 +9,6 @@ import json
 import os
 import re
 import sys
-from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from io import BytesIO, TextIOBase, TextIOWrapper
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
@@ -18,6 +17,7 @@ import click
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
+from frametool.cli.embedded import streams, writer
 from frametool.cli.stderr import TROUBLES, BatchLine, say, say_error, telling_of, wants_json, words_of
 from frametool.documents.source import MOST_CHARACTERS, UTF16, ReadCache, decode, opened
 from frametool.errors import FileProblem, FormatError, FrametoolError, Misused, ValueInvalid, alternatives
@@ -180,7 +180,8 @@ class CommandBatch:
 
     def run(self, stream: BinaryIO) -> int:
         """Run the commands of a stream as they come and return the exit status of all."""
-        with _as_in_a_pipe():
+        piped = _Pipe(sys.stdout.buffer, "utf-8", newline="\n") if sys.stdout.isatty() else sys.stdout
+        with streams(_NoInput(), piped):  # standard input has the lines of the batch
             for line in command_lines(stream, self.source):
                 self.count += 1
                 status = self._run_line(line)
@@ -230,11 +231,10 @@ class CommandBatch:
             is_own = words[0].startswith("-")  # an option of frametool itself
             return answered(lambda: called(words) if is_own else called_in(self.context, words), words)
         held = BytesIO()
-        with redirect_stdout(TextIOWrapper(held, "utf-8", newline="\n", write_through=True)) as stream:
+        with streams(sys.stdin, writer(held)):
             status = answered(lambda: called_in(self.context, words, partial(print_as_json, name)), words)
         if status in FINISHED:
             self.results.keep(name, held.getvalue().decode())
-        stream.detach()
         return status
 
 
@@ -247,21 +247,6 @@ def _refuse(words: Sequence[str]) -> None:
     endless = next((each for each in words if each in ENDLESS), "")
     if words[0] == "sim" and (endless or "--duration inf" in " ".join(words)):
         raise Misused(f"sim {endless or '--duration inf'} keeps the lines behind it waiting; run it alone")
-
-
-@contextmanager
-def _as_in_a_pipe() -> Iterator[None]:
-    """Keep commands from standard input, whose lines are the batch's, and let them print as they print into a pipe."""
-    before = sys.stdin, sys.stdout
-    sys.stdin = _NoInput()
-    piped = _Pipe(sys.stdout.buffer, "utf-8", newline="\n") if sys.stdout.isatty() else None
-    sys.stdout = piped or sys.stdout
-    try:
-        yield
-    finally:
-        sys.stdin, sys.stdout = before
-        if piped:
-            piped.detach()
 
 
 class _Pipe(TextIOWrapper):
