@@ -35,9 +35,9 @@ frames:
 KEYED = """\
 frames:
   camera_optical: {parent: camera_link, xyzw: [-0.5, 0.5, -0.5, 0.5]}
-  camera_link: {parent: base_link, xyz: {x: 0.1, z: 1.2}, rpy_deg: [0, 15, 0]}
+  camera_link: {parent: base_link, x: 0.1, z: 1.2, y: 0, roll_deg: 0, pitch_deg: 15, yaw_deg: 0}
   base_link:
-    lidar: {xyz: [0.9, 0, 2], rpy_deg: [0, 0, 90]}
+    lidar: {xyz: [0.9, 0, 2], yaw: 90deg}
 """
 HALF = "0.7071067811865476"
 SIXTEENTH = "{x: 0, y: 0.13052619222005157, z: 0, w: 0.9914448613738104}"
@@ -158,7 +158,11 @@ REFUSED = {
     "frames: {a: {xyz: [1, 2, 3]}}":
         "0.yaml:1:14: 'xyz' stands where a frame's name is expected: a root has no pose, its keys are its children",
     "frames: {a: {b: {name: c}}}": "0.yaml:1:18: name is given by the nesting; leave it out",
-    "frames: {c: {parent: b, name: d}}": "0.yaml:1:25: the key above is the name; leave it out",
+    "frames: {c: {parent: b, name: d}}": "0.yaml:1:25: name is given by the nesting; leave it out",
+    "frames: {c: {parent: b, x: 1, theta: 9m}}": "0.yaml:1:38: '9m' is not an angle: the units are deg and rad",
+    "frames: {c: {parent: b, x: 1, roll: 9}}": "0.yaml:1:13: half a rotation: missing pitch, yaw beside roll",
+    "frames: {a: {b: {xyz: [1, 2, 3], c: {}}}}":
+        "0.yaml:1:34: frames below one with a pose stand under children: {c: ..}",
     "frames: {a: {b: {children: [1]}}}": "0.yaml:1:28: expected the children as a mapping by name, found a list",
     "{frams: {}}":
         "0.yaml:1:1: no frame tree: expected frames:, transforms: or an entry with name: and parent:; found the keys 'frams'",

@@ -24,12 +24,12 @@ from frametool.formats.trees.written_poses import standing_edges, tell_lonely_ro
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.names import COLUMN_WORDS
-from frametool.grammar.pose import POSE_KEYS, read_angle_unit, read_pose
+from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
 from frametool.grammar.readers import Misfit, Reading, as_mapping, kind
 from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
@@ -110,14 +110,7 @@ def _entry(
         raise Misfit("missing child; in a list an entry names its frame")
     for key in [key for key, value in fields.items() if _is_remark(key, value)]:
         left[key] = fields.pop(key)
-    places: dict[Path, str] = {}
-    mapping = _in_grammar(fields, options.answers.order, places)
-    try:
-        read = read_pose(mapping, reading)
-    except Misfit as misfit:  # at the key as it is written
-        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
-        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
-        raise
+    read = read_loose_pose(fields, reading, order=options.answers.order)
     if read.position is None and read.rotation is None:
         raise Misfit("neither position nor rotation; a pose has x, y, z, or a key like translation, and a rotation")
     if parent is not None:
@@ -136,6 +129,18 @@ def _entry(
 
 
 _SELF = {"me": "cam", "imu": "imu", "body": "body"}
+
+
+def read_loose_pose(fields: dict[str, Any], reading: Reading, also: Collection[str] = (), *, order: str = "") -> Pose:
+    """Read a pose whose numbers may stand each under a name of its own: x, y, z, yaw; raises Misfit."""
+    places: dict[Path, str] = {}
+    mapping = _in_grammar(fields, order, places)
+    try:
+        return read_pose(mapping, reading, also)
+    except Misfit as misfit:  # at the key as it is written
+        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
+        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
+        raise
 
 
 def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
@@ -187,7 +192,9 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
             raise Misfit("ax, ay, az and theta belong together: an axis and the angle about it")
         found[angle] = {"axis": [axis[each] for each in "xyz"], **found[angle]}
     elif angle and found[angle].keys() == {"angle"}:  # about z, as yaw alone
-        _put(found, angle.replace("axis_angle", "rpy"), {"yaw": found.pop(angle)["angle"]}, "theta")
+        yaw = angle.replace("axis_angle", "rpy")
+        _put(found, yaw, {"yaw": found.pop(angle)["angle"]}, "theta")
+        places[yaw, "yaw"] = places[angle, "angle"]
     for key, parts, least in (("rpy", ("roll", "pitch", "yaw"), {"yaw"}), ("quaternion", "xyzw", set())):
         for spelled in (key, f"{key}_deg", f"{key}_rad"):
             given = found.get(spelled)

@@ -42,7 +42,9 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
+NO_NAME = "stands where a frame's name is expected: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
+LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # numbers one by one
 CHILDREN = frozenset(("children", *TIMED))
 
 
@@ -116,18 +118,16 @@ def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
         yield from _entries(frames, ("frames",), reading)
     elif frames is not None:
         for name, entry in as_mapping(frames, "a mapping of root frames or a list of entries").items():
-            if type(entry) is dict and type(entry.get("parent")) is str:
-                if "name" in entry:
-                    raise Misfit("the key above is the name; leave it out", ("frames", name, "name"), key=True)
-                yield from _entry({**entry, "name": name}, ("frames", name), reading)
+            if type(entry) is dict and type(parent := entry.get("parent")) is str:
+                del entry["parent"]
+                yield from _below(parent, {name: entry}, ("frames",), reading)
             else:
-                yield from _below_root(name, entry, reading)
+                yield Edge(None, name, IDENTITY, path=("frames", name))
+                yield from _below(name, entry, ("frames", name), reading)
 
 
-def _below_root(root: str, children: Any, reading: Reading) -> Iterator[Edge]:
+def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[Edge]:
     """Walk one nested tree, parents before children; a stack, so that no tree is too deep."""
-    path: Path = ("frames", root)
-    yield Edge(None, root, IDENTITY, path=path)
     pending = [(root, children, path)]
     while pending:
         parent, entries, path = pending.pop()
@@ -154,11 +154,7 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
     try:
         entry = {} if entry is None else entry
         if child in POSE_KEYS and type(entry) is not dict:
-            raise Misfit(
-                f"{shown(child)} stands where a frame's name is expected: "
-                "a root has no pose, its keys are its children",
-                key=True,
-            )
+            raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
         if names := NAMES.intersection(as_mapping(entry, f"the pose of frame {shown(child)}")):
             raise Misfit(f"{min(names)} is given by the nesting; leave it out", (min(names),), key=True)
         pose = _pose(entry, reading, CHILDREN)
@@ -199,6 +195,10 @@ def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pos
         entry = {key: value for key, value in entry.items() if key != AXES_KEY}
     if "camera" in entry:
         within(("camera",), _check_camera, entry["camera"])
+    if not (POSE_KEYS.issuperset(entry) or LOOSE.isdisjoint(entry)):
+        from frametool.formats.trees.named import read_loose_pose
+
+        return read_loose_pose(entry, reading, also)
     return read_pose(entry, reading, also)
 
 
@@ -310,7 +310,7 @@ def _given_in(entry: dict[str, Any], reading: Reading) -> Earth:
 
 def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
     """Read one pose with its stamp.  uncertain: there is a covariance for all."""
-    pose = read_pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
+    pose = _pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
     if said := COVARIANCE_KEYS.intersection(sample):
         raise Misfit(f"{min(said)} is one for all samples; write it beside samples", (min(said),), key=True)
     if uncertain and pose.parent is not None and "parent" not in sample:
