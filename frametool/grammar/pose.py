@@ -298,7 +298,8 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     unknown = [key for key in mapping if key not in known]
     known -= LISTED_WORDS
     if unknown and "children" in also and type(mapping[unknown[0]]) is dict:
-        raise Misfit(f"frames below one with a pose stand under children: {{{unknown[0]}: ..}}", (unknown[0],), key=True)
+        below = f"children: {{{unknown[0]}: ..}}"
+        raise Misfit(f"frames below one with a pose stand under {below}", (unknown[0],), key=True)
     if unknown:
         named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
         choices = ", ".join([*ROTATIONS][:MOST_CHOICES])

@@ -133,10 +133,9 @@ def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[E
         parent, entries, path = pending.pop()
         deeper = []
         for child, entry in _children({} if entries is None else entries, path, reading).items():
-            here = (*path, child)
-            yield from _nested(parent, child, entry, here, reading)
+            yield from _nested(parent, child, entry, (*path, child), reading)
             if type(entry) is dict and "children" in entry:
-                deeper.append((child, entry["children"], (*here, "children")))
+                deeper.append((child, entry["children"], (*path, child, "children")))
         pending.extend(reversed(deeper))
 
 
