@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import Finding, ValueInvalid, shown, warn
+from frametool.errors import Finding, Unanswered, ValueInvalid, shown, warn
 from frametool.text.numbers import NotFinite, parse_number
 
 if TYPE_CHECKING:
@@ -48,6 +48,20 @@ class Misfit(ValueInvalid):
 
 class NotARotation(Misfit):
     """Numbers that were read well but make no rotation, no covariance, or no pose."""
+
+
+class Unclear(Misfit):
+    """Report a value whose meaning an option has to tell."""
+
+    def placed(self, source: Source, document: int) -> FormatError:
+        """Make the error that names the line and column."""
+        return answerable(super().placed(source, document))
+
+
+def answerable(error: FormatError) -> Unanswered:
+    """Make of an error one that an option answers."""
+    place = {"source": error.source, "line": error.line, "column": error.column, "snippet": error.snippet}
+    return Unanswered(error.message, **place)  # type: ignore[arg-type]
 
 
 class Reading:

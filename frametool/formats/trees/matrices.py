@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from frametool.documents.yaml import TAG
 from frametool.errors import bare, first_of, shown
 from frametool.formats.table import DIRECTIONS
-from frametool.formats.trees.tree_reader import Unclear, dotted, named
+from frametool.formats.trees.tree_reader import dotted, named
 from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Answers, Edge, Tally
-from frametool.grammar.readers import Misfit, Reading, kind, read_numbers, within
+from frametool.grammar.readers import Misfit, Reading, Unclear, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AGREEMENT, read_spelled, rotation_of
 
 if TYPE_CHECKING:

@@ -19,17 +19,16 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import bare
 from frametool.formats.trees.matrices import FRAME_KEYS, Ambiguous, Meaning, directed, meaning_of
-from frametool.formats.trees.tree_reader import Unclear, document_edges, named
+from frametool.formats.trees.tree_reader import document_edges, named
 from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.edges import Edge, Options
-from frametool.grammar.names import COLUMN_WORDS
-from frametool.grammar.pose import POSE_KEYS, Pose, read_angle_unit, read_pose
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind
-from frametool.grammar.rotation_spelling import POSITION_WORDS, ROTATION_WORDS, is_position
+from frametool.grammar.loose import WORDS, read_loose_pose
+from frametool.grammar.pose import read_angle_unit
+from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.frames.lookups import Frames
@@ -40,21 +39,7 @@ if TYPE_CHECKING:
 NAME = "named"
 WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is none of the names
 PARENTS, CHILDREN = (tuple(dict.fromkeys(keys[at] for keys in FRAME_KEYS[:4])) for at in (0, 1))
-_POSITIONS = (*POSITION_WORDS, "translation", "position", "location")
-_TURNS = (*(word for word, meant in ROTATION_WORDS.items() if not meant), "q", "quaternion")
-_SPELLED = {"t": "xyz", "q": "quaternion", "r": "rotvec_rad"}  # by the first letter of a column's own name
-_WHOLE = ("value", "pose")  # seven numbers
 _OF_CAMERAS = ("rvec", "qvec", "tvec", "R", "T", "t")  # camera<-world in OpenCV and COLMAP, often the other way
-# the names of single numbers -> the key of the grammar under which they stand together
-_FLAT = {
-    **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t")},
-    **{f"q{axis}": ("quaternion", axis) for axis in "xyzw"},
-    **{word: (_SPELLED[name[0]], word[-1]) for word, name in COLUMN_WORDS.items()},
-    **{f"{axis}_{unit}": (f"xyz_{unit}", axis) for axis in "xyz" for unit in ("mm", "cm")},
-    **{f"{name}{unit}": (f"rpy{unit}", name) for name in ("roll", "pitch", "yaw") for unit in ("", "_deg", "_rad")},
-    **{f"a{axis}": ("axis", axis) for axis in "xyz"},
-    **{f"{name}{unit}": (f"axis_angle{unit}", "angle") for name in ("theta", "angle") for unit in ("", "_deg", "_rad")},
-}
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -131,18 +116,6 @@ def _entry(
 _SELF = {"me": "cam", "imu": "imu", "body": "body"}
 
 
-def read_loose_pose(fields: dict[str, Any], reading: Reading, also: Collection[str] = (), *, order: str = "") -> Pose:
-    """Read a pose whose numbers may stand each under a name of its own: x, y, z, yaw; raises Misfit."""
-    places: dict[Path, str] = {}
-    mapping = _in_grammar(fields, order, places)
-    try:
-        return read_pose(mapping, reading, also)
-    except Misfit as misfit:  # at the key as it is written
-        known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
-        misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
-        raise
-
-
 def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
     """Take the name of a frame out of an entry; raises Misfit for two of them."""
     there = [key for key in keys if key in fields]
@@ -156,83 +129,7 @@ def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
 
 def _is_remark(key: str, value: Any) -> bool:
     """Tell a text beside a pose, a topic or a model, from what may be a misspelt number."""
-    known = key in POSE_KEYS or key in _FLAT or key in (*_POSITIONS, *_TURNS, *_WHOLE)
-    return not known and type(value) is str and re.match(r"[-+.]*\d", value) is None
-
-
-def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> dict[str, Any]:
-    """Return an entry with the keys of the grammar of poses; raises Misfit.
-
-    places: is filled with the keys under which these stand in the text
-    """
-    found: dict[str, Any] = {}
-    for key, value in fields.items():
-        if type(value) is not list and type(value) is not dict and key in _FLAT:
-            together, part = _FLAT[key]
-            parts = found.setdefault(together, {})
-            if type(parts) is not dict or part in parts:
-                raise Misfit(f"{bare(key)} says again what stands beside it; keep one", (key,), key=True)
-            parts[part], places[together, part] = value, key
-        elif key in _WHOLE:
-            if type(value) is not list or len(value) != 7:
-                found_here = f"{len(value)} numbers" if type(value) is list else kind(value)
-                raise Misfit(f"expected 7 numbers, found {found_here}", (key,))
-            _put(found, "xyz", value[:3], key)
-            _put(found, _ordered(value[3:], order, key), value[3:], key)
-        elif key in _POSITIONS and is_position(key, value):
-            _put(found, "xyz", value, key)
-        elif key in _TURNS:
-            _put(found, *_turn(value, order, key), key)
-        else:
-            _put(found, key, value, key)
-        places |= {(new,): key for new in found if (new,) not in places and type(value) in (list, dict)}
-    angle = next((key for key in found if key.startswith("axis_angle") and type(found[key]) is dict), "")
-    if axis := found.pop("axis", None):
-        if not angle or axis.keys() != {"x", "y", "z"}:
-            raise Misfit("ax, ay, az and theta belong together: an axis and the angle about it")
-        found[angle] = {"axis": [axis[each] for each in "xyz"], **found[angle]}
-    elif angle and found[angle].keys() == {"angle"}:  # about z, as yaw alone
-        yaw = angle.replace("axis_angle", "rpy")
-        _put(found, yaw, {"yaw": found.pop(angle)["angle"]}, "theta")
-        places[yaw, "yaw"] = places[angle, "angle"]
-    for key, parts, least in (("rpy", ("roll", "pitch", "yaw"), {"yaw"}), ("quaternion", "xyzw", set())):
-        for spelled in (key, f"{key}_deg", f"{key}_rad"):
-            given = found.get(spelled)
-            if type(given) is dict and given.keys() != {*parts} and given.keys() != least:
-                missing = ", ".join(part for part in parts if part not in given)
-                raise Misfit(f"half a rotation: missing {missing} beside {', '.join(given)}")
-    return found
-
-
-def _put(found: dict[str, Any], key: str, value: Any, given: str) -> None:
-    """Keep a value; raises Misfit for the second position, or for what stands there twice."""
-    if key in found:
-        raise Misfit(f"{bare(given)} says again what stands beside it; keep one", (given,), key=True)
-    found[key] = value
-
-
-def _turn(value: Any, order: str, key: str) -> tuple[str, Any]:
-    """Return the key of the grammar for a rotation, by its shape, and its value; raises Misfit."""
-    if type(value) is list and len(value) == 4 and not any(type(each) is list for each in value):
-        return _ordered(value, order, key), value
-    if type(value) is list and (len(value) == 9 or any(type(each) is list for each in value)):
-        return "matrix", value
-    if type(value) is dict and not {"roll", "pitch", "yaw"}.isdisjoint(value):
-        return "rpy", value
-    if type(value) is dict and value.keys() == {"qx", "qy", "qz", "qw"}:
-        return "quaternion", {name[1]: each for name, each in value.items()}
-    if type(value) is list and len(value) == 3:
-        what = f"{bare(key)} of 3 numbers does not say what they are"
-        raise Misfit(f"{what}; write rpy, rpy_deg or rotvec", (key,), key=True)
-    return "quaternion", value
-
-
-def _ordered(value: list[Any], order: str, key: str) -> str:
-    if not order:
-        numbers = ", ".join(str(each) for each in value)
-        what = f"{bare(key)} [{bare(numbers)}] does not say where w stands"
-        raise Unclear(f"{what}: give --from xyzw or --from wxyz, for all of the file", (key,), key=True)
-    return order
+    return key not in WORDS and type(value) is str and re.match(r"[-+.]*\d", value) is None
 
 
 def write_tree(tree: Frames, style: Style) -> str:

@@ -21,9 +21,9 @@ from frametool.documents.xml import Element, XmlFile
 from frametool.documents.yaml_writer import flow
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.trees.matrices import HEAD, TAGS, FrameNames, Matrices, Meaning, made_ordinary, meaning_of
-from frametool.formats.trees.tree_reader import Unclear, answerable, document_edges, remember
+from frametool.formats.trees.tree_reader import document_edges, remember
 from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges, tell_lonely_roots
-from frametool.grammar.readers import Misfit, Reading, as_mapping
+from frametool.grammar.readers import Misfit, Reading, Unclear, answerable, as_mapping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -23,7 +23,7 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, tell, within
+from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, tell, within
 from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
@@ -118,9 +118,8 @@ def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
         yield from _entries(frames, ("frames",), reading)
     elif frames is not None:
         for name, entry in as_mapping(frames, "a mapping of root frames or a list of entries").items():
-            if type(entry) is dict and type(parent := entry.get("parent")) is str:
-                del entry["parent"]
-                yield from _below(parent, {name: entry}, ("frames",), reading)
+            if type(entry) is dict and type(entry.get("parent")) is str:
+                yield from _below(entry.pop("parent"), {name: entry}, ("frames",), reading)
             else:
                 yield Edge(None, name, IDENTITY, path=("frames", name))
                 yield from _below(name, entry, ("frames", name), reading)
@@ -195,7 +194,7 @@ def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pos
     if "camera" in entry:
         within(("camera",), _check_camera, entry["camera"])
     if not (POSE_KEYS.issuperset(entry) or LOOSE.isdisjoint(entry)):
-        from frametool.formats.trees.named import read_loose_pose
+        from frametool.grammar.loose import read_loose_pose
 
         return read_loose_pose(entry, reading, also)
     return read_pose(entry, reading, also)
@@ -367,20 +366,6 @@ def line_error(file: InputFile, line: int, column: int, message: str) -> FormatE
     """Make the error for a place in a text that is read line by line."""
     text = file.text.split("\n")[line - 1].rstrip("\r")
     return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
-
-
-class Unclear(Misfit):
-    """Report a value whose meaning an option has to tell."""
-
-    def placed(self, source: Source, document: int) -> FormatError:
-        """Make the error that names the line and column."""
-        return answerable(super().placed(source, document))
-
-
-def answerable(error: FormatError) -> Unanswered:
-    """Make of an error one that an option answers."""
-    place = {"source": error.source, "line": error.line, "column": error.column, "snippet": error.snippet}
-    return Unanswered(error.message, **place)  # type: ignore[arg-type]
 
 
 def document_edges(file: InputFile, options: Options, take: Take, tags: Collection[str] = ()) -> Iterator[Edge]:
