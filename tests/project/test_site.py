@@ -36,10 +36,10 @@ TYPED = {
     "gimbal lock": "What happens at gimbal lock?",
     "opencv rvec matrix": "OpenCV's rvec to a matrix?",
     "how to chain transforms": "How do I chain transforms?",
-    "urdf link joint values": "Link to link of a URDF at joint values?",
+    "urdf link joint values": "The pose between two links of a URDF, at joint values?",
     "colmap camera centres": "Camera centres of a COLMAP model?",
     "convert gps to utm": "GPS to ECEF, or to UTM?",
-    "where is the camera in the hand": "Where does the camera sit in the hand?",
+    "where is the camera in the hand": "Where is the camera in the hand (eye-in-hand)?",
     "translation error percent kitti": "Translation error in percent, as KITTI ranks?",
 }  # fmt: skip
 
@@ -124,7 +124,7 @@ def test_a_command_line_is_taken_apart() -> None:
 @pytest.mark.parametrize(("title", "kind", "expected"), [
     ("GPS to ECEF, or to UTM?", "topics", ["earth", "rotations"]),
     ("Camera centres of a COLMAP model?", "forms", ["colmap"]),
-    ("Where does the camera sit in the hand?", "files", ["gripper.csv", "target.csv"]),
+    ("Where is the camera in the hand (eye-in-hand)?", "files", ["gripper.csv", "target.csv"]),
     ("Where does turtle2 see turtle1 after two seconds?", "commands", ["sim follow", "lookup", "apply"]),
 ])  # fmt: skip
 def test_a_question_leads_to_what_it_uses(title: str, kind: str, expected: list[str]) -> None:
