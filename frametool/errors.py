@@ -169,7 +169,7 @@ class UnknownFrame(LookupFailed):
         place = f" in {where}" if where else ""
         near = did_you_mean(name, self.known)
         self.short = f"unknown frame {shown(name)}{place}{near}"
-        message = f"{self.short}{'' if near else ';'} frames: {listing(self.known, near=name)}"
+        message = f"{self.short}{'' if near else ';'} frames: {listing(self.known, NEAREST, near=name)}"
         super().__init__(message, frame=name, known=nsmallest(20, self.known))
 
 

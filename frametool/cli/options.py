@@ -21,7 +21,7 @@ from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from frametool.cli.command import Adds
     from frametool.formats.load import Rules
@@ -76,41 +76,27 @@ class Notations(Text):
 
 
 class Form(Text):
-    """The name of a form of text, of any or of those from which something is read."""
+    """The name of a format: any, or one of those that a command reads or writes."""
 
-    def __init__(self, names: Collection[str], are: str) -> None:
-        """Keep the forms that may be named, and what they are in an error: `read`, `known`."""
-        self.names = names
+    def __init__(self, choices: Collection[str], are: str) -> None:
+        """Keep the formats that may be named, and what they are in an error: `read`, `known`."""
+        self.choices = choices
         self.are = are
 
     def read(self, text: str) -> str:
         """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
-        if text not in self.names:
-            _refuse_unsupported(text)
-            near = did_you_mean(text, self.names)
-            raise ValueInvalid(f"no form {shown(text)} is {self.are}{near}; `frametool formats` lists all")
+        if text not in self.choices:
+            from frametool.formats.unsupported import UNSUPPORTED
+
+            if row := UNSUPPORTED.get(text):
+                raise ValueInvalid(f"{text} ({row.summary}) is not supported: {row.remedy}")
+            near = did_you_mean(text, self.choices)
+            raise ValueInvalid(f"no format {shown(text)} is {self.are} (`frametool formats` lists all){near}")
         return text
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
-        """Offer the forms."""
-        return {name: FORMATS[name].summary for name in self.names}
-
-
-class WrittenForm(click.Choice[str]):
-    """The form of a result, one of those that a command writes."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Refuse an unknown one; of one that is not supported, say what to do."""
-        if value not in self.choices:
-            _refuse_unsupported(value)
-        return super().convert(value, param, ctx)
-
-
-def _refuse_unsupported(name: str) -> None:
-    from frametool.formats.unsupported import UNSUPPORTED
-
-    if row := UNSUPPORTED.get(name):
-        raise click.BadParameter(f"{name} ({row.summary}) is not supported: {row.remedy}")
+        """Offer the formats."""
+        return {name: FORMATS[name].summary if name in FORMATS else "for people" for name in self.choices}
 
 
 def suffix_of(path: str) -> str:
@@ -245,10 +231,6 @@ _PLACE = (
 )
 
 
-def _form_option(forms: Iterable[str], text: str) -> Callable[[Any], Any]:
-    return option("-f --format", text, WrittenForm(("text", *forms)), name="format_name")
-
-
 MESSAGES = ("pose", "tf", "path", "point", "fix")
 
 
@@ -275,7 +257,9 @@ def result_options(*what: str) -> Adds:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     forms = writers(*what)
     recording = [] if set(forms).isdisjoint(writers("recording")) else _RECORDING
-    return together(_form_option(forms, "form of the result"), *_PLACE, _PRECISION, *recording)
+    chosen = option("-f --format FORMAT", "of the result (frametool formats)", Form(("text", *forms), "written here"),
+                    name="format_name")  # fmt: skip
+    return together(chosen, *_PLACE, _PRECISION, *recording)
 
 
 def list_options(*more: str) -> Adds:
@@ -283,7 +267,8 @@ def list_options(*more: str) -> Adds:
 
     more: forms beside text and those of reports
     """
-    return together(_form_option((*writers("report"), *more), "form of the result  [default: text]"), *_PLACE)
+    forms = "text", *writers("report"), *more
+    return together(option("-f --format", "of the result  [default: text]", forms, name="format_name"), *_PLACE)
 
 
 _TO = together(

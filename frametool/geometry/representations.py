@@ -494,13 +494,12 @@ def notations(spec: str) -> tuple[Notation, ...]:
 
 
 def checked_axes(axes: str) -> str:
-    """Return the name of an Euler convention back if it is one; else raise ValueInvalid with those there are."""
+    """Return the name of an Euler convention back if it is one; else raise ValueInvalid with the nearest."""
     if axes in euler.AXES:
         return axes
     near = _both_readings(axes.lower()) or _near_axes(axes.lower()) or ";"
     raise ValueInvalid(
-        f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters: "
-        f"{', '.join(sorted(euler.AXES))}"
+        f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters, such as rzyx"
     )
 
 

@@ -244,10 +244,10 @@ WRONG = {
     ("convert --from matrix 1 0 0 0 1 0 0 0 -1", 1):
         "matrix has determinant -1: it is left-handed (mirrored); a rotation has 1",
     ("convert --from quaternion 0 0 foo 1", 2):
-        "convert: 'foo' is not a number; usage: frametool convert [OPTIONS] [VALUES.. | POSE]",
+        "convert: 'foo' is not a number; `frametool convert --help` shows the options",
     ("convert --from rpy 1 2", 2):
         "convert: rpy has 3 numbers (roll pitch yaw), or 6 with x y z before them; found 2; "
-        "usage: frametool convert [OPTIONS] [VALUES.. | POSE]",
+        "`frametool convert --help` shows the options",
     ("convert '{rpi: [1,2,3]}'", 2):
         "argument:1:2: unknown key 'rpi', did you mean 'rpy'?; a pose has xyz and one rotation: quaternion, xyzw, "
         "wxyz, rpy, euler, axis_angle, rotvec, matrix, mrp, six_d",
@@ -261,7 +261,7 @@ WRONG = {
     ("convert missing.yaml", 5): "missing.yaml: no such file or directory",
     ("lookup . a b", 2):
         "lookup: TREE is . but FRAMETOOL_TREE is not set; name a file; "
-        "usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
+        "`frametool lookup --help` shows the options",
     ("lookup arm.yaml base tpi", 4):
         "unknown frame 'tpi' in arm.yaml; did you mean 'tip'? frames: base, tip, tool, world",
     ("lookup arm.yaml nope nope", 4): "unknown frame 'nope' in arm.yaml; frames: base, tip, tool, world",
@@ -287,12 +287,16 @@ WRONG = {
         "no command 'transform'; `frametool --help` lists all, `frametool help WORD` searches",
     ("arm.yaml base tip", 2): "no command 'arm.yaml'; a file follows a command: frametool tree arm.yaml",
     ("lookup arm.yaml base", 2):
-        "lookup: missing argument 'SOURCE'; usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
+        "lookup: missing argument 'SOURCE'; `frametool lookup --help` shows the options",
     ("lookup arm.yaml base tip --presicion 3", 2):
-        "lookup: no such option '--presicion'; did you mean '--precision'?; "
-        "usage: frametool lookup [OPTIONS] TREE TARGET SOURCE",
+        "lookup: no such option '--presicion'; did you mean '--precision'? "
+        "`frametool lookup --help` shows the options",
     ("convert --from ryp 0 0 0", 2): "convert: invalid value for '--from': unknown representation 'ryp'; "
         "did you mean 'rpy'? representations: ",
+    ("convert --from euler:zzx 0 0 0", 2): "convert: invalid value for '--from': unknown Euler axes 'zzx'; s (static axes) or r (rotating axes) and three "
+        "letters, such as rzyx; `frametool convert --help` shows the options",
+    (f"lookup '{{frames: {{a: {{{', '.join(f'{name}: {{xyz: [0, 0, 1]}}' for name in 'bcdefg')}}}}}}}' a x", 4):
+        "unknown frame 'x' in argument; frames: a, b, c, d, e and 2 more",
     ("convert --from euler 0 0 0", 2): "convert: invalid value for '--from': euler needs its axes: ",
     ("convert 1 2 3", 2): "convert: 3 numbers do not say what they are; add --from with one of ",
     ("convert --from rpy 0 0 0 -o there.yaml", 5): "there.yaml: exists; give --force to replace it",

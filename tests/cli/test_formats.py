@@ -100,7 +100,7 @@ def test_what_a_form_asks_for_is_an_answer_that_options_give(name: str) -> None:
 def test_a_misspelled_form_is_told_with_the_nearest(run: Run) -> None:
     found = run("formats", "jsno")
     assert (found.status, found.out) == (2, "")
-    assert "no form 'jsno' is known; did you mean 'json'?; `frametool formats` lists all" in found.err
+    assert "no format 'jsno' is known (`frametool formats` lists all); did you mean 'json'?" in found.err
 
 
 def test_the_suffix_of_the_output_chooses_the_form_of_the_list(run: Run, tmp_path: object) -> None:

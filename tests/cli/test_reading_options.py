@@ -115,7 +115,7 @@ def test_without_a_stream_the_form_is_that_of_the_tree(run: Run) -> None:
         (("convert", "--in", "urdf"), "--in urdf is not streamed; streams are "),
         (("convert", "--in", "csv", "--in", "tsv", "-i", "points.csv"), "--in csv and --in tsv: there is one stream"),
         (("apply", "--transform", "{xyz: [1, 0, 0]}", "-i", "points.csv", "--in", "urdf"), "--in urdf is not streamed"),
-        (("tree", "t.yaml", "--in", "yamll"), "no form 'yamll' is read; did you mean 'yaml'?"),
+        (("tree", "t.yaml", "--in", "yamll"), "no format 'yamll' is read (`frametool formats` lists all); did you mean 'yaml'?"),
         (("tree", "t.yaml", "--in", "xacro"), "is not supported: expand it: xacro FILE"),
         (("tree", "t.yaml", "--frames", "a,"), "--frames takes names with commas between them, found 'a,'"),
         (("tree", "t.yaml", "-j", "lift"), "--joint takes NAME=VALUE, found 'lift'"),

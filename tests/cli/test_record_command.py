@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 STILL = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
 TREE = "{name: camera, parent: base, xyz: [1, 2, 3]}"
-USAGE = "; usage: frametool record [OPTIONS] RECORDING"
+USAGE = "; `frametool record --help` shows the options"
 
 
 def messages(form: str) -> list[Sent]:

@@ -105,5 +105,11 @@ def test_notes_and_warnings_fit_the_terminal_and_are_one_line_in_a_pipe(folder: 
     assert any(len(line) > 80 for line in piped.stderr.splitlines()) == any(line.startswith("  ") for line in shown.split("\n"))
 
 
-def test_an_error_stays_one_line(folder: Path) -> None:
-    assert seen(folder, "tree", "table.csv").count("\n") == 1
+def test_an_error_wraps_at_the_width_of_the_terminal_and_is_one_line_in_a_pipe(folder: Path) -> None:
+    shown = seen(folder, "tree", "table.csv")
+    assert (shown.count("\n"), max(map(len, shown.splitlines())) <= 80) == (3, True)
+    piped = subprocess.run(
+        [sys.executable, "-m", "frametool", "tree", "table.csv"], cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert (piped.stderr.count("\n"), shown.split()) == (1, piped.stderr.split())

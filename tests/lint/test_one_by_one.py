@@ -52,4 +52,4 @@ def test_one_file_that_is_not_there_ends_it(run: Callable[..., Any]) -> None:
 
 def test_measurements_are_of_one_tree(run: Callable[..., Any]) -> None:
     done = run("check", "--each", "a.yaml", "--measured", "a.yaml", files={"a.yaml": TREE})
-    assert done == (2, "", "frametool: check: --measured and --each exclude each other; usage: frametool check [OPTIONS] FILES...\n")
+    assert done == (2, "", "frametool: check: --measured and --each exclude each other; `frametool check --help` shows the options\n")

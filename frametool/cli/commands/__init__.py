@@ -184,7 +184,7 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
 
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """Put a usage error on one line, with how the command is called; what it quotes of the arguments is cut."""
+    """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
     from frametool.cli.replaced import replacement
 
     ctx = getattr(error, "ctx", None)
@@ -199,5 +199,5 @@ def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
         message = message[0].lower() + message[1:]
     if ctx is None or ctx.parent is None:
         return message
-    pieces = " ".join(ctx.command.collect_usage_pieces(ctx))
-    return f"{ctx.info_name}: {message}; usage: {ctx.command_path} {pieces}"
+    help_on = f"{' ' if message[-1] == '?' else '; '}`{ctx.command_path} --help` shows the options"
+    return f"{ctx.info_name}: {message}{'' if '`frametool' in message else help_on}"

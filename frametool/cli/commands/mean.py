@@ -9,7 +9,7 @@ from frametool.cli.explaining import PoseTask, pose_stream_options
 from frametool.cli.options import ColumnNames, pose_result_options
 from frametool.cli.poses import is_inline, is_pasted, poses_from, without_inverse
 from frametool.errors import ValueInvalid, warn
-from frametool.stream.faults import MOST, ROWS_SKIPPED
+from frametool.stream.faults import MOST
 from frametool.text.numbers import parse_number
 
 
@@ -17,7 +17,7 @@ from frametool.text.numbers import parse_number
 @argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
 @option("--weights NAME | W,W,..", "column or key of each pose's weight, or the weights of the POSEs", ColumnNames())
 @option("--by NAME", "a mean for each value of this column or key", ColumnNames(), excludes=("weights",))
-@option("--robust", "leave out poses that do not agree with the rest, and tell them")
+@option("--robust", "reject outliers, and list them")
 @pose_stream_options
 @pose_result_options("poses")
 def command(inputs: Inputs) -> int:
@@ -35,8 +35,8 @@ def command(inputs: Inputs) -> int:
     _deg degrees) between the poses and the mean. covariance is that of one pose, over x y z and turns about X Y Z in
     the parent's axes as in ROS, by n - 1; std_x, std_y, std_z and std_angle are roots of its diagonal.
 
-    With --robust all of that is of the poses kept, `used` of `count`: what is more than 3 sigmas off, by medians, is
-    left out, told with its place, how far off it is, and u, that in sigmas; the status is then 3. Where none is, the
+    With --robust outliers, more than 3 sigmas off by medians, are rejected: all of that is of the poses kept, `used` of
+    `count`. A warning lists each with its place, how far off it is, and u, that in sigmas. Without outliers the
     numbers are those of the plain mean. Weights are in proportion to 1 / variance.
     """
     task = PoseTask(inputs)
@@ -79,7 +79,7 @@ def command(inputs: Inputs) -> int:
         warn(line)
     if len(left_out) > most:
         warn(f"{len(left_out) - most} more poses left out")
-    return ROWS_SKIPPED if left_out else status
+    return status
 
 
 def _numbers(weights: str) -> list[float]:

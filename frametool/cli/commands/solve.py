@@ -16,13 +16,12 @@ from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import tell
 from frametool.cli.trees import refuse_two_readers
 from frametool.errors import ValueInvalid, shown, warn
-from frametool.stream.faults import ROWS_SKIPPED
 
 if TYPE_CHECKING:
 
     from frametool.view.fit_text import Solution
 
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 3 rows left out, 5 file."
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 5 file."
 SHAPES = ("hand_eye", "points")
 FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
 
@@ -49,13 +48,13 @@ def _read_names(text: str) -> list[str]:
 @option("--scale", "of A to B too", requires=("points",))
 @option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names,
     requires=("hand_eye", "points"))  # fmt: skip
-@option("--no-robust", "use all rows, wrong ones too")
+@option("--no-robust", "use all rows, outliers too")
 @option("--report FILE.json|csv", "numbers of the fit and of each row", file_with(".json", ".csv"))
 @reading_options()
 @whole_pose_options
 @result_options("tree", "trajectory")
-def command(inputs: Inputs) -> int:
-    """Solve for the transforms that measurements mean, with sigmas; what does not agree is left out and named.
+def command(inputs: Inputs) -> None:
+    """Estimate transforms from measurements, with sigmas; outliers are rejected and listed.
 
     \b
       frametool solve measurements.yaml -o solved.yaml
@@ -95,7 +94,8 @@ def command(inputs: Inputs) -> int:
     if report:
         _write_report(found, report, force=force)
     _write(output, found, on_hand=not (hand_eye and inputs.eye_to_hand))
-    return ROWS_SKIPPED if found.left_out else 0
+    if count := len(found.left_out):
+        warn(f"{count} outlier{'s' * (count > 1)} rejected; --no-robust uses all rows")
 
 
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
