@@ -86,13 +86,16 @@ class Form(Text):
     def read(self, text: str) -> str:
         """Refuse an unknown one with the nearest name; of one that is not supported, say what to do."""
         if text not in self.choices:
-            from frametool.formats.unsupported import UNSUPPORTED
-
-            if row := UNSUPPORTED.get(text):
-                raise ValueInvalid(f"{text} ({row.summary}) is not supported: {row.remedy}")
-            near = did_you_mean(text, self.choices)
-            raise ValueInvalid(f"no format {shown(text)} is {self.are} (`frametool formats` lists all){near}")
+            raise ValueInvalid(self._refusal(text))
         return text
+
+    def _refusal(self, text: str) -> str:
+        from frametool.formats.unsupported import UNSUPPORTED
+
+        if row := UNSUPPORTED.get(text):
+            return f"{text} ({row.summary}) is not supported: {row.remedy}"
+        near = did_you_mean(text, self.choices)
+        return f"no format {shown(text)} is {self.are} (`frametool formats` lists all){near}"
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
         """Offer the formats."""
