@@ -27,7 +27,7 @@ from frametool.ros.plain_messages import unit_components
 from frametool.text.lines import Pieces
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -255,7 +255,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     number = 1
     layouts: dict[Any, MessageLayout | None] = {}
     try:
-        for stretch in _stretches(reader.messages(channels)):
+        for stretch in _stretches(reader.blocks(channels)):
             for (channel, _), run in groupby(stretch, lambda each: (each.channel, len(each.data))):
                 for text, count in _lines(reader.types, channel, [each.data for each in run], layouts):
                     held.append(text)
@@ -271,13 +271,13 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     yield b"".join(held)
 
 
-def _stretches(messages: Iterator[Message]) -> Iterator[list[Message]]:
+def _stretches(blocks: Iterator[Iterable[Message]]) -> Iterator[list[Message]]:
     """Yield messages many together; those before an error too."""
     held: list[Message] = []
     try:
-        for message in messages:
-            held.append(message)
-            if len(held) == MANY:
+        for block in blocks:
+            held += block
+            if len(held) >= MANY:
                 yield held
                 held = []
     except Exception:

@@ -9,9 +9,9 @@ import shutil
 from bisect import bisect_left
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from heapq import merge
 from io import BufferedReader, BytesIO, FileIO
-from operator import itemgetter
+from itertools import chain
+from operator import attrgetter, itemgetter
 from pathlib import Path, PurePath
 from struct import Struct
 from tempfile import TemporaryDirectory
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
 from frametool.errors import FileProblem, FormatError, FrametoolError, shown
+from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -37,7 +38,9 @@ RECORD_HEAD = 9  # bytes
 RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # what a record begins with, and a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
 LENGTH = Struct("<I")  # of ROS 1 bags (wiki.ros.org/Bags/Format/2.0), with what the headers of their records say
-OF_MESSAGE, OF_CONNECTION, CONNECTION = b"\4\0\0\0op=\2", b"\4\0\0\0op=\7", b"\x09\0\0\0conn="
+TIME = Struct("<II")
+OF_MESSAGE, OF_CONNECTION = b"\4\0\0\0op=\2", b"\4\0\0\0op=\7"
+CONNECTION, OF_TIME = b"\x09\0\0\0conn=", b"\x0d\0\0\0time="
 
 
 @dataclass(eq=False, slots=True)
@@ -123,19 +126,9 @@ class McapFile:
         counts = self.said.channel_message_counts
         return sum(counts.get(number, 0) for number, each in self.channels.items() if each in wanted)
 
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
-        """Yield the messages on some channels, or on all; chunks whose times overlap are merged."""
-        time, held = itemgetter(1), list[Message]()
-        try:
-            for found in self._found(wanted):
-                found.sort(key=time)
-                at = bisect_left(held, found[0].log_ns, key=time)
-                yield from held[:at]
-                held = sorted([*held[at:], *found], key=time) if at < len(held) else found
-        except Exception:
-            yield from held
-            raise
-        yield from held
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+        """Yield the messages on some channels, or on all."""
+        return _in_order(self._found(wanted))
 
     def others(self) -> Iterator[Any]:
         """Yield its attachments and metadata, as records of mcap."""
@@ -165,23 +158,45 @@ class McapFile:
                 yield Chunk.read(ReadDataStream(self.stream))
 
     def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
-        """Yield the messages of each chunk, and those outside of chunks, many together."""
+        """Yield the messages of each chunk, and those outside of chunks, many together; register what else is there."""
         from mcap import records
 
         found: list[Message] = []
         for each in self._records(wanted):
-            for one in _records_of(each) if isinstance(each, records.Chunk) else (each,):
-                if isinstance(one, records.Message):
-                    channel = self.channels[one.channel_id]
-                    if wanted is None or channel in wanted:
-                        found.append(Message(channel, one.log_time, one.data, one.publish_time, one.sequence))
-                elif isinstance(one, records.Schema | records.Channel):
-                    self._register(one)
+            if isinstance(each, records.Chunk):
+                self._take(_unpacked_chunk(each), wanted, found)
+            elif isinstance(each, records.Message):
+                channel = self.channels[each.channel_id]
+                if wanted is None or channel in wanted:
+                    found.append(Message(channel, each.log_time, each.data, each.publish_time, each.sequence))
+            elif isinstance(each, records.Schema | records.Channel):
+                self._register(each)
             if found and (isinstance(each, records.Chunk) or len(found) > BLOCK):
                 yield found
                 found = []
         if found:
             yield found
+
+    def _take(self, data: bytes, wanted: Collection[Channel] | None, found: list[Message]) -> None:
+        """Add the messages on some channels that are in a chunk; register what else is there."""
+        from mcap import records
+        from mcap.data_stream import ReadDataStream
+        from mcap.opcode import Opcode
+
+        end, message = 0, Opcode.MESSAGE.value
+        while end < len(data):
+            code, size = RECORD.unpack_from(data, end)
+            begin, end = end + RECORD_HEAD, end + RECORD_HEAD + size
+            if end > len(data):
+                raise ValueError("a record is longer than its chunk")
+            if code == message:
+                number, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, begin)
+                channel = self.channels[number]
+                if wanted is None or channel in wanted:
+                    found.append(Message(channel, log_ns, data[begin + MESSAGE.size : end], publish_ns, sequence))
+            elif code in (Opcode.SCHEMA, Opcode.CHANNEL):
+                kind = records.Schema if code == Opcode.SCHEMA else records.Channel
+                self._register(kind.read(ReadDataStream(BytesIO(data[begin:end]))))
 
     def _register(self, *records: Any) -> None:
         """Register schemas and channels that are not known yet."""
@@ -198,12 +213,9 @@ class McapFile:
                 self.channels[each.id] = made
 
 
-def _records_of(chunk: Any) -> list[Any]:
-    """Return what is in a chunk; raises ValueError for one that is too large, before it is unpacked."""
+def _unpacked_chunk(chunk: Any) -> bytes:
+    """Return the records of a chunk; raises ValueError for one that is too large, before it is unpacked."""
     import zstandard
-    from mcap import records
-    from mcap.data_stream import ReadDataStream
-    from mcap.opcode import Opcode
     from mcap.stream_reader import get_chunk_data_stream
 
     size = chunk.uncompressed_size
@@ -212,19 +224,22 @@ def _records_of(chunk: Any) -> list[Any]:
     if size > MOST:
         raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    data, end, found = stream.read(length), 0, list[Any]()
-    while end < length:
-        code, size = RECORD.unpack_from(data, end)
-        begin, end = end + RECORD_HEAD, end + RECORD_HEAD + size
-        if end > length:
-            raise ValueError("a record is longer than its chunk")
-        if code == Opcode.MESSAGE:
-            channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, begin)
-            found.append(records.Message(channel, log_ns, data[begin + MESSAGE.size : end], publish_ns, sequence))
-        elif code in (Opcode.SCHEMA, Opcode.CHANNEL):
-            kind = records.Schema if code == Opcode.SCHEMA else records.Channel
-            found.append(kind.read(ReadDataStream(BytesIO(data[begin:end]))))
-    return found
+    return bytes(stream.read(length))
+
+
+def _in_order(chunks: Iterable[list[Message]]) -> Iterator[list[Message]]:
+    """Yield the messages of chunks in the order of their times: chunks that overlap are merged; none is empty."""
+    time, held = itemgetter(1), list[Message]()
+    try:
+        for found in chunks:
+            found.sort(key=time)
+            at = bisect_left(held, found[0].log_ns, key=time)
+            yield held[:at]
+            held = sorted([*held[at:], *found], key=time) if at < len(held) else found
+    except Exception:
+        yield held
+        raise
+    yield held
 
 
 class DatabaseFile:
@@ -261,24 +276,29 @@ class DatabaseFile:
     def expected(self, _wanted: Collection[Channel] | None) -> None:
         """Return None: only the metadata of the folder say how many messages there are."""
 
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
         """Yield the messages on some channels, or on all."""
         numbers = ",".join(str(number) for number, each in self.channels.items() if wanted is None or each in wanted)
         some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY timestamp, id"  # noqa: S608 - numbers
-        for number, log_ns, data in self.database.execute(some):
-            yield Message(self.channels[number], log_ns, data, log_ns)
+        rows = self.database.execute(some)
+        while block := rows.fetchmany(BLOCK):
+            yield [Message(self.channels[number], log_ns, data, log_ns) for number, log_ns, data in block]
 
 
 class Bag1File:
-    """A ROS 1 bag; the index of its messages is in memory, as the library has it."""
+    """A ROS 1 bag; chunks are read whole, so that the index of their messages is not."""
 
     head = None
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Tally) -> None:
-        """Read its index."""
+        """Read what the end of the file says of its connections and chunks."""
         from rosbags.rosbag1.reader import Reader, decompressors
 
-        self.reader: Any = opened.enter_context(Reader(path))
+        class Unindexed(Reader):
+            def read_index_data(self, pos: int, indexes: Any) -> None:
+                """Leave it unread."""
+
+        self.reader: Any = opened.enter_context(Unindexed(path))
         self._connections = {each.id: each for each in self.reader.connections}
         self.channels = {number: self._channel(each) for number, each in self._connections.items()}
         used = {id(each.decompressor) for each in self.reader.chunks.values()}
@@ -298,31 +318,40 @@ class Bag1File:
         counts = (chunk.connection_counts for chunk in self.reader.chunk_infos)
         return sum(count for each in counts for number, count in each.items() if number not in others)
 
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[Message]:
-        """Yield the messages on some channels, or on all: as the library does, which makes an object of each header."""
-        some = [number for number, each in self.channels.items() if wanted is None or each in wanted]
-        before, chunk = -1, b""
-        for log_ns, place, begin in merge(*(self.reader.indexes[number] for number in some)):
-            if place != before:
-                before, about = place, self.reader.chunks[place]
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+        """Yield the messages on some channels, or on all."""
+        return _in_order(filter(None, self._found(wanted)))
+
+    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+        """Yield the messages of each chunk."""
+        numbers = {number for number, each in self.channels.items() if wanted is None or each in wanted}
+        for each in sorted(self.reader.chunk_infos, key=attrgetter("start_time")):
+            if not numbers.isdisjoint(each.connection_counts):
+                about = self.reader.chunks[each.pos]
                 self.reader.bio.seek(about.datapos)
-                chunk = about.decompressor(self.reader.bio.read(about.datasize))
-            header, data, end = _record1(chunk, begin)
-            while OF_CONNECTION in header:
-                header, data, end = _record1(chunk, end)
-            if OF_MESSAGE not in header:
-                raise ValueError("no message where the index has one")
-            (number,) = LENGTH.unpack_from(header, header.index(CONNECTION) + len(CONNECTION))
-            yield Message(self.channels[number], log_ns, data, log_ns)
+                found: list[Message] = []
+                try:
+                    self._take(about.decompressor(self.reader.bio.read(about.datasize)), numbers, found)
+                finally:
+                    yield found
 
-
-def _record1(chunk: bytes, begin: int) -> tuple[bytes, bytes, int]:
-    """Return header and data of a record of a ROS 1 bag, and where it ends."""
-    middle = begin + LENGTH.size + LENGTH.unpack_from(chunk, begin)[0]
-    end = middle + LENGTH.size + LENGTH.unpack_from(chunk, middle)[0]
-    if end > len(chunk):
-        raise ValueError("a record is longer than its chunk")
-    return chunk[begin + LENGTH.size : middle], chunk[middle + LENGTH.size : end], end
+    def _take(self, chunk: bytes, numbers: set[int], found: list[Message]) -> None:
+        """Add the messages of some connections in a chunk: the library makes an object of each header."""
+        end, size = 0, LENGTH.size
+        while end < len(chunk):
+            middle = end + size + LENGTH.unpack_from(chunk, end)[0]
+            header, begin = chunk[end:middle], middle + size
+            end = begin + LENGTH.unpack_from(chunk, middle)[0]
+            if end > len(chunk):
+                raise ValueError("a record is longer than its chunk")
+            if OF_MESSAGE in header:
+                (number,) = LENGTH.unpack_from(header, header.index(CONNECTION) + len(CONNECTION))
+                if number in numbers:
+                    second, part = TIME.unpack_from(header, header.index(OF_TIME) + len(OF_TIME))
+                    log_ns = second * BILLION + part
+                    found.append(Message(self.channels[number], log_ns, chunk[begin:end], log_ns))
+            elif OF_CONNECTION not in header:
+                raise ValueError("neither a message nor a connection")
 
 
 class RecordingReader:
@@ -366,11 +395,16 @@ class RecordingReader:
 
     def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Message]:
         """Yield the messages on some channels, or on all; raises FormatError where not all are there."""
+        return chain.from_iterable(self.blocks(wanted))
+
+    def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Iterable[Message]]:
+        """Yield them in lists of any length."""
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
             count = 0
-            for count, message in enumerate(file.messages(wanted), 1):  # noqa: B007 - the last counts
-                yield _unpacked(message) if self._is_packed else message
+            for block in file.messages(wanted):
+                yield map(_unpacked, block) if self._is_packed else block
+                count += len(block)
             self._check(count, file.expected(wanted), wanted)
             total += count
         self._check(total, self._expected(wanted), wanted)
@@ -444,7 +478,7 @@ def opened_recording(path: str, tally: Tally) -> Iterator[RecordingReader]:
         raise FormatError("nothing in it: an empty file is no bag", source=path)
     try:
         import mcap  # noqa: F401 - whether it is there
-        import rosbags.highlevel  # noqa: F401 - as well
+        import rosbags.typesys  # noqa: F401 - as well
     except ImportError:
         raise FileProblem(f"{path}: bags are read with an extra; install it: pip install 'frametool[bag]'") from None
 
