@@ -1,159 +1,339 @@
-"""Comparisons as pictures: paths coloured by error, errors over time, how often which, errors by length."""
+"""Comparisons as a report: one page with the numbers, paths and errors over time; or a drawing of one as SVG."""
 
 from __future__ import annotations
 
+import json
+from datetime import UTC, datetime
+from functools import partial
+from html import escape
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.fit.numbers import statistics
-from frametool.view.fit_text import write_comparison, write_table
-from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords, shade_of, write_svg
-from frametool.view.run_plot import ticks
+from frametool import __version__
+from frametool.documents.json import dump
+from frametool.errors import printable
+from frametool.view import fit_text
+from frametool.view.charts import Area, Chart, ChartLine
+from frametool.view.fit_text import CSV_TITLES, TITLES, short_cell
+from frametool.view.pictures import (
+    SERIES,
+    Picture,
+    PictureBox,
+    PictureDot,
+    PictureLine,
+    PictureWords,
+    shade_of,
+    svg_element,
+    write_html,
+    write_svg,
+)
+from frametool.view.scene import text_width
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from frametool.fit.comparison import Comparison
     from frametool.view.pictures import Shape
 
-    Points = Sequence[tuple[float, float]]
+WIDE, HIGH = 412.0, 112.0  # pixels of a chart
+LEFT, TOP, RIGHT, BOTTOM = 54.0, 40.0, 14.0, 42.0  # around it
+ROW = 38.0  # pixels of an estimate's box and its name
+STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each drawn by its extremes
+LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
+ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # seen on white paper and on dark
+SERIES_NAMES = list(SERIES)
+LEAST_LENGTHS = 3
+FAR = 1e3  # times its size is a path away from 0 where the numbers along its axes are shortened
 
-MAP, MARGIN, WIDE, HIGH, GAP = 460.0, 60.0, 420.0, 120.0, 50.0  # pixels
-LEFT = MAP + 2 * MARGIN + 40.0
-MOST = 2000  # points of a line
-LEVELS = 24  # of error along a path
-BINS = 30
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
+class Curve(NamedTuple):
+    """A comparison as it is drawn: with its name and colour, the pairs that were chosen and their times."""
 
-def comparison_picture(found: Comparison) -> Picture:
-    """Draw one comparison, as large at a thousand pairs as at a million."""
-    numbers = found.as_dict()
-    title = f"{found.names[1]} against {found.names[0]}"
-    shapes: list[Shape] = [PictureWords(MARGIN, 24.0, f"{title}: ate {numbers['ate']['m']['rmse']:.4g} m", bold=True)]
-    shapes += _paths(found)
-    top = MARGIN
-    shapes += _over_time(found, top)
-    shapes += _histogram(found, top + HIGH + GAP)
-    shapes += _by_length(numbers, top + 2 * (HIGH + GAP))
-    return Picture(LEFT + WIDE + MARGIN / 2, MAP + 2 * MARGIN, shapes, title)
+    found: Comparison
+    name: str
+    colour: str
+    chosen: Any
+    times: list[float]
+
+    def over_time(self, values: Any) -> list[tuple[float, float]]:
+        """Return the chosen ones of some values with their times."""
+        return [*zip(self.times, values[self.chosen].tolist(), strict=True)]
 
 
 def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
-    """Return a report in one file that asks nothing of anybody: `svg` of one comparison, or `html` of any."""
-    if form == "svg":
-        return write_svg(comparison_picture(found[0]))
-    from html import escape
-
-    from frametool.documents.json import dump
-
-    every = [each.as_dict() for each in found]
-    table = write_table(every) + "\n" if len(every) > 1 else ""
-    texts = table + "\n".join(map(write_comparison, every)) + f"\n$ {command}\n"
-    pictures = "".join(write_svg(comparison_picture(each)) for each in found)
-    held = "[" + ", ".join(map(dump, every)) + "]"
-    for letter in "<>&":  # nothing in it ends the element
-        held = held.replace(letter, f"\\u{ord(letter):04x}")
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
-        f"<title>{escape(', '.join(each.names[1] for each in found))}</title></head>\n"
-        f"<body>\n{pictures}<pre>{escape(texts)}</pre>\n"
-        f'<script type="application/json" id="numbers">{held}</script>\n</body>\n</html>\n'
+    """Return a report in one file that loads nothing: `svg` of one comparison, or `html` of any number."""
+    curves = [_curve(each, at, len(found)) for at, each in enumerate(found)]
+    numbers = [each.as_dict() for each in found]
+    unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
+    map_chart, seen = _map(curves)
+    charts = _over_time(curves, "pair" if unit == "pair" else "time (s)")
+    columns = (
+        {"path": _path(curves, map_chart, seen), "distribution": _distribution(curves)},
+        {"errors": _stacked(charts), **_by_length(curves, numbers)},
     )
+    what = curves[0].name if len(curves) == 1 else f"{len(curves)} estimates"
+    title = f"{what} against {printable(found[0].names[0])}"
+    if form == "svg":
+        return _side_by_side(f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m", columns)
+    figures = "".join(
+        f"<div>{''.join(f'<figure id={name}>{svg_element(each)}</figure>' for name, each in column.items())}</div>\n"
+        for column in columns
+    )
+    hints = dict.fromkeys(hint for each in numbers for hint in each["hints"])
+    body = (
+        f"<main>\n<header><h1>{escape(title)}</h1>\n"
+        f"<p>{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, frametool {__version__}</p>\n"
+        f"<pre><code>$ {escape(printable(command))}</code></pre>\n"
+        f"{''.join(f'<p class=hint>{escape(hint)}</p>' for hint in hints)}</header>\n"
+        f"{_tiles(numbers[0]) if len(found) == 1 else _table(numbers, curves)}"
+        f'<div id="figures">\n{figures}</div>\n{"".join(map(partial(_measured, one=len(found) == 1), numbers))}'
+        '</main>\n<output id="tip" hidden></output>\n'
+    )
+    samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0][0]) for each in curves]}
+    held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
+    return write_html(title, body, script="report.js", data=held)
 
 
-def _thinned(values: Any) -> Any:
-    """Return which of many values are drawn: of each stretch the least and the most, and both ends."""
-    count = len(values)
-    if count <= MOST:
-        return np.arange(count)
-    edges = np.linspace(0, count, MOST // 2 + 1).astype(int)
-    found = [
-        begin + at for begin, end in pairwise(edges) for at in (values[begin:end].argmin(), values[begin:end].argmax())
-    ]
-    return np.unique([0, count - 1, *found])
-
-
-def _paths(found: Comparison) -> Iterator[Shape]:
-    """Draw both paths along the axis they spread least, the estimate coloured by its error, and what colours mean."""
-    ref, est, error = found.pairs.ref.xyz, found.moved.xyz, found.ate.m
-    right, ahead = sorted(np.argsort(np.ptp(ref, 0), kind="stable")[1:].tolist())
-    both = np.concatenate([ref, est])
-    low, high = both.min(0), both.max(0)
-    span = max(high[right] - low[right], high[ahead] - low[ahead], 1e-9)
-
-    def place(xyz: Any) -> list[tuple[float, float]]:
-        x = MARGIN + MAP * (xyz[:, right] - (low[right] + high[right] - span) / 2) / span
-        y = MARGIN + MAP - MAP * (xyz[:, ahead] - (low[ahead] + high[ahead] - span) / 2) / span
-        return list(zip(x.tolist(), y.tolist(), strict=True))
-
-    yield PictureLine(place(ref[_thinned(ref[:, right])]), "zero", 2.0, title=found.names[0])
-    chosen = _thinned(error)
-    points, worst = place(est[chosen]), float(error.max())
-    levels = np.minimum((error[chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1).tolist()
-    begin = 0
-    for at in range(1, len(levels) + 1):
-        if at == len(levels) or levels[at] != levels[begin]:
-            colour = shade_of((levels[begin] + 0.5) / LEVELS)
-            what = f"{found.names[1]}: {error[chosen[begin]]:.3g} m"
-            yield PictureLine(points[begin : at + 1], colour, 2.0, title=what)
-            begin = at
-    yield PictureDot(*points[0], 4.0, "ink", f"{found.names[1]} begins")
-    for level in range(LEVELS):
-        colour = shade_of(level / (LEVELS - 1))
-        yield PictureBox(MARGIN + level * 6.0, MARGIN + MAP + 18.0, 6.5, 10.0, colour)
-    yield PictureWords(MARGIN + LEVELS * 6.0 + 8.0, MARGIN + MAP + 23.0, f"0 .. {worst:.3g} m", "soft")
-    seen = f"{'xyz'[right]} right, {'xyz'[ahead]} up; {span:.4g} m"
-    yield PictureWords(MARGIN + MAP, MARGIN + MAP + 23.0, seen, "soft", "end")
-
-
-def _over_time(found: Comparison, top: float) -> Iterator[Shape]:
-    stamps = found.pairs.ref.stamps_ns
+def _curve(found: Comparison, at: int, count: int) -> Curve:
+    ate, stamps = found.ate, found.pairs.ref.stamps_ns
     times = np.arange(found.pairs.ref.size) if stamps is None else (stamps - stamps[0]) / 1e9
-    chosen = _thinned(found.ate.m)
-    curve = list(zip(times[chosen].tolist(), found.ate.m[chosen].tolist(), strict=True))
-    rmse = statistics(found.ate.m).rmse
-    lines = [(curve, "x", 1.2), ([(curve[0][0], rmse), (curve[-1][0], rmse)], "soft", 1.0)]
-    yield from _panel(f"error (m) over {'poses' if stamps is None else 'time (s)'}", lines, top)
+    every = [ate.m, ate.rad, *((ate.along, ate.across, ate.up) if count == 1 else ())]
+    stretches = max(STRETCHES // count, FEWEST)
+    chosen = np.unique(np.concatenate([_extremes(each, stretches) for each in every if each is not None]))
+    colour = "trail" if count == 1 else SERIES_NAMES[at % len(SERIES)]
+    return Curve(found, printable(found.names[1]), colour, chosen, times[chosen].tolist())
 
 
-def _histogram(found: Comparison, top: float) -> Iterator[Shape]:
-    counts, edges = np.histogram(found.ate.m, BINS)
-    steps = [point for count, begin, end in zip(counts.tolist(), edges.tolist(), edges[1:].tolist(), strict=False)
-             for point in ((begin, count), (end, count))]  # fmt: skip
-    yield from _panel("how many poses have which error (m)", [(steps, "y", 1.5)], top)
+def _extremes(values: Any, stretches: int) -> Any:
+    """Return which of many values are drawn: of each stretch the least and the greatest, and both ends."""
+    count = len(values)
+    if count <= 2 * stretches:
+        return np.arange(count)
+    edges = pairwise(np.linspace(0, count, stretches + 1).astype(int))
+    found = ((begin + values[begin:end].argmin(), begin + values[begin:end].argmax()) for begin, end in edges)
+    return np.array([0, count - 1, *np.ravel([*found])])
 
 
-def _by_length(numbers: dict[str, Any], top: float) -> Iterator[Shape]:
-    """Draw KITTI's errors by length, or else those of the deltas in metres."""
-    if numbers["kitti"]:
-        points = [(row["length_m"], row["percent"]) for row in numbers["kitti"]["lengths"]]
+def _figure(high: float, shapes: Sequence[Shape]) -> Picture:
+    return Picture(LEFT + WIDE + RIGHT, TOP + high + BOTTOM, shapes)
+
+
+def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
+    """Return axes in equal scales for all paths, along the axis they spread least, and what flattens positions."""
+    every = np.concatenate([xyz for each in curves for xyz in (each.found.pairs.ref.xyz, each.found.moved.xyz)])
+    low, high = every.min(0), every.max(0)
+    axes = np.sort(np.argsort(high - low, kind="stable")[1:])
+    span = max(float((high - low).max()), 1e-9)
+    base = np.where(np.abs(low) > FAR * span, np.round(low), 0.0)[axes]
+    low, high = low[axes] - base, high[axes] - base
+    names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
+    tall = WIDE * min(max((high[1] - low[1]) / max(high[0] - low[0], 1e-9), 0.5), 1.0)
+    ends = [(begin - 0.03 * span, end + 0.03 * span) for begin, end in zip(low.tolist(), high.tolist(), strict=True)]
+    chart = Chart(Area(LEFT, TOP, WIDE, float(tall)), ends[0], ends[1], (names[0], names[1]), equal=True)
+    return chart, lambda xyz: (xyz[:, axes] - base).tolist()
+
+
+def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
+    """Draw all paths, a single one in the colours of its errors."""
+    first = curves[0]
+    lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
+    shapes: list[Shape] = []
+    if len(curves) == 1:
+        lines.append(ChartLine("estimate, by error", shade_of(0.5, ERROR_STOPS), []))
+        shapes = _coloured(first, [chart.place(*point) for point in seen(first.found.moved.xyz[first.chosen])], chart)
     else:
-        points = [(float(row["delta"][:-1]), row["percent"]) for row in numbers["rpe"] if row["percent"] is not None]
-    if points:
-        yield from _panel("error (%) by length (m)", [(sorted(points), "z", 1.5)], top, dots=True)
+        lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
+    start = PictureDot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
+    return _figure(chart.area.height, [*chart.drawn(_named(lines)), *shapes, start])
 
 
-def _panel(
-    title: str, lines: Sequence[tuple[Points, str, float]], top: float, *, dots: bool = False
-) -> Iterator[Shape]:
-    """Draw a diagram from 0: ticks, their numbers, lines."""
-    x_ticks = ticks(min(0.0, lines[0][0][0][0]), max(x for points, _, _ in lines for x, _ in points))
-    y_ticks = ticks(0.0, max(y for points, _, _ in lines for _, y in points))
+def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
+    """Draw a path in the colours of its errors, and what these mean."""
+    errors, low = curve.found.ate.m, chart.area.top + chart.area.height + 25.0
+    worst = float(errors.max())
+    levels = np.minimum((errors[curve.chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1)
+    shapes: list[Shape] = [
+        PictureWords(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, f"error 0 .. {worst:.3g} m", "soft", size=11.0)
+    ]
+    for level in range(LEVELS):
+        colour = shade_of(level / (LEVELS - 1), ERROR_STOPS)
+        points: list[tuple[float, float]] = []
+        for at in np.flatnonzero(levels[:-1] == level).tolist():
+            if points[-1:] != [placed[at]]:
+                points += [(np.nan, np.nan), placed[at]]
+            points.append(placed[at + 1])
+        shapes += [PictureLine(points[1:], colour, 2.0)] * bool(points)
+        shapes.append(PictureBox(LEFT + level * 7.0, low, 7.5, 9.0, colour))
+    return shapes
 
-    def place(x: float, y: float) -> tuple[float, float]:
-        return LEFT + WIDE * (x - x_ticks[0]) / (x_ticks[-1] - x_ticks[0]), top + HIGH * (1 - y / y_ticks[-1])
 
-    yield PictureWords(LEFT, top - 14.0, title)
-    for tick in y_ticks:
-        yield PictureLine([place(x_ticks[0], tick), place(x_ticks[-1], tick)], "faint")
-        yield PictureWords(LEFT - 6.0, place(0.0, tick)[1], f"{tick:g}", "soft", "end", 10.0)
-    for tick in x_ticks:
-        yield PictureWords(place(tick, 0.0)[0], top + HIGH + 12.0, f"{tick:g}", "soft", "middle", 10.0)
-    for points, colour, width in lines:
-        placed = [place(*point) for point in points]
-        yield PictureLine(placed, colour, width)
-        yield from (PictureDot(x, y, 3.0, colour) for x, y in placed if dots)
+def _named(lines: list[ChartLine]) -> list[ChartLine]:
+    """Leave the legend to the table of estimates where their names are too long for one line."""
+    if sum(text_width(line.name, 12.0) + 33.0 for line in lines) < WIDE - 60.0:
+        return lines
+    return [line._replace(name="" if at else line.name) for at, line in enumerate(lines)]
+
+
+def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[ChartLine]]]:
+    """Return charts of the errors in position, in rotation, and of a single estimate along and across its path."""
+    end, ate, one = max(each.times[-1] for each in curves), curves[0].found.ate, len(curves) == 1
+    kinds = {"error in position (m)": [(each.name * (not one), each.colour, each.found.ate.m, each) for each in curves]}
+    if turned := [(each, each.found.ate.rad) for each in curves if each.found.ate.rad is not None]:
+        kinds["error in rotation (deg)"] = [("", each.colour, np.degrees(rad), each) for each, rad in turned]
+    if one:
+        parts = zip(("along", "across", "up"), "xyz", (ate.along, ate.across, ate.up), strict=True)
+        kinds["error in the path's axes (m)"] = [(*part, curves[0]) for part in parts]
+    charts = []
+    for at, (name, drawn) in enumerate(kinds.items()):
+        lines = [ChartLine(label, colour, each.over_time(values), 1.2) for label, colour, values, each in drawn]
+        if one and at == 0:
+            rmse = float(np.sqrt((ate.m**2).mean()))
+            lines.append(ChartLine(f"rmse {rmse:.3g} m", "soft", [(0.0, rmse), (end, rmse)], 1.0, (4.0, 3.0)))
+        low, high = min(0.0, *(each[2].min() for each in drawn)), max(each[2].max() for each in drawn)
+        area = Area(LEFT, TOP + at * (HIGH + TOP + BOTTOM - 14.0), WIDE, HIGH)
+        ends = (float(low), float(high))
+        charts.append((Chart(area, (0.0, end), ends, (along * (at == len(kinds) - 1), name)), _named(lines)))
+    return charts
+
+
+def _stacked(charts: Sequence[tuple[Chart, list[ChartLine]]]) -> Picture:
+    last = charts[-1][0].area
+    return _figure(last.top + HIGH - TOP, [shape for chart, lines in charts for shape in chart.drawn(lines)])
+
+
+def _distribution(curves: Sequence[Curve]) -> Picture:
+    """Draw how many poses have which error; of several estimates a box each."""
+    errors = [each.found.ate.m for each in curves]
+    ends = (0.0, max(float(each.max()) for each in errors))
+    if len(curves) == 1:
+        counts, edges = np.histogram(errors[0], BINS)
+        steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
+        names = ("error in position (m)", "poses")
+        chart = Chart(Area(LEFT, TOP, WIDE, HIGH), ends, (0.0, float(counts.max())), names)
+        return _figure(HIGH, [*chart.drawn([ChartLine("", curves[0].colour, steps)])])
+    names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
+    chart = Chart(Area(LEFT, TOP, WIDE, ROW * len(curves)), ends, (0.0, 1.0), names)
+    shapes = [*chart.drawn(rows=[])]
+    for at, (each, values) in enumerate(zip(curves, errors, strict=True)):
+        y, colour = TOP + (at + 0.66) * ROW, each.colour
+        least, first, middle, third, most, worst = (
+            chart.place(value, 0.0)[0] for value in np.percentile(values, (5, 25, 50, 75, 95, 100)).tolist()
+        )
+        shapes += [
+            PictureLine([(least, y), (most, y)], colour, 1.5, title=each.name),
+            PictureBox(first, y - 7.0, third - first, 14.0, colour), PictureDot(middle, y, 4.0, "paper"),
+            PictureDot(worst, y, 3.0, colour), PictureWords(LEFT + 4.0, y - 17.0, each.name[:60], size=11.0),
+        ]  # fmt: skip
+    return _figure(chart.area.height, shapes)
+
+
+def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> dict[str, Picture]:
+    """Draw KITTI's errors by length, or else those of the deltas in metres, where there are enough lengths."""
+    lines = []
+    for curve, each in zip(curves, numbers, strict=True):
+        points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
+        deltas = [(float(row["delta"][:-1]), row["percent"]) for row in each["rpe"] if row["percent"] is not None]
+        lines.append(ChartLine("", curve.colour, sorted(points or deltas), dots=True))
+    lines = [line for line in lines if len(line.points) >= LEAST_LENGTHS]
+    if not lines:
+        return {}
+    far, most = (max(point[axis] for line in lines for point in line.points) for axis in (0, 1))
+    chart = Chart(Area(LEFT, TOP, WIDE, HIGH), (0.0, far), (0.0, most), ("length (m)", "relative error (%)"))
+    return {"lengths": _figure(HIGH, [*chart.drawn(lines)])}
+
+
+def _samples(curve: Curve, map_chart: Chart, seen: Any, time_chart: Chart) -> dict[str, Any]:
+    """Return where the drawn pairs are in both pictures, and what is said of them when they are pointed at."""
+    ate, chosen = curve.found.ate, curve.chosen
+    places = [map_chart.place(*point) for point in seen(curve.found.moved.xyz[chosen])]
+    over = [time_chart.place(*point) for point in curve.over_time(ate.m)]
+    numbers = {"m": ate.m[chosen], **({} if ate.rad is None else {"deg": np.degrees(ate.rad[chosen])})}
+    return {
+        "name": curve.name, "t": [round(each, 3) for each in curve.times],
+        "path": [[round(at, 1) for at in each] for each in places],
+        "errors": [[round(at, 1) for at in each] for each in over],
+        **{key: [float(f"{each:.4g}") for each in values.tolist()] for key, values in numbers.items()},
+    }  # fmt: skip
+
+
+def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
+    """Return pictures in columns as one SVG document."""
+    drawn, bottom = "", 0.0
+    for number, column in enumerate(columns):
+        top = 24.0
+        for each in column.values():
+            drawn += svg_element(each, place=f' x="{number * each.width:g}" y="{top:g}"')
+            top += each.height
+        bottom = max(bottom, top)
+    heading = PictureWords(LEFT, 20.0, title, bold=True)
+    return write_svg(Picture(len(columns) * columns[0]["path"].width, bottom, [heading], title), drawn)
+
+
+def _tiles(found: dict[str, Any]) -> str:
+    """Return the three numbers that one looks for first."""
+    ate, poses = found["ate"]["m"], found["poses"]
+    said = f"rmse; at most {ate['max']:.4g} m, aligned by {found['settings']['align']}"
+    tiles = [("ATE", f"{ate['rmse']:.4g}", "m", said)]
+    if steps := [row for row in found["rpe"] if row["percent"] is not None]:
+        *others, last = (f"{row['percent']:.3g} % over {row['delta']}" for row in steps)
+        value, _, said = last.partition(" % ")
+        tiles.append(("RPE", value, "%", "; ".join([said, *others])))
+    share = f"of {poses['possible']}, {100 * poses['paired'] / max(poses['possible'], 1):.3g} %"
+    tiles.append(("Poses paired", str(poses["paired"]), "", share))
+    cells = (f"<div><h2>{name}</h2><p><strong>{value}</strong> {unit}</p><p>{said}</p></div>"
+             for name, value, unit, said in tiles)  # fmt: skip
+    return f'<div id="tiles">{"".join(cells)}</div>\n'
+
+
+TABLE_UNITS = {"m": "m", "deg": "deg", "percent": "%"}
+TABLE_MEANINGS = (
+    "", "rmse of the error in position", "greatest error in position", "rmse of the error in rotation",
+    "rmse along the path", "rmse across the path", "rmse at right angles to the path, up",
+    "relative error over the longest distance", "mean error over stretches of path", "of the alignment",
+    "poses of the estimate with a partner in the reference",
+)  # fmt: skip
+
+
+def _table(numbers: Sequence[dict[str, Any]], curves: Sequence[Curve]) -> str:
+    """Return a row for each estimate, the best of each column marked, which sorts by the title that is clicked."""
+    rows = [fit_text.table_row(each) for each in numbers]
+    best = fit_text.best_of(rows)
+    shown = [at for at in range(len(TITLES)) if any(row[at] is not None for row in rows)]
+    head, body = "", ""
+    for at in shown:
+        unit = TABLE_UNITS.get(CSV_TITLES[at].rpartition("_")[2], "")
+        head += f'<th><button title="{TABLE_MEANINGS[at]}">{TITLES[at]} <small>{unit}</small></button></th>'
+    for row, curve in zip(rows, curves, strict=True):
+        swatch = f'<svg class="swatch" viewBox="0 0 1 1"><rect class="{curve.colour}" width="1" height="1"/></svg>'
+        body += f"<tr><th>{swatch}{escape(curve.name)}</th>"
+        for at in shown[1:]:
+            value = "" if row[at] is None else row[at]
+            body += f'<td data-value="{value}"{" class=best" * (value == best[at])}>{short_cell(row[at])}</td>'
+        body += "</tr>\n"
+    return f'<table id="estimates"><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>\n'
+
+
+def _measured(found: dict[str, Any], *, one: bool) -> str:
+    """Return all measures of a comparison with what they mean, and its settings, folded."""
+    rows = ["".join(f"<th>{title}</th>" for title in ("", "", *fit_text.COLUMNS, "%"))]
+    row = '<th tabindex="0" data-tip="{}">{}</th><td>{}</td>{}'.format
+    for label, meaning, summed, percent in fit_text.measures(found):
+        cells = "".join(f"<td>{fit_text.exact(summed and summed[key])}</td>" for key in fit_text.COLUMNS)
+        name, unit = label.strip().rsplit(" ", 1)
+        cells += "<td></td>" if percent is None else f"<td>{percent:.2f}</td>"
+        rows.append(row(escape(meaning), name, unit, cells))
+    fits = ", ".join(f"{kind} {short_cell(value)}" for kind, value in found["ate_by_alignment"].items())
+    for name, unit, meaning, text in (
+        ("kitti", "", "Mean error of stretches of path, as the KITTI benchmark has it", fit_text.kitti_sentence(found)),
+        ("ate by fit", "m", "The absolute error under each alignment", fits),
+    ):
+        rows.append(row(meaning, name, unit, f'<td colspan="6">{text}</td>'))
+    table = f'<table class="measures">{"".join(f"<tr>{each}</tr>" for each in rows)}</table>\n'
+    settings = found["settings"] | {key: found[key] for key in ("offset_s", "transform", "duration_s", "path_m")}
+    entries = "".join(f"<dt>{key}</dt><dd>{escape(each if isinstance(each, str) else dump(each))}</dd>"
+                      for key, each in settings.items() if each is not None)  # fmt: skip
+    folded = f"<details><summary>Settings</summary><dl>{entries}</dl></details>\n"
+    summary = f"<details><summary>{escape(printable(found['est']))}</summary>\n{table}{folded}</details>\n"
+    return table + folded if one else summary

@@ -276,36 +276,51 @@ def write_comparison(found: dict[str, Any]) -> str:
     folded = partial(fill, width=WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     lines = [*map(folded, lines)]
     lines.append(indent + "".join(f"{title:>{CELL}}" for title in COLUMNS))
-    ate = found["ate"]
-    for label, key in (("ate m", "m"), ("ate deg", "deg"), ("ate rot", "rot"), ("ate full", "full"),
-                       ("  along m", "along_m"), ("  across m", "across_m"), ("  up m", "up_m")):  # fmt: skip
-        if key in ate:
-            lines.append(_row(label, ate[key]))
+    for label, _, summed, percent in measures(found):
+        share_of_delta = "" if percent is None else f"{percent:>8.2f} %"
+        lines.append(_row(label, summed) + share_of_delta)
+    return "\n".join([*lines, f"{'kitti':<{NAME}}{kitti_sentence(found)}", ""])
+
+
+MEANINGS = {
+    "ate m": ("m", "Absolute error: the distance between each pose of the estimate, as aligned, and its reference"),
+    "ate deg": ("deg", "Absolute error in rotation: the angle between the two orientations of a pair"),
+    "ate rot": ("rot", "Norm of the difference between the two rotation matrices of a pair, as evo has it"),
+    "ate full": ("full", "Norm of the difference between the two 4 x 4 matrices of a pair, as evo has it"),
+    "  along m": ("along_m", "The part of the absolute error along the path, positive ahead"),
+    "  across m": ("across_m", "The part of the absolute error across the path, positive to the left"),
+    "  up m": ("up_m", "The part of the absolute error at right angles to the path, positive up"),
+}
+
+
+def measures(found: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, float] | None, float | None]]:
+    """Yield each measure of a comparison: its label with the unit last, what it means, its statistics, its percent."""
+    for label, (key, meaning) in MEANINGS.items():
+        if key in found["ate"]:
+            yield label, meaning, found["ate"][key], None
     for row in found["rpe"]:
-        share_of_delta = "" if row["percent"] is None else f"{row['percent']:>8.2f} %"
-        lines.append(_row(f"rpe {row['delta']} m", row["m"]) + share_of_delta)
+        way = f"the motion over {row['delta']}: estimate against reference, {row['pairs']} pairs of poses"
+        yield f"rpe {row['delta']} m", f"Relative error of {way}; % of {row['delta']}", row["m"], row["percent"]
         if row["deg"] is not None:
-            lines.append(_row(f"rpe {row['delta']} deg", row["deg"]))
+            yield f"rpe {row['delta']} deg", f"Relative error in rotation of {way}", row["deg"], None
         else:
-            lines.append(_row("  distance m", row["distance_m"]))
-    return "\n".join([*lines, _kitti(found), ""])
+            yield "  distance m", f"Difference of the distance covered by {way}", row["distance_m"], None
 
 
 def _row(label: str, summed: dict[str, float] | None) -> str:
-    return f"{label:<{LABEL}}" + "".join(f"{_exact(summed and summed[key]):>{CELL}}" for key in COLUMNS)
+    return f"{label:<{LABEL}}" + "".join(f"{exact(summed and summed[key]):>{CELL}}" for key in COLUMNS)
 
 
-def _kitti(found: dict[str, Any]) -> str:
-    kitti = found["kitti"]
-    if kitti:
-        said = f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
-    else:
-        asked = min(found["settings"]["segments_m"])
-        said = f"-  ({found['path_m']['ref']:.1f} m of path, {asked:g} m asked)"
-    return f"{'kitti':<{NAME}}{said}"
+def kitti_sentence(found: dict[str, Any]) -> str:
+    """Return the numbers of the KITTI benchmark, or why there are none."""
+    if kitti := found["kitti"]:
+        return f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
+    asked = min(found["settings"]["segments_m"])
+    return f"-  ({found['path_m']['ref']:.1f} m of path, {asked:g} m asked)"
 
 
-def _exact(value: Any) -> str:
+def exact(value: Any) -> str:
+    """Write a number within the width of a column; `-` where there is none."""
     if value is None:
         return "-"
     whole = len(str(int(abs(value)))) + (value < 0)
@@ -364,14 +379,14 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     if form == "csv":
         lines = [CSV_TITLES, *(["" if cell is None else str(cell) for cell in row] for row in rows)]
         return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
-    best = [_best(column) for column in zip(*rows, strict=True)]
+    best = best_of(rows)
     marked = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[form]
     shown = []
     for row in rows:
-        texts = [*map(_cell, row)]
+        texts = [*map(short_cell, row)]
         if form == "latex":
             texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
-        is_best = (at in RANKED and cell is not None and cell == best[at] for at, cell in enumerate(row))
+        is_best = (cell is not None and cell == best[at] for at, cell in enumerate(row))
         shown.append([marked.format(text) if best else text for text, best in zip(texts, is_best, strict=True)])
     if form == "markdown":
         lines = [TITLES, ["---", *["---:"] * (len(TITLES) - 1)], *shown]
@@ -386,13 +401,14 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     return "".join(f"{gap.join(line)}\n" for line in aligned)
 
 
-def _best(column: Sequence[Any]) -> float | None:
-    """Return the least of several numbers; one alone is no best."""
-    there = [cell for cell in column if isinstance(cell, float)]
-    return min(there) if len(column) > 1 and there else None
+def best_of(rows: Sequence[Sequence[Any]]) -> list[float | None]:
+    """Return the least number of each column that is ranked; one alone is no best."""
+    columns = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
+    return [min(there) if at in RANKED and there and len(rows) > 1 else None for at, there in enumerate(columns)]
 
 
-def _cell(cell: Any) -> str:
+def short_cell(cell: Any) -> str:
+    """Write a cell of a table of comparisons."""
     return cell if isinstance(cell, str) else str(cell) if isinstance(cell, int) else _short(cell)
 
 

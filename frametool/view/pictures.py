@@ -7,7 +7,10 @@ library, matplotlib.  Also draws frames so: ground, links, trails, axes, names a
 from __future__ import annotations
 
 import io
+import os
 import warnings
+from base64 import b64encode
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
@@ -15,7 +18,7 @@ from frametool.errors import FileProblem, printable
 from frametool.view.scene import SLANTED, Projection, Size, axis_tips, nice, place_labels
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.view.scene import FrameScene, Label
@@ -32,22 +35,35 @@ PALETTE = {
     "y": ("#12873d", "#51cf66"),
     "z": ("#1a5fd0", "#5c9dff"),
 }
+# the same of the lines of several things of one kind, on pages
+SERIES = {
+    "blue": ("#2563eb", "#7aa7ff"),
+    "orange": ("#c2410c", "#fb923c"),
+    "teal": ("#0f766e", "#2dd4bf"),
+    "pink": ("#be185d", "#f472b6"),
+    "olive": ("#4d7c0f", "#a3e635"),
+    "violet": ("#7c3aed", "#c4a7ff"),
+}
+NAMED = PALETTE | SERIES
 
 # viridis at five places, dark for little
 STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green that white paper still shows
 
 
-def shade_of(part: float) -> str:
+def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
     """Return the colour of a part of the way from little, 0, to much, 1."""
-    place = part * (len(STOPS) - 1)
-    at = min(int(place), len(STOPS) - 2)
-    mixed = (round(a + (b - a) * (place - at)) for a, b in zip(STOPS[at], STOPS[at + 1], strict=True))
+    place = part * (len(stops) - 1)
+    at = min(int(place), len(stops) - 2)
+    mixed = (round(a + (b - a) * (place - at)) for a, b in zip(stops[at], stops[at + 1], strict=True))
     return f"#{''.join(f'{part:02x}' for part in mixed)}"
 
 
 class PictureLine(NamedTuple):
-    """A line through points; dashes: pixels drawn and left out; title: what it says when pointed at."""
+    """A line through points, broken at those that are no numbers.
+
+    dashes: pixels drawn and left out; title: what it says when pointed at.
+    """
 
     points: Sequence[tuple[float, float]]
     colour: str
@@ -108,38 +124,88 @@ text {paint-order: stroke; stroke-width: 3px; stroke-linejoin: round}
 """
 
 
-def write_svg(picture: Picture) -> str:
-    """Return the picture as an SVG document."""
-    width, height = f"{picture.width:g}", f"{picture.height:g}"
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+def write_svg(picture: Picture, more: str = "") -> str:
+    """Return the picture as an SVG document; more: elements behind it."""
     rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
     light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
     style = f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
-    paper = '<rect class="paper" width="100%" height="100%"/>\n'
-    return f"{head} {FONT}>\n{_title(picture.title)}{style}{paper}{''.join(map(_element, picture.shapes))}</svg>\n"
+    return svg_element(picture, f'{style}<rect class="paper" width="100%" height="100%"/>\n{more}')
 
 
-def write_html(picture: Picture, more: str = "") -> str:
-    """Return an HTML document of the picture, and of what else it is to hold."""
-    head = f'<head><meta charset="utf-8">{_title(picture.title)}</head>'
-    return f'<!DOCTYPE html>\n<html lang="en">\n{head}\n<body>\n{write_svg(picture)}{more}</body>\n</html>\n'
+def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
+    """Return the picture as an element of a page or of a picture, which has its style.
+
+    before: what stands behind it.  place: attributes that say where it is.
+    """
+    size = f'width="{picture.width:g}" height="{picture.height:g}" viewBox="0 0 {picture.width:g} {picture.height:g}"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg"{place} {size} {FONT}>\n{_title(picture.title)}'
+    return f"{head}{before}{''.join(map(_element, picture.shapes))}</svg>\n"
+
+
+def write_html(
+    title: str, body: str, *, style: str = "report.css", script: str = "", data: Mapping[str, str] | None = None
+) -> str:
+    """Return a page in one file, which lets its own script and style run, and loads nothing.
+
+    style, script: of the files in the folder `page`.  data: JSON by the id of the element that holds it.
+    """
+    texts = {"style": _page_file(style), "script": "".join(map(_page_file, script.split()))}
+    if style == "report.css":
+        light, dark = ("".join(f"--{name}: {NAMED[name][scheme]}; " for name in NAMED) for scheme in (0, 1))
+        rules = "".join(f".{name} {{fill: var(--{name})}} .{name}-line {{stroke: var(--{name})}}\n" for name in NAMED)
+        dark = f"@media screen and (prefers-color-scheme: dark) {{:root {{{dark}}}}}"
+        texts["style"] = f":root {{{light}}}\n{dark}\n{SHARED}{rules}{texts['style']}"
+    digests = (f"{kind}-src '{_digest(text)}'; " if text else "" for kind, text in texts.items())
+    policy = f"default-src 'none'; img-src data:; {''.join(digests)}base-uri 'none'; form-action 'none'"
+    held = {name: text.translate(HARMLESS) for name, text in (data or {}).items()}
+    return f"""\
+<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<title>{_text(title)}</title>
+<style>{texts["style"]}</style>
+</head>
+<body>
+{body}{"".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held.items())}
+{f'<script type="module">{texts["script"]}</script>' if script else ""}
+</body>
+</html>
+"""
+
+
+HARMLESS = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&"}  # JSON that no name in it can end
+
+
+def _page_file(name: str) -> str:
+    with open(os.path.join(os.path.dirname(__file__), "page", name), encoding="utf-8") as stream:
+        return stream.read()
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
 def write_picture(picture: Picture, suffix: str, more: str = "") -> str | bytes:
     """Return a picture in the form of a suffix: .png, .svg or .html; `more` stands below it in HTML."""
     if suffix == ".png":
         return write_png(picture)
-    return write_svg(picture) if suffix == ".svg" else write_html(picture, more)
+    if suffix == ".svg":
+        return write_svg(picture)
+    return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n{more}</main>\n")
 
 
 def _element(shape: Shape) -> str:
     match shape:
         case PictureLine(points, colour, width, alpha, dashes, title):
-            way = "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
+            way = "L".join(f"{_number(x)} {_number(y)}" if x == x else "" for x, y in points)  # noqa: PLR0124 - no number
+            way = way.replace("LL", "M")
             look = "" if width == 1.0 else f' stroke-width="{width:g}"'
             look += "" if alpha == 1.0 else f' opacity="{alpha:g}"'
             look += f' stroke-dasharray="{" ".join(map("{:g}".format, dashes))}"' if dashes else ""
-            stroke = f'class="{colour}-line"' if colour in PALETTE else f'stroke="{colour}"'
+            stroke = f'class="{colour}-line"' if colour in NAMED else f'stroke="{colour}"'
             end = f">{_title(title)}</path>" if title else "/>"
             return f'<path {stroke}{look} d="M{way}"{end}\n'
         case PictureDot(x, y, radius, colour, title):
@@ -152,12 +218,12 @@ def _element(shape: Shape) -> str:
             look = "" if anchor == "start" else f' text-anchor="{anchor}"'
             look += "" if size_px == 12.0 else f' font-size="{size_px:g}"'
             look += ' font-weight="bold"' if bold else ""
-            halo = " paper-line" if colour in PALETTE else ""
+            halo = " paper-line" if colour in NAMED else ""
             return f'<text {_fill(colour, halo)} x="{_number(x)}" y="{_number(y)}"{look}>{_text(text)}</text>\n'
 
 
 def _fill(colour: str, more: str = "") -> str:
-    return f'class="{colour}{more}"' if colour in PALETTE else f'fill="{colour}"'
+    return f'class="{colour}{more}"' if colour in NAMED else f'fill="{colour}"'
 
 
 def _title(text: str) -> str:
@@ -214,7 +280,7 @@ def write_png(picture: Picture) -> bytes:
 
 def _paint(axes: Any, shape: Shape, order: int) -> None:
     """Paint one shape over those before it."""
-    look = {"color": PALETTE.get(shape.colour, (shape.colour,))[0], "zorder": order}
+    look = {"color": NAMED.get(shape.colour, (shape.colour,))[0], "zorder": order}
     match shape:
         case PictureLine(points, _, width, alpha, dashes):
             xs, ys = zip(*points, strict=True)

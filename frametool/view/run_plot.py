@@ -13,6 +13,7 @@ from xml.sax.saxutils import escape
 from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
+from frametool.view.charts import Area, Chart, ChartLine
 from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords
 
 if TYPE_CHECKING:
@@ -126,7 +127,6 @@ PANEL_GAP = 50.0
 HEIGHT = WINDOW + 2.0 * MARGIN
 BACKGROUND = "#4556ff"  # turtlesim's 69, 86, 255
 WHITE = "#ffffff"
-LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
 # the turtles' colours as they show on white
 DARKENED = dict(
     zip(COLOURS, ("#c79a00", "#d4691b", "#1593ad", "#2a9d8f", "#d6458b", "#5a9a16", "#7d5fc7", "#666666"), strict=True)
@@ -140,10 +140,14 @@ def run_picture(drawing: Drawing) -> Picture:
     followed = {name: curve for name, curve in drawing.curves.items() if curve.times}
     shapes = list(_window(drawing))
     colours = drawing.colours()
+    end = max((each.times[-1] for each in followed.values()), default=0.0)
+    height = (WINDOW - 2.0 * PANEL_GAP) / 3.0
     for index, title in enumerate(PANELS if followed else ()):
-        curves = [(name, DARKENED[colours[name]], each.times, each[index + 1]) for name, each in followed.items()]
-        height = (WINDOW - 2.0 * PANEL_GAP) / 3.0
-        shapes += _panel(title, curves, MARGIN + index * (height + PANEL_GAP), height)
+        curves = [ChartLine(name, DARKENED[colours[name]], [*zip(each.times, each[index + 1], strict=True)])
+                  for name, each in followed.items()]  # fmt: skip
+        known = [0.0, *(value for curve in curves for _, value in curve.points)]
+        area = Area(LEFT, MARGIN + index * (height + PANEL_GAP), PANEL_WIDTH, height)
+        shapes += Chart(area, (0.0, end), (min(known), max(known)), ("time (s)", title)).drawn(curves)
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
 
 
@@ -185,36 +189,3 @@ def _turtle(name: str, state: TurtleState, colour: str) -> Iterator[Shape]:
         yield PictureDot(across, down, radius + 1.0, "#333333")
         yield PictureDot(across, down, radius, colour)
     yield PictureWords(x, y - 24.0, name, WHITE, "middle")
-
-
-def _panel(title: str, curves: Sequence[Curve], top: float, height: float) -> Iterator[Shape]:
-    """Draw a diagram: ticks, lines, and their names; curves have a name, a colour, seconds and values."""
-    known = [0.0, *(value for _, _, _, values in curves for value in values)]
-    x_ticks = ticks(0.0, max(max(times) for _, _, times, _ in curves))
-    y_ticks = ticks(max(min(known), -FURTHEST), min(max(known), FURTHEST))
-    last, low, high = x_ticks[-1], y_ticks[0], y_ticks[-1]
-
-    def place(t: float, value: float) -> tuple[float, float]:
-        inside = min(max(value, low), high)
-        return LEFT + PANEL_WIDTH * t / last, top + height * (high - inside) / (high - low)
-
-    yield PictureWords(LEFT, top - 12.0, title)
-    for tick in y_ticks:
-        yield PictureLine([place(0.0, tick), place(last, tick)], "faint")
-        yield PictureWords(LEFT - 6.0, place(0.0, tick)[1], f"{tick:g}", anchor="end")
-    for tick in x_ticks:
-        seconds = f"{tick:g}{' s' * (tick == last)}"
-        yield PictureWords(place(tick, low)[0], top + height + 12.0, seconds, anchor="middle")
-    for index, (name, colour, times, values) in enumerate(curves):
-        points = [place(t, value) for t, value in zip(times, values, strict=True)]
-        yield PictureLine(points, colour, 1.5, title=name)
-        yield PictureWords(LEFT + PANEL_WIDTH - 80.0 * index, top - 12.0, name, colour, "end")
-
-
-def ticks(low: float, high: float) -> list[float]:
-    """Return round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
-    span = high - low if high - low > LEAST_SPAN else 1.0
-    step = 10.0 ** math.floor(math.log10(span / 4.0))
-    step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [count * step for count in range(first, max(last, first + 1) + 1)]

@@ -518,8 +518,7 @@ def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: 
 
 def _spots(flat: Projection, words: str, point: Flat) -> Iterator[Label]:
     """Yield where a name might stand inside the picture, the best first."""
-    # a little too much rather than too little
-    wide = FONT * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
+    wide = text_width(words, FONT)
     for away in DISTANCES:
         for dx, dy in SIDES:
             left = point.x + dx * away - (wide if dx < 0.0 else wide / 2.0 if dx == 0.0 else 0.0)
@@ -527,6 +526,11 @@ def _spots(flat: Projection, words: str, point: Flat) -> Iterator[Label]:
             box = left - 2.0, middle - 0.62 * FONT, left + wide + 2.0, middle + 0.62 * FONT
             if box[0] > 2.0 and box[2] < flat.size.width - 2.0 and box[1] > 2.0 and box[3] < flat.size.height - 2.0:
                 yield Label(words, point, box, away)
+
+
+def text_width(words: str, size: float) -> float:
+    """Return about how many pixels a text is wide, a little too many rather than too few."""
+    return size * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
 
 
 def words_of(names: list[str], most: int = 2) -> str:

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 import frametool
+from frametool.view.comparison_page import write_report
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -199,8 +200,75 @@ def test_a_report_is_one_file_that_asks_nothing(run: Run, tmp_path: Path, suffix
         held = re.search(r'<script type="application/json" id="numbers">(.*?)</script>', text, re.DOTALL)
         assert held is not None
         assert json.loads(held[1])[0]["poses"]["paired"] == 160
+        assert text.count("<script") == 3
     again = run("compare", "drone-ref.tum", name, "-o", f"report.{suffix}", files=files)
     assert again.status == 5
+
+
+def report(run: Run, folder: Path, *arguments: str) -> str:
+    """Return the page of a comparison."""
+    assert run("compare", *arguments, "--report", "report.html", "--force", files=FILES).status == 0
+    return (folder / "report.html").read_text()
+
+
+def held_in(text: str, name: str) -> Any:
+    """Read what a page holds as JSON."""
+    return json.loads(re.search(f'<script type="application/json" id="{name}">(.*?)</script>', text, re.DOTALL)[1])  # type: ignore[index]
+
+
+def test_a_report_says_what_was_compared_and_holds_the_numbers_of_json(run: Run, tmp_path: Path) -> None:
+    text = report(run, tmp_path, *DRONE)
+    assert "<h1>drone-est.tum against drone-ref.tum</h1>" in text
+    assert re.search(r"<p>\d{4}-\d\d-\d\d \d\d:\d\d UTC, frametool [\d.]+</p>", text)
+    assert re.search(r"<code>\$ frametool .*</code>", text)
+    assert held_in(text, "numbers") == [found(run, *DRONE)]
+    assert re.findall("<h2>(.*?)</h2><p><strong>(.*?)</strong> (.*?)</p>", text) == [("ATE", "0.043", "m"), ("RPE", "0.786", "%"), ("Poses paired", "160", "")]
+
+
+def test_each_measure_of_the_text_is_a_row_of_the_report_with_its_meaning(run: Run, tmp_path: Path) -> None:
+    lines = run("compare", *DRONE, files=FILES).out.splitlines()
+    wanted = [line.split() for line in lines if re.match(r"ate (m|deg)|rpe|  (along|across|up)", line)]
+    rows = re.findall(r'data-tip="([^"]{20,})">([^<]*)</th><td>([^<]*)</td>((?:<td>[^<]*</td>){6})', report(run, tmp_path, *DRONE))
+    cells = [[*name.split(), unit, *re.findall("<td>([^<]+)</td>", numbers)] for _, name, unit, numbers in rows]
+    assert cells == [[cell for cell in row if cell != "%"] for row in wanted]
+
+
+def test_the_path_of_a_report_has_equal_scales_and_axes_in_metres(run: Run, tmp_path: Path) -> None:
+    path = re.search('<figure id="?path"?>(.*?)</figure>', report(run, tmp_path, *DRONE), re.DOTALL)[1]  # type: ignore[index]
+    words = re.findall(r'<text class="[^"]*" x="([\d.]+)" y="([\d.]+)"[^>]*>([^<]*)</text>', path)
+    assert {"y (m)", "z (m)", "reference", "estimate, by error"} <= {text for _, _, text in words}
+    across = {float(text): float(x) for x, y, text in words if re.fullmatch(r"-?\d+", text) and float(x) > 60}
+    down = {float(text): float(y) for x, y, text in words if re.fullmatch(r"-?\d+", text) and float(x) < 60}
+    scales = [(max(at.values()) - min(at.values())) / (max(at) - min(at)) for at in (across, down)]
+    assert scales[0] == pytest.approx(scales[1], rel=1e-3)
+
+
+def test_errors_by_length_are_drawn_of_three_lengths_or_more(run: Run, tmp_path: Path) -> None:
+    drawn = ["relative error (%)" in report(run, tmp_path, *names) for names in (DRONE, ("kitti-ref.txt", "kitti-est.txt"))]
+    assert drawn == [False, True]
+
+
+def test_a_report_of_several_has_a_row_and_a_box_each(run: Run, tmp_path: Path) -> None:
+    text = report(run, tmp_path, "drone-ref.tum", "drone-est.tum", "drone-ref.tum")
+    rows = re.findall(r"<tr><th><svg.*?</svg>([^<]*)</th>(.*?)</tr>", text)
+    table = run("compare", "drone-ref.tum", "drone-est.tum", "drone-ref.tum", "-f", "csv", files=FILES).out.splitlines()
+    cells = [[name, *re.findall('data-value="([^"]*)"', cells)] for name, cells in rows]
+    assert cells == [[cell for cell in line.split(",") if cell] for line in table[1:]]
+    distribution = re.search('<figure id="?distribution"?>(.*?)</figure>', text, re.DOTALL)[1]  # type: ignore[index]
+    assert distribution.count("<rect") == 2
+    assert len(held_in(text, "samples")["curves"]) == 2
+
+
+def test_a_report_of_many_poses_stays_small_and_keeps_the_extremes() -> None:
+    generator = np.random.default_rng(3)
+    way, noise = np.cumsum(generator.normal(0.0, 0.05, (100_000, 3)), 0), generator.normal(0.0, 0.1, (100_000, 3))
+    noise[54_321] = 9.0
+    turned = np.tile([0.0, 0.0, 0.0, 1.0], (100_000, 1))
+    ref, est = (frametool.Trajectory(np.arange(100_000) * 10**9, xyz, turned) for xyz in (way, way + noise))
+    text = write_report([frametool.compare(ref, est, align="none")], "html", "frametool compare")
+    assert len(text) <= 400_000
+    (curve,) = held_in(text, "samples")["curves"]
+    assert max(zip(curve["m"], curve["t"], strict=True)) == (pytest.approx(9.0 * 3**0.5, rel=1e-3), 54_321)
 
 
 def test_align_prints_an_entry_and_writes_the_whole_estimate(run: Run) -> None:

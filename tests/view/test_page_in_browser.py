@@ -342,3 +342,56 @@ def test_a_thousand_frames_are_ready_in_a_second_and_drawn_in_thirty_millisecond
     assert len(tab.evaluate("() => window.frameview.labels.placed")) > 20
     assert tab.inner_text("#foot").startswith("1001 frames")
     assert tab.evaluate("() => window.frameview.labels.hidden") > 0
+
+
+# --- the report of a comparison ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def report_of(run: Callable[..., Any], tmp_path: Path) -> Callable[..., Path]:
+    """Write the report of estimates against the first trajectory."""
+
+    def write(*names: str) -> Path:
+        assert run("compare", *(str(ROOT / "examples" / name) for name in names), "-o", "report.html", "--align", "sim3").status == 0
+        return tmp_path / "report.html"
+
+    return write
+
+
+def test_pointing_at_a_curve_marks_its_place_on_the_path(report_of: Callable[..., Path], visit: Visit) -> None:
+    tab = visit(report_of("truth.tum", "odometry.tum"))
+    (curve,) = json.loads(tab.locator("#samples").text_content())["curves"]
+    at = max(range(len(curve["m"])), key=lambda each: curve["m"][each])
+    for picture in ("errors", "path"):
+        box, high = tab.locator(f"#{picture} svg").bounding_box(), tab.evaluate(f"document.querySelector('#{picture} svg').viewBox.baseVal.height")
+        x, y = curve[picture][at]
+        tab.mouse.move(box["x"] + x * box["height"] / high, box["y"] + y * box["height"] / high)
+        assert tab.inner_text("#tip") == f"{curve['t'][at]:g} s   {curve['m'][at]:g} m   {curve['deg'][at]:g}°"
+        for name in ("errors", "path"):
+            mark = tab.locator(f"#{name} .mark")
+            assert [float(mark.get_attribute(each)) for each in ("cx", "cy")] == curve[name][at]
+    tab.mouse.move(1, 1)
+    assert tab.locator("#tip").is_hidden()
+
+
+def test_the_table_of_estimates_sorts_by_what_is_clicked(report_of: Callable[..., Path], visit: Visit) -> None:
+    tab = visit(report_of("truth.tum", "odometry.tum", "mono.tum"))
+
+    def names() -> list[str]:
+        return [text.rsplit("/", 1)[-1] for text in tab.locator("#estimates tbody th").all_inner_texts()]
+
+    orders = []
+    for title in ("ate", "ate", "est"):
+        tab.click(f"#estimates button:has-text('{title}') >> nth=0")
+        orders.append(names())
+    assert orders == [["mono.tum", "odometry.tum"], ["odometry.tum", "mono.tum"], ["mono.tum", "odometry.tum"]]
+
+
+@pytest.mark.parametrize("names", [("truth.tum", "odometry.tum"), ("truth.tum", "odometry.tum", "mono.tum")])
+def test_a_report_prints_on_one_page_and_fits_a_phone(report_of: Callable[..., Path], visit: Visit, names: tuple[str, ...]) -> None:
+    path = report_of(*names)
+    assert len(re.findall(rb"/Type /Page\b", visit(path).pdf(prefer_css_page_size=True))) == 1
+    phone = visit(path, viewport={"width": 390, "height": 844})
+    assert phone.evaluate("document.documentElement.scrollWidth") <= 390
+    dark = visit(path, color_scheme="dark").evaluate("getComputedStyle(document.body).backgroundColor")
+    assert dark == "rgb(20, 23, 28)"

@@ -1,0 +1,110 @@
+"""Charts: lines over axes with round numbers, each axis with its name and unit."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.view.pictures import PictureDot, PictureLine, PictureWords
+from frametool.view.scene import text_width
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from frametool.view.pictures import Shape
+
+    Range = tuple[float, float]
+    Point = tuple[float, float]
+
+LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
+
+
+class Area(NamedTuple):
+    """A rectangle of a picture that values are drawn in, without what is written around it."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+
+class ChartLine(NamedTuple):
+    """A line by its points in the units of the axes; without a name it is not in the legend."""
+
+    name: str
+    colour: str
+    points: Sequence[Point]
+    width: float = 1.5
+    dashes: tuple[float, ...] = ()
+    dots: bool = False
+
+
+class Chart:
+    """Two axes in an area of a picture, and where values are between them."""
+
+    def __init__(self, area: Area, x: Range, y: Range, names: tuple[str, str], *, equal: bool = False) -> None:
+        """Choose the ends of both axes.
+
+        names: what is along x and along y, with units.  equal: a unit is as long along x as along y.
+        """
+        self.area, self.names = area, names
+        if equal:
+            pixels = min(size / max(end - begin, 1e-9) for size, (begin, end) in zip(area[2:], (x, y), strict=True))
+            x, y = (((begin + end - size / pixels) / 2.0, (begin + end + size / pixels) / 2.0)
+                    for size, (begin, end) in zip(area[2:], (x, y), strict=True))  # fmt: skip
+        limits = [(max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in (x, y)]
+        self.ticks = [ticks(*each) for each in limits]
+        self.x, self.y = ((each[0], each[-1]) for each in self.ticks)
+        if x[1] - x[0] > LEAST_SPAN:  # ends where the values do
+            self.x = limits[0]
+        if equal:
+            self.y = limits[1]
+        self.ticks = [[at for at in each if begin <= at <= end]
+                      for each, (begin, end) in zip(self.ticks, (self.x, self.y), strict=True)]  # fmt: skip
+
+    def place(self, x: float, y: float) -> Point:
+        """Return the pixels of two values; of values beyond the axis y, those of its end."""
+        left, top, width, height = self.area
+        inside = min(max(y, self.y[0]), self.y[1])
+        across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
+        return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
+
+    def drawn(self, lines: Sequence[ChartLine] = (), rows: Sequence[str] | None = None) -> Iterator[Shape]:
+        """Draw the axes, the lines and a legend of those with names; rows: words in the place of numbers along y."""
+        left, top, width, height = self.area
+        right, bottom = left + width, top + height
+        yield PictureWords(left, top - 14.0, self.names[1], "soft")
+        if self.names[0]:
+            yield PictureWords(right, bottom + 30.0, self.names[0], "soft", "end")
+        for tick in self.ticks[0]:
+            across = self.place(tick, 0.0)[0]
+            yield PictureLine([(across, top), (across, bottom)], "faint")
+            yield PictureWords(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0)
+        for at, tick in enumerate(self.ticks[1] if rows is None else range(len(rows))):
+            down = self.place(0.0, tick)[1]
+            yield PictureLine([(left, down), (right, down)], "faint" if tick else "zero")
+            yield PictureWords(left - 7.0, down, f"{tick:g}" if rows is None else rows[at], "soft", "end", 11.0)
+        for line in lines:
+            points = [self.place(*point) for point in line.points]
+            if points:
+                yield PictureLine(points, line.colour, line.width, dashes=line.dashes, title=line.name)
+            yield from (PictureDot(x, y, 3.0, line.colour) for x, y in points if line.dots)
+        yield from legend([line for line in lines if line.name], right, top - 14.0)
+
+
+def legend(lines: Sequence[ChartLine], right: float, y: float) -> Iterator[Shape]:
+    """Write the names of lines on one line that ends at the right, each behind a piece of its line."""
+    for line in reversed(lines):
+        yield PictureWords(right, y, line.name, "ink", "end", 11.0)
+        right -= text_width(line.name, 12.0) + 5.0
+        yield PictureLine([(right - 16.0, y), (right, y)], line.colour, max(line.width, 2.0), dashes=line.dashes)
+        right -= 28.0
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Return round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
+    span = high - low if high - low > LEAST_SPAN else 1.0
+    step = 10.0 ** math.floor(math.log10(span / 4.0))
+    step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [count * step for count in range(first, max(last, first + 1) + 1)]
