@@ -13,14 +13,10 @@ Source: Khronos glTF 2.0, sections 3.6 (buffers), 3.11 (animation), 4.4 (binary)
 from __future__ import annotations
 
 import json
-import os
-import re
 import struct
 import sys
 from array import array
 from base64 import b64encode
-from hashlib import sha256
-from html import escape
 from itertools import chain, islice
 from json import dumps
 from operator import mul
@@ -31,6 +27,7 @@ from frametool.formats.robots.model import JointValue
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import single
+from frametool.view.pictures import page_file, write_html
 from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn
 
 if TYPE_CHECKING:
@@ -166,7 +163,6 @@ def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence
     return seconds, places, rotations
 
 
-FOLDER = os.path.join(os.path.dirname(__file__), "page")
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
 WITH_JOINTS = (*SCRIPTS[:-1], "joints", "main")
 EACH = 8  # bytes of a number
@@ -194,28 +190,10 @@ def write_page(
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
         head["overlay"] = {"title": other_title, "poses": poses}
-    script, style = "".join(_file(f"{name}.js") for name in (WITH_JOINTS if joints else SCRIPTS)), _file("page.css")
-    parts = {
-        # the page lets its own script and style run, and nothing else
-        "POLICY": "default-src 'none'; "
-        f"script-src '{_digest(script)}'; style-src '{_digest(style)}'; base-uri 'none'; form-action 'none'",
-        "TITLE": escape(title),
-        "STYLE": style,
-        # JSON that no name in it can end
-        "HEAD": dumps(head, separators=(",", ":")).replace("<", "\\u003c").replace("&", "\\u0026"),
-        "BLOB": b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode(),
-        "SCRIPT": script,
-    }
-    return re.sub("@([A-Z]+)@", lambda mark: parts[mark[1]], _file("page.html"))
-
-
-def _file(name: str) -> str:
-    with open(os.path.join(FOLDER, name), encoding="utf-8") as stream:
-        return stream.read()
-
-
-def _digest(text: str) -> str:
-    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
+    blob = b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode()
+    scripts = " ".join(f"{name}.js" for name in (WITH_JOINTS if joints else SCRIPTS))
+    held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(blob)}
+    return write_html(title, page_file("page.html"), style="page.css", script=scripts, data=held)
 
 
 def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:

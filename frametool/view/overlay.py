@@ -12,13 +12,14 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import FileProblem, FormatError, ValueInvalid
-from frametool.view.pictures import FONT, POINTS, STOPS, require_matplotlib, shade_of
+from frametool.view.pictures import FONT, POINTS, STOPS, require_matplotlib, shade_of, write_html
 
 if TYPE_CHECKING:
     from frametool.geometry.types import Number
 
 SUFFIXES = (".svg", ".html", ".png")
 MOST = 20_000  # points that are drawn
+UPRIGHT = ' style="image-orientation: none"'  # which pages say in their style
 PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that are followed by a size
 
@@ -89,9 +90,7 @@ class Overlay:
             return self._png()
         svg = self._svg()
         if self.suffix == ".html":
-            style = "body {margin: 0; background: #14171c} svg {width: 100%; height: auto; max-height: 100vh}"
-            head = f'<head><meta charset="utf-8"><title>overlay</title><style>{style}</style></head>'
-            svg = f'<!DOCTYPE html>\n<html lang="en">\n{head}\n<body>\n{svg}</body>\n</html>\n'
+            svg = write_html("overlay", f'<main id="overlay">{svg.replace(UPRIGHT, "")}</main>')
         return svg.encode()
 
     def summary(self) -> str:
@@ -149,7 +148,7 @@ class Overlay:
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{shot.width}" height="{shot.height}" '
             f'viewBox="-0.5 -0.5 {shot.width} {shot.height}" {FONT}>\n'
             f'<defs><linearGradient id="depth">{stops}</linearGradient></defs>\n'
-            f'<image x="-0.5" y="-0.5" width="{shot.width}" height="{shot.height}" style="image-orientation: none" '
+            f'<image x="-0.5" y="-0.5" width="{shot.width}" height="{shot.height}"{UPRIGHT} '
             f'href="data:image/{shot.kind};base64,{b64encode(shot.data).decode()}"/>\n{circles}'
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" fill="url(#depth)" '
             f'stroke="#000000"/>\n{words}</svg>\n'

@@ -149,7 +149,7 @@ def write_html(
 
     style, script: of the files in the folder `page`.  data: JSON by the id of the element that holds it.
     """
-    texts = {"style": _page_file(style), "script": "".join(map(_page_file, script.split()))}
+    texts = {"style": page_file(style), "script": "".join(map(page_file, script.split()))}
     if style == "report.css":
         light, dark = ("".join(f"--{name}: {NAMED[name][scheme]}; " for name in NAMED) for scheme in (0, 1))
         rules = "".join(f".{name} {{fill: var(--{name})}} .{name}-line {{stroke: var(--{name})}}\n" for name in NAMED)
@@ -179,7 +179,8 @@ def write_html(
 HARMLESS = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&"}  # JSON that no name in it can end
 
 
-def _page_file(name: str) -> str:
+def page_file(name: str) -> str:
+    """Return the text of a file in the folder `page`."""
     with open(os.path.join(os.path.dirname(__file__), "page", name), encoding="utf-8") as stream:
         return stream.read()
 

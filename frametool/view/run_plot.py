@@ -147,14 +147,15 @@ def run_picture(drawing: Drawing) -> Picture:
                   for name, each in followed.items()]  # fmt: skip
         known = [0.0, *(value for curve in curves for _, value in curve.points)]
         area = Area(LEFT, MARGIN + index * (height + PANEL_GAP), PANEL_WIDTH, height)
-        shapes += Chart(area, (0.0, end), (min(known), max(known)), ("time (s)", title)).drawn(curves)
+        names = ("time (s)" * (title == PANELS[-1]), title)
+        shapes += Chart(area, (0.0, end), (min(known), max(known)), names).drawn(curves)
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
 
 
 def last_commands(drawing: Drawing) -> str:
     """Return an HTML table of what each follower saw and did last."""
     rows = "".join(
-        f"<tr><td>{escape(printable(name))}</td><td>{curve.times[-1]:g}</td><td>{curve.distance[-1]:.4f}</td>"
+        f"<tr><th>{escape(printable(name))}</th><td>{curve.times[-1]:g}</td><td>{curve.distance[-1]:.4f}</td>"
         f"<td>{curve.linear[-1]:.4f}</td><td>{curve.angular[-1]:.4f}</td></tr>\n"
         for name, curve in drawing.curves.items()
         if curve.times

@@ -1,7 +1,7 @@
-// What the command wrote into the page: a head as JSON, and doubles and 64-bit stamps, packed if many.
+// What the command wrote into the page: a head, and doubles and 64-bit stamps, packed if many.
 
 const head = JSON.parse(document.getElementById("head-data").textContent);
-const blob = await unpack(document.getElementById("blob").textContent.trim(), head.packed);
+const blob = await unpack(JSON.parse(document.getElementById("blob").textContent), head.packed);
 
 async function unpack(text, packed) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
