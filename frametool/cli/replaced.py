@@ -14,6 +14,7 @@ REPLACED = {
     "sim sweep": "`frametool.simulate_many` in Python tries many gains at once",
     "view --live": "the page plays what moves, `frametool view TREE --open`",
     "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
+    "view --sliders": "a robot's page has its sliders; --no-sliders leaves them out",
     "compare --end": "--stop says the same",
     "align --end": "--stop says the same",
     "--tf2": "numbers are tf2's anyway; --cache 10 keeps as much as its buffer, --moving reads one stamp as it does",

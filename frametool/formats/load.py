@@ -563,6 +563,7 @@ def load_sources(
                 _add(builder, file)
             refuse_unknown_joints(files)
             tree = _with_cameras(builder.finish(), files) if builder.has_cameras else builder.finish()
+            tree.robots = [robot for file in files for robot in file.tally.robots]
     finally:
         close_all(sources)
     if places is not None:

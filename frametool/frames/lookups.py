@@ -46,6 +46,8 @@ class Frames:
     cameras: Mapping[str, Camera] = MappingProxyType({})  # of frames, as a tree of ours says
     read_cameras: Callable[[], dict[str, Callable[..., Camera]]] = staticmethod(dict)  # in files of other forms
 
+    robots: Sequence[tuple[Any, Any]] = ()  # of files with joints, their values and the links that they move
+
     def __init__(self, name: str) -> None:
         """Create an empty set of frames; `name` says in error messages where they come from."""
         self.name = name

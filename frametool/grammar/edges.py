@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.errors import FormatError
+    from frametool.formats.robots.model import Link, Value
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
 
@@ -122,7 +123,7 @@ class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
     __slots__ = (
-        "assumed", "axes", "drawn", "has_joints", "names", "noise", "notes", "others", "projected", "rough",
+        "assumed", "axes", "drawn", "has_joints", "names", "noise", "notes", "others", "projected", "robots", "rough",
         "unknown_joints",
     )  # fmt: skip
 
@@ -133,6 +134,7 @@ class Tally:
         axes: frame -> the axes of the camera it is, `optical` or `opengl`
         drawn: of a file without poses, child -> how often its edge comes
         projected: how far the worst matrix was from a rotation, in forms that round them
+        robots: of files with joints, the values of those that stand still and the links that they move
         has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
         each with the error that says so, for another file may have them
         """
@@ -144,6 +146,7 @@ class Tally:
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.projected = 0.0
+        self.robots: list[tuple[Mapping[str, Value], list[Link]]] = []
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
         self.notes: dict[str, Finding] = {}

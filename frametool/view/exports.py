@@ -31,9 +31,9 @@ from frametool.view.pictures import page_file, write_html
 from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
-    from frametool.formats.robots.model import Robot, Value
+    from frametool.formats.robots.model import Mimic
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
     from frametool.sim.simulate import SimulationStep
@@ -173,25 +173,26 @@ NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 def write_page(
     scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
-    other: FrameScene | None = None, other_title: str = "", joints: Sequence[dict[str, Any]] = (),
+    other: FrameScene | None = None, other_title: str = "", sliders: bool = False,
 ) -> str:  # fmt: skip
     """Return the page.
 
     title: its heading.  file: the tree's name in the command that the page offers to copy.
     eye: azimuth and elevation of the first view, radians.
     other: another tree seen in the same frame, laid over this one; other_title: what it is called.
-    joints: those with a slider, as `joint_sliders` makes them.
+    sliders: whether the joints of robots have one each.
     """
     head = _head(scene) | {"title": title, "file": file or title, "made": f"frametool {__version__}"}
     head["show"] = _shown(scene, eye)
-    if joints:
-        head["joints"] = list(joints)
+    joints = joint_sliders(scene) if sliders else {}
+    if joints.get("joints"):
+        head |= joints
     if other is not None:
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
         head["overlay"] = {"title": other_title, "poses": poses}
     blob = b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode()
-    scripts = " ".join(f"{name}.js" for name in (WITH_JOINTS if joints else SCRIPTS))
+    scripts = " ".join(f"{name}.js" for name in (WITH_JOINTS if "joints" in head else SCRIPTS))
     held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(blob)}
     return write_html(title, page_file("page.html"), style="page.css", script=scripts, data=held)
 
@@ -248,28 +249,32 @@ def _packed(pieces: Iterator[bytes]) -> Iterator[bytes]:
     yield packer.flush()
 
 
-def joint_sliders(robot: Robot, values: Mapping[str, Value], names: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the joints that turn or slide and stand still, as the page has them.
+def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
+    """Return the joints that turn or slide and stand still, and the links that they move, as the page has them."""
+    index = {name: number for number, name in enumerate(scene.names)}
+    joints: list[dict[str, Any]] = []
+    moved: list[dict[str, Any]] = []
+    places: dict[str, int] = {}
+    mimics: list[tuple[dict[str, Any], Mimic]] = []
+    for values, links in scene.tree.robots:
+        for link in links:
+            known = [values.get(joint.name) for joint in link.joints]
+            if not known or link.child not in index or not all(isinstance(value, JointValue) for value in known):
+                continue
+            numbers = range(len(joints), len(joints) + len(known))
+            places |= zip((joint.name for joint in link.joints), numbers, strict=True)
+            moved.append({"frame": index[link.child], "joints": [*numbers], "origin": link.origin, "after": link.after,
+                          "inverted": link.inverted})  # fmt: skip
+            for joint, value in zip(link.joints, known, strict=True):
+                joints.append({key: getattr(joint, key) for key in SLIDER_KEYS} | {"value": float(value.plain)})
+                mimics += [(joints[-1], joint.mimic)] * (joint.mimic is not None)
+    for joint, mimic in mimics:
+        if mimic.joint in places:
+            joint["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
+    return {"joints": joints, "links": moved}
 
-    values: of the joints, by name.  names: of the frames of the page, in its order.
-    """
-    index = {name: number for number, name in enumerate(names)}
-    links = {child: link for child, link in robot.links.items() if link.joints and child in index}
-    found: list[dict[str, Any]] = []
-    for child, link in links.items():
-        (joint,) = link.joints
-        value = values.get(joint.name)
-        if not joint.posed and isinstance(value, JointValue):
-            found.append({
-                "name": joint.name, "frame": index[child], "kind": joint.kind, "axis": joint.axis,
-                "origin": link.origin, "lower": joint.lower, "upper": joint.upper, "value": float(value.plain),
-            })  # fmt: skip
-    places = {str(each["name"]): number for number, each in enumerate(found)}
-    for name, each in zip(places, found, strict=True):
-        mimic = robot.joints[name].mimic
-        if mimic and mimic.joint in places:
-            each["mimic"] = [places[mimic.joint], mimic.multiplier, mimic.offset]
-    return found
+
+SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
 
 
 class RunPage:

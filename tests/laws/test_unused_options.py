@@ -52,7 +52,7 @@ MODES: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
     (("check", "robot.yaml"), OF_FILES),
     (("diff", "robot.yaml", "robot.yaml"), OF_FILES),
     (("monitor", "drive.yaml"), OF_FILES),
-    (("view", "robot.yaml"), (*OF_FILES, "--path", "--sliders", "--overlay")),
+    (("view", "robot.yaml"), (*OF_FILES, "--path", "--no-sliders", "--overlay")),
     (("view", "robot.yaml", "-o", "x.svg"), ("--color=always",)),
     (("view", "robot.yaml", "-o", "x.glb"), ("--color=always", "--from=top")),
 )  # fmt: skip

@@ -17,7 +17,7 @@ import frametool
 from frametool.view.exports import SCRIPTS, WITH_JOINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
 ARM = ROOT / "examples" / "arm.urdf"
@@ -26,7 +26,7 @@ MOVED = {"shoulder_pan": 0.5, "elbow": -1.25, "wrist_roll": 3.0, "gripper": 0.02
 
 def page(folder: Path, *more: str) -> Path:
     path = folder / "arm.html"
-    command = [sys.executable, "-m", "frametool", "view", str(ARM), "--sliders", "--quiet", "-o", str(path), *more]
+    command = [sys.executable, "-m", "frametool", "view", str(ARM), "--quiet", "-o", str(path), *more]
     subprocess.run(command, check=True)
     return path
 
@@ -61,14 +61,66 @@ def test_a_page_without_joints_has_no_script_for_them(tmp_path: Path) -> None:
     assert set(WITH_JOINTS) - set(SCRIPTS) == {"joints"}
 
 
-@pytest.mark.parametrize("arguments", [("-o", "x.svg"), ("-f", "text"), ()])
-def test_sliders_need_a_page(run: Callable[..., Any], arguments: tuple[str, ...]) -> None:
-    done = run("view", str(ARM), "--sliders", *arguments)
+@pytest.mark.parametrize("arguments", [("robot.yaml",), ("arm.urdf", "--no-sliders")])
+def test_what_has_no_joints_or_wants_none_has_no_sliders(run: Callable[..., Any], arguments: tuple[str, ...]) -> None:
+    done = run("view", str(ROOT / "examples" / arguments[0]), *arguments[1:], "-f", "html")
+    assert done.status == 0
+    assert "set_joint" not in done.out
+
+
+def test_the_option_for_sliders_went_with_a_word_on_the_new_one(run: Callable[..., Any]) -> None:
+    done = run("view", str(ARM), "--sliders", "-o", "x.html")
     assert done.status == 2
-    assert "--sliders move the joints of a robot on a page" in done.err
+    assert "--no-sliders" in done.err
 
 
-def test_what_has_no_joints_has_no_sliders(run: Callable[..., Any]) -> None:
-    done = run("view", str(ROOT / "examples" / "robot.yaml"), "--sliders", "-f", "html")
-    assert done.status == 1
-    assert "expected a URDF robot" in done.err
+FINGER = {"knuckle": 0.7, "tip_joint": -0.4}
+
+
+@NEEDS_CHROMIUM
+@pytest.mark.parametrize(("robot", "ends", "joints"), [("finger.xml", ("palm", "site:tip"), FINGER), ("lift.sdf", ("base", "camera"), {"hoist": 0.3})])
+def test_joints_of_other_robots_move_as_lookup_moves_them(run: Callable[..., Any], tmp_path: Path, robot: str, ends: tuple[str, str], joints: dict[str, float]) -> None:
+    """MJCF has anchors and references, SDF poses behind its joints."""
+    source = ROOT / "examples" / robot
+    tree = frametool.load(source, joints=joints)
+    base, tip = (next(name for name in tree.frames if name.rsplit("::", 1)[-1] == end) for end in ends)
+    assert run("view", str(source), "-o", "robot.html").status == 0
+    told = ",".join(f"{name}={value}" for name, value in joints.items())
+    seen = browsers.seen_in_chromium(tmp_path / "robot.html", f"target={base}&source={tip}&joints={told}")
+    pose = json.loads(re.search('data-pose="([^"]*)"', seen)[1])  # type: ignore[index]
+    assert pose == pytest.approx(list(tree.lookup(base, tip).components), abs=1e-13)
+
+
+@pytest.fixture
+def tab(browser: Any, tmp_path: Path) -> Iterator[Any]:
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    tab = context.new_page()
+    tab.goto(f"file://{page(tmp_path, '-j', 'elbow=0.5')}")
+    tab.wait_for_selector("html[data-ready]", state="attached")
+    yield tab
+    context.close()
+
+
+def test_a_slider_shows_its_name_its_value_in_its_unit_and_its_limits(tab: Any) -> None:
+    rows = {row.locator("span").inner_text(): row for row in tab.locator("#sliders label").all()}
+    assert {*rows} == {"shoulder_pan", "shoulder_lift", "elbow", "wrist_roll", "gripper", "gripper_right"}
+    for name, row in rows.items():
+        span, slider = row.locator("span").bounding_box(), row.locator("input").bounding_box()
+        assert span["width"] > 6 * len(name)
+        assert span["x"] + span["width"] <= slider["x"]
+    assert rows["elbow"].locator("output").inner_text() == "28.6°"
+    assert rows["elbow"].locator("i").all_inner_texts() == ["-137.5°", "137.5°"]
+    assert rows["gripper"].locator("i").all_inner_texts() == ["0.0 mm", "40.0 mm"]
+
+
+def test_moving_a_slider_moves_what_follows_and_home_is_where_the_page_began(tab: Any) -> None:
+    tab.evaluate("() => { window.copied = []; navigator.clipboard.writeText = async (text) => { window.copied.push(text); }; }")
+    tab.locator("input[aria-label=gripper]").fill("0.03")
+    tab.locator("input[aria-label=gripper]").dispatch_event("change")
+    assert tab.locator("label:has(input[aria-label=gripper_right]) output").inner_text() == "30.0 mm"
+    assert "joints=gripper%3D0.03" in tab.url
+    tab.click("#shell")
+    assert tab.evaluate("() => window.copied[0]").endswith(" -j elbow=0.5 -j gripper=0.03")
+    tab.click("#home")
+    assert tab.evaluate("() => window.joints.values") == [0, 0, 0.5, 0, 0, 0]
+    assert "joints=" not in tab.url

@@ -13,7 +13,7 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option,
 from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import FRAME, frame_name, load_tree, opened
+from frametool.cli.trees import FRAME, frame_name, load_tree
 from frametool.errors import listing, shown
 from frametool.frames.stamps import format_stamp
 
@@ -51,7 +51,7 @@ def _eye(text: str) -> Eye:
 @option("-o --output FILE", "write there instead of stdout, whole or not at all")
 @option("--force", "let --output replace an existing file", requires=("output",), under="Result")
 @option("--overlay", "lay TREE over a second tree, named in TARGET's place: what has moved?")
-@option("--sliders", "a slider for each joint of a URDF robot, on its page", excludes=("overlay",))
+@option("--no-sliders", "no sliders for the joints of a robot on its page", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
 @color_option
 def command(inputs: Inputs) -> None:
@@ -75,13 +75,11 @@ def command(inputs: Inputs) -> None:
         from frametool.view.pictures import require_matplotlib
 
         require_matplotlib()
-    overlay, sliders, eye = inputs.overlay, inputs.sliders, inputs.peek("eye")
+    overlay, eye = inputs.overlay, inputs.peek("eye")
     if chosen != "glb":  # which is seen from all sides
         inputs.ask("eye")
     refuse(overlay and (source or not target), "--overlay takes two trees: frametool view AFTER BEFORE --overlay")
     refuse(inputs.path_only and not (target and source), "--path draws the way between TARGET and SOURCE; name both")
-    if sliders and (chosen != "html" or tree == "-"):
-        raise click.UsageError("--sliders move the joints of a robot on a page: give a file, and -o FILE.html")
     frames = load_tree(tree, inputs.more, rules(inputs))
     from frametool.view.scene import FrameScene
 
@@ -102,6 +100,7 @@ def command(inputs: Inputs) -> None:
 
             print_terminal(scene, eye, color)
             return
+    sliders = chosen == "html" and not overlay and not inputs.no_sliders
     inputs.refuse_idle()
     content = _content(scene, chosen, tree, eye, before, str(target), sliders=sliders)
     path = _page_file(tree) if inputs.opens and output is None else output
@@ -133,8 +132,9 @@ def _content(
     if form == "html":
         from frametool.view.exports import write_page
 
-        joints = _joints(tree, scene) if sliders else []
-        return write_page(scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, joints=joints)
+        return write_page(
+            scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, sliders=sliders
+        )
     if form == "glb":
         from frametool.view.exports import write_glb
 
@@ -151,16 +151,6 @@ def _content(
     if still.hidden:
         say(f"note: {still.hidden} names found no place")
     return write_picture(still.picture, f".{form}")
-
-
-def _joints(tree: str, scene: FrameScene) -> list[dict[str, Any]]:
-    """Return the joints of a robot's file that get a slider; its warnings came when its frames were read."""
-    from frametool.errors import overheard
-    from frametool.formats.robots.urdf import robot_of
-    from frametool.view.exports import joint_sliders
-
-    (robot, posture), _ = overheard(robot_of, opened([tree])[0])
-    return joint_sliders(robot, posture.still, scene.names)
 
 
 def _page_file(tree: str) -> str:
