@@ -198,7 +198,7 @@ def close_all(files: Iterable[Source | FrameFile]) -> None:
 def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
     """Raise the error for a joint that options or files told of and that none of the files has, once all were read."""
     told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
-    robots = [file.tally for file in files if file.tally.has_joints]
+    robots = [file.tally for file in files if file.tally.robot is not None]
     if told and not robots:
         option = "--joint" if told[0].joints else "--joints"
         raise BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
@@ -563,7 +563,6 @@ def load_sources(
                 _add(builder, file)
             refuse_unknown_joints(files)
             tree = _with_cameras(builder.finish(), files) if builder.has_cameras else builder.finish()
-            tree.robots = [robot for file in files for robot in file.tally.robots]
     finally:
         close_all(sources)
     if places is not None:
@@ -575,8 +574,9 @@ CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "ner
 
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
-    """Add to a tree the cameras of its files: those in trees of ours, others when one is asked for."""
+    """Add to a tree the robots of its files and their cameras: of trees of ours now, of others when one is asked for."""
     others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
+    tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
     tree.read_cameras = partial(_read_cameras, tree, others)
     return tree

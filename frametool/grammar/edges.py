@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import repeat
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from frametool.errors import Finding, listing, shown
 from frametool.grammar.readers import is_slashed, slash_note
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from frametool.errors import FormatError
-    from frametool.formats.robots.model import Link, Value
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
 
@@ -123,7 +122,7 @@ class Tally:
     """What is worth telling about a recording once it is read: counted here, told at the end."""
 
     __slots__ = (
-        "assumed", "axes", "drawn", "has_joints", "names", "noise", "notes", "others", "projected", "robots", "rough",
+        "assumed", "axes", "drawn", "names", "noise", "notes", "others", "projected", "robot", "rough",
         "unknown_joints",
     )  # fmt: skip
 
@@ -134,19 +133,17 @@ class Tally:
         axes: frame -> the axes of the camera it is, `optical` or `opengl`
         drawn: of a file without poses, child -> how often its edge comes
         projected: how far the worst matrix was from a rotation, in forms that round them
-        robots: of files with joints, the values of those that stand still and the links that they move
-        has_joints: whether values of joints are about this file; unknown_joints: those told of that it does not have,
-        each with the error that says so, for another file may have them
+        robot: of a file that values of joints are about, the values of those that stand still and the links they move
+        unknown_joints: those told of that it does not have, each with the error that says so, for another file may
         """
         self.assumed = ""
         self.axes: dict[str, str] = {}
         self.drawn: dict[str, str] = {}
-        self.has_joints = False
+        self.robot: tuple[Mapping[str, Any], list[Any]] | None = None
         self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []
         self.projected = 0.0
-        self.robots: list[tuple[Mapping[str, Value], list[Link]]] = []
         self.rough: list[int] = []
         self.others: dict[str, int] = {}
         self.notes: dict[str, Finding] = {}
