@@ -574,7 +574,7 @@ CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "ner
 
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
-    """Add to a tree the robots of its files and their cameras: of trees of ours now, of others when one is asked for."""
+    """Add to a tree the robots of its files, and cameras: of trees of ours now, of others when one is asked for."""
     others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
     tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
