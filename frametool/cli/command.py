@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.sink import checked_by, writing
+from frametool.cli.sink import checked_by, show
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, ValueInvalid
 
@@ -143,11 +143,10 @@ def inputs() -> Inputs:
     return found
 
 
-def show_help(ctx: click.Context, *, everything: bool = False) -> None:
+def show_help(ctx: click.Context, *, everything: bool = False, paged: bool = False) -> None:
     """Print the help of a command, with `everything` of all its options."""
     ctx.meta[EVERYTHING] = everything
-    with writing(None) as write:
-        write(f"{ctx.get_help()}\n")
+    show(f"{ctx.get_help()}\n", paged=paged or everything)
 
 
 def _help(ctx: click.Context, option: click.Parameter, chosen: bool) -> None:  # click's signature
@@ -183,7 +182,7 @@ HELP_ALL = click.Option(
 
 HEADINGS = (
     "Options", "Files (help formats)", "Time (help time)", "Rotations (help rotations, help earth)",
-    "Rows (help streams)", "Result (help errors)", "Forms that leave something open (help formats)",
+    "Rows (help streams)", "Result (help errors)", "Formats that do not specify something (help formats)",
     "Turtles (help turtles)",
 )  # fmt: skip
 WIDEST = 24  # of the left column

@@ -165,7 +165,7 @@ UTF8 = Utf8()
 # --- inputs --------------------------------------------------------------------------------------------------------
 
 _of_files, _of_times, _of_rotations, _of_results, _of_forms = (
-    partial(option, under=heading) for heading in ("Files", "Time", "Rotations", "Result", "Forms")
+    partial(option, under=heading) for heading in ("Files", "Time", "Rotations", "Result", "Formats")
 )
 verbose_option = _of_files("-v --verbose", "say what each input was taken for")
 _IN = "form of the input (`frametool formats`), once a file"
@@ -227,7 +227,7 @@ def say_if_verbose(text: str) -> None:
 
 # --- results -------------------------------------------------------------------------------------------------------
 
-_PRECISION = _of_results("--precision N|full", "digits after the point  [default: full; overviews 6]", Digits())
+_PRECISION = _of_results("--precision N|full", "digits after the point  [default: full; on a terminal 9 in all, overviews 6]", Digits())
 _PLACE = (
     _of_results("-o --output FILE", "write this file, whole or not at all"),
     _of_results("--force", "let --output replace a file", requires=("output", "report")),

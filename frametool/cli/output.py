@@ -5,7 +5,6 @@ Pictures on their way out: in which form, by the suffix of a file.
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from importlib import import_module
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from click import UsageError
 
 from frametool.cli.options import FULL
-from frametool.cli.sink import filling, is_special, writing
+from frametool.cli.sink import filling, in_colour, is_special, writing
 from frametool.cli.stderr import say
 from frametool.errors import FrametoolError, ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from frametool.stream.row_poses import RowPoses
 
 BATCH = 256  # poses
+ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
 WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
 BLOCK = 1 << 13  # poses of a trajectory
 
@@ -59,7 +59,7 @@ class Output:
             from frametool.formats.unsupported import refuse_suffix
 
             refuse_suffix(self.path)
-        self.marks: tuple[str, ...] = ()  # patterns of what has a colour in text on a terminal
+        self.marks: tuple[str, ...] = (ZEROS,)  # patterns of what has a style in text on a terminal
         self.told = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
         if inputs.peek("origin") is not None or any(each.representation.is_place for each in notations):
@@ -82,6 +82,7 @@ class Output:
             form, chosen, degrees=bool(inputs.deg), precision=None if digits == FULL else digits, full=digits == FULL,
             keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
+        self.style.screen = form == "text" and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)
         if table.is_recording(form):
             from frametool.cli.recording import recorded
@@ -113,7 +114,7 @@ class Output:
         """Colour target and source, in what says which is seen from which."""
         target, source = re.escape(printable(target)), re.escape(printable(source))
         seen = rf"(?m)^(?P<green>{source})(?: at \S+)? seen from (?P<cyan>{target})(?= |$)"
-        self.marks = seen, rf"\(maps points in (?P<green>{source}) to points in (?P<cyan>{target})\)"
+        self.marks += seen, rf"\(maps points in (?P<green>{source}) to points in (?P<cyan>{target})\)"
 
     def _refuse_place(self) -> None:
         """Stop where a form has no place for latitude and longitude."""
@@ -133,12 +134,19 @@ class Output:
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
             return
         beside = {key for each in poses for key in each.said(self.style)}
+        if len(poses) > 1 or "covariance" in beside:
+            self._shorten()
         if "scale" in beside:
             from frametool.stream.writers import refuse_scale_in
 
             refuse_scale_in(self.style.form, beside)
         self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
         self._tell_dropped(key for each in poses for key in each.extras)
+
+    def _shorten(self) -> None:
+        """Show poses on a terminal by quaternion and rpy only, where no representation is asked for."""
+        if self.style.screen and not self.style.notations:
+            self.style.notations = notation("quaternion"), notation("rpy_deg")
 
     def _tell_dropped(self, keys: Iterable[str]) -> None:
         """Name what results say besides where the form has no place for it."""
@@ -149,6 +157,7 @@ class Output:
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
         self._refuse_place()
+        self._shorten()
         self.pieces(self._blocks(_batched(results)) if self._in_blocks else self._batches(results))
 
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
@@ -313,8 +322,7 @@ class Output:
             for piece in pieces:
                 for_people = is_plain and isinstance(piece, str)
                 text = "\n".join(map(printable, str(piece).split("\n"))) if for_people else piece
-                marked = self.marks and for_people and self.path is None and sys.stdout.isatty()
-                write(in_colour(str(text), self.marks) if marked else text)
+                write(in_colour(str(text), self.marks) if for_people and self.style.screen else text)
             if self._fault is not None:
                 raise self._fault
         self._tell_of_suffix()
@@ -333,15 +341,6 @@ class Output:
     def text(self, text: str) -> None:
         """Write text."""
         self.pieces([text])
-
-
-def in_colour(text: str, marks: Sequence[str]) -> str:
-    """Return text for the terminal: named groups of patterns in the colour of their name, unless NO_COLOR is set."""
-    if os.environ.get("NO_COLOR"):
-        return text
-    from frametool.view.pose_text import coloured
-
-    return coloured(text, marks)
 
 
 def _as_point(value: Result | dict[str, Any]) -> Result | dict[str, Any]:

@@ -1,4 +1,7 @@
-"""Where results go: standard output, whole lines at a time, a file or a folder that is there whole or not at all."""
+"""Where results go: standard output, whole lines at a time, a file or a folder that is there whole or not at all.
+
+On a terminal, text for people has styles, and a pager where it is longer than the screen.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +11,31 @@ import stat
 import sys
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import count
+from itertools import count, groupby
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, BinaryIO
+
+from click import echo_via_pager
 
 from frametool.cli.signals import STATE, clean_up
 from frametool.errors import FileProblem, ValueInvalid, printable, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
+    from collections.abc import Callable, Iterable, Iterator
 
     Write = Callable[[str | bytes | memoryview], None]
 
 _checks: list[Callable[[], None]] = []
 OPEN_FILES = "/proc/self/fd"  # where Linux has the files of a process by their numbers
 BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # what a folder may hold that is replaced
+STYLES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "magenta": 35, "cyan": 36}  # legible on dark and light
+HELP_MARKS = (  # of helps, topics, formats and the cookbook
+    r"(?m)^ +(?P<green>(?:\$ .*|(?:frametool|printf|sed) .*))",
+    r"\A(?P<bold>Usage:|(?!Usage:).*)",
+    r"(?m)^(?P<bold>[A-Za-z][\w ]*(?: \([^)\n]*\))?:|\S.*\?)$",
+    r"(?m)^  (?P<cyan>[a-z][\w-]*)  +(?=\S)",
+    r"(?<![\w-])(?P<cyan>--?[a-zA-Z][\w-]*)",
+)
 LONGEST_NAME = 255  # bytes, on nearly every file system
 
 
@@ -48,6 +61,38 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
         with _replacing(path, force=force) as part:
             yield writer_into(part, path)
             check()
+
+
+def in_colour(text: str, marks: Iterable[str]) -> str:
+    """Return text for a terminal: each named group of some patterns in the style that is its name, unless NO_COLOR.
+
+    Where two overlap, the pattern that comes first counts.
+    """
+    if os.environ.get("NO_COLOR") or os.environ.get("TERM") in ("dumb", "unknown"):
+        return text
+    codes = [0] * len(text)
+    for mark in marks:
+        for found in re.finditer(mark, text):
+            for name, part in found.groupdict().items():
+                begin, end = found.span(name)
+                if part and not any(codes[begin:end]):
+                    codes[begin:end] = [STYLES[name]] * (end - begin)
+    pieces, begin = [], 0
+    for code, run in groupby(codes):
+        piece = text[begin : (begin := begin + len(list(run)))]
+        pieces.append(f"\x1b[{code}m{piece}\x1b[0m" if code else piece)
+    return "".join(pieces)
+
+
+def show(text: str, *, paged: bool) -> None:
+    """Write a help or the like to standard output; on a terminal in styles, and paged where it is longer."""
+    is_seen = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+    if is_seen and paged and text.count("\n") >= get_terminal_size().lines:
+        check()
+        echo_via_pager(in_colour(text, HELP_MARKS).removesuffix("\n"))
+        return
+    with writing(None) as write:
+        write(in_colour(text, HELP_MARKS) if is_seen else text)
 
 
 @contextmanager

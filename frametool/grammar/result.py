@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
 
 INFINITE = float("inf")
+ROUNDED_TO_ZERO = 1e-12  # below it, on a screen
 
 
 class Recorded(NamedTuple):
@@ -44,7 +45,8 @@ class Style:
     """How results are written: format, notations, unit of bare angles, digits, sign of quaternions.
 
     precision: digits after the point; None for the shortest text that reads back
-    full: that text for people too, who are else shown some decimals of an overview
+    full: that text for people too, who are else shown some decimals of an overview, or 9 digits on a screen
+    screen: whether a terminal shows the text
     axes: those of the camera that the poses are of, `optical` or `opengl`; "" where that is not known
     in_camera: whether they are seen from the same camera at another time
     place: how positions on the Earth are written, None where x, y, z are
@@ -54,7 +56,7 @@ class Style:
 
     __slots__ = (
         "axes", "degrees", "form", "full", "in_camera", "in_cm", "keep_sign", "notations", "place", "precision",
-        "recording",
+        "recording", "screen",
     )  # fmt: skip
 
     def __init__(
@@ -70,7 +72,7 @@ class Style:
         """Keep what the options of a command say."""
         self.form = form
         self.axes = ""
-        self.in_camera = self.in_cm = False
+        self.in_camera = self.in_cm = self.screen = False
         self.place: Place | None = None
         self.recording = Recorded()
         self.notations = notations
@@ -86,6 +88,7 @@ class Style:
             keep_sign=self.keep_sign,
         )  # fmt: skip
         style.axes, style.in_camera, style.in_cm = self.axes, self.in_camera, self.in_cm
+        style.screen = self.screen and form == self.form
         style.recording = self.recording
         style.put_at(self.place)
         return style
@@ -104,11 +107,18 @@ class Style:
         """Write a finite number: shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        return repr(value + 0.0) if self.precision is None else f"{value:z.{self.precision}f}"
+        if self.precision is not None:
+            return f"{value:z.{self.precision}f}"
+        return repr(_nine_digits(value) if self.screen and not self.full else value + 0.0)
 
     def in_degrees(self, notation: Notation) -> bool:
         """Tell whether a notation's angles are written in degrees: its own suffix wins."""
         return notation.in_degrees(self.degrees)
+
+
+def _nine_digits(value: float) -> float:
+    """Round as a screen shows numbers: what rounding errors leave of a zero is zero."""
+    return float(f"{value:.9g}") if abs(value) >= ROUNDED_TO_ZERO else 0.0
 
 
 class Result:

@@ -20,7 +20,15 @@ from frametool.geometry.representations import ROTATIONS, ROWS, notation
 from frametool.geometry.transform import Transform
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import TIMES, Pose
-from frametool.grammar.result import Result, edge_label, is_locked, placed, rotation_entry, rotation_numbers
+from frametool.grammar.result import (
+    ROUNDED_TO_ZERO,
+    Result,
+    edge_label,
+    is_locked,
+    placed,
+    rotation_entry,
+    rotation_numbers,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -153,7 +161,8 @@ def _rotation_lines(pose: Pose, notation: Notation, style: Style) -> Iterator[Nu
     row, numbers = notation.representation, rotation_numbers(pose, notation, style)
     if row.shape == ROWS:
         for at, each in enumerate(rotation_entry(pose, notation, style)[1][: math.isqrt(len(numbers))]):
-            yield NumberLine("" if at else notation.label, [("", value) for value in each], "")
+            names = ["[" * style.screen, *[""] * len(each)]
+            yield NumberLine("" if at else notation.label, list(zip(names, each, strict=False)), "]" * style.screen)
         return
     unit = ("deg" if style.in_degrees(notation) else "rad") if row.angles else ""
     yield NumberLine(notation.label, list(zip(notation.names, numbers, strict=True)), unit)
@@ -207,6 +216,7 @@ def _angle(radians: float) -> str:
 
 def _two_digits(value: float, unit: str) -> str:
     """Write a sigma with its unit: `2.1 mm`, `12 m`; what is tiny with an exponent."""
+    value = value if value > ROUNDED_TO_ZERO else 0.0
     if value and not 0.001 <= value < ENDLESS:
         return f"{value:.1e} {unit}"
     decimals = max(1 - math.floor(math.log10(value)), 0) if value else 0
@@ -248,7 +258,8 @@ def _columns(lines: Sequence[NumberLine], label: int, style: Style) -> list[str]
             f"{name:>{width}} {text}" if width else text
             for (name, _), text, width in zip(line.cells, texts_of, names, strict=False)
         ]
-        texts.append("  ".join([f"  {line.label:<{label}}", " ".join(named), line.unit]).rstrip() + "\n")
+        parts = f"  {line.label:<{label}}", " ".join(named), line.unit
+        texts.append("  ".join(parts).rstrip().replace("  ]", " ]") + "\n")
     return texts
 
 
@@ -358,18 +369,6 @@ def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
     )  # fmt: skip
 
 
-def coloured(text: str, marks: Sequence[str]) -> str:
-    """Return text as the terminal shows it: each named group of some patterns in the colour that is its name."""
-    from rich.text import Text
-
-    whole, console = Text(text), coloured_console()
-    for pattern in marks:
-        whole.highlight_regex(pattern)
-    with console.capture() as shown:
-        console.print(whole, end="")
-    return shown.get()
-
-
 def _label(track: Track, style: Style, covariance: Components | None) -> tuple[str, ...]:
     """Return the pose of an edge, how uncertain it is, and how it moves: its newest pose then."""
     label: tuple[str, ...] = edge_label(Transform.of(*track.components), style, track.parent)
@@ -385,23 +384,38 @@ def _label(track: Track, style: Style, covariance: Components | None) -> tuple[s
 def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
     """Yield the lines with the blanks that bring their poses below one another.
 
-    Where that makes them too long levels stand closer; where that is not enough either poses stand behind their names.
+    Where that makes them too long levels stand closer, sigmas are left out; where that is not enough either poses stand
+    behind their names.
     """
     lines = list(_lines(tree, style))
-    labels = [line.label for line in lines if line.label]
-    positions = max((len(label[0]) for label in labels), default=0)
-    poses = 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
-    names = _widest(lines)
-    if names + poses > WIDEST:
-        # each level takes two cells instead of four
-        lines = [line._replace(branch=re.sub("(.)..(.)", r"\1\2", line.branch)) for line in lines]
-        names = _widest(lines)
-    if names + poses > WIDEST:
+    turns = max((len(line.label[1]) for line in lines if _is_uncertain(line)), default=0)
+    wide = [_in_column(line, turns) if _is_uncertain(line) else line for line in lines]
+    narrow = [line._replace(branch=re.sub("(.)..(.)", r"\1\2", line.branch)) for line in wide]  # 2 cells, not 4
+    plain = [
+        line._replace(label=(*each.label[:2], *each.label[2 + _is_uncertain(each) :]))
+        for line, each in zip(narrow, lines, strict=True)
+    ]
+    for lines in (wide, narrow, plain):
+        labels, names = [line.label for line in lines if line.label], _widest(lines)
+        positions = max((len(label[0]) for label in labels), default=0)
+        poses = 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
+        if names + poses <= WIDEST:
+            break
+    else:
         yield from ((part, "  " * bool(part.label)) for line in lines for part in _folded(line))
         return
     for line in lines:
         label = (f"{line.label[0]:<{positions}}", *line.label[1:]) if line.label else ()
         yield line._replace(label=label), " " * bool(label) * (names - len(line.branch) - cells(line.frame) + 2)
+
+
+def _is_uncertain(line: DrawnFrame) -> bool:
+    return len(line.label) > 2 and line.label[2].startswith("±")
+
+
+def _in_column(line: DrawnFrame, width: int) -> DrawnFrame:
+    position, rotation, *others = line.label
+    return line._replace(label=(position, f"{rotation:<{width}}", *others))
 
 
 def _folded(line: DrawnFrame) -> Iterator[DrawnFrame]:

@@ -52,7 +52,7 @@ def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
     odd = [entry for entry in entries if entry["jumps"] or entry["backward"]]
     names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in odd)
     rows = (rf"(?m)^(?P<red>{parent} +{child} .*)$" for parent, child in names)
-    said = r"(?P<red>\b(?:jumps|back) [1-9]\d*)", r"(?m)(?P<yellow>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
+    said = r"(?P<red>\b(?:jumps|back) [1-9]\d*)", r"(?m)(?P<magenta>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
     return *rows, *said
 
 

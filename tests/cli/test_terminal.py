@@ -28,7 +28,7 @@ def seen(folder: Path, *arguments: str, **environment: str) -> str:
     kept = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "COLUMNS")}
     outer, inner = pty.openpty()
     process = subprocess.Popen(
-        [sys.executable, "-m", "frametool", *arguments], stdin=subprocess.DEVNULL, stdout=inner, stderr=inner, cwd=folder,
+        [sys.executable, "-m", "frametool", *arguments], stdin=inner if "PAGER" in environment else subprocess.DEVNULL, stdout=inner, stderr=inner, cwd=folder,
         env=kept | {"PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "80"} | environment,
     )  # fmt: skip
     os.close(inner)
@@ -113,3 +113,73 @@ def test_an_error_wraps_at_the_width_of_the_terminal_and_is_one_line_in_a_pipe(f
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert (piped.stderr.count("\n"), shown.split()) == (1, piped.stderr.split())
+
+
+NUMBERS = [
+    (("convert", "--from", "rpy_deg", "10", "20", "30", "--to", "rpy_deg"), "  rpy  roll 10.0 pitch 20.0 yaw 30.0  deg\n"),
+    (("apply", "--transform", "{rpy_deg: [0, 0, 120]}", "1", "0", "0"), "-0.5  0.866025404  0.0  m\n"),
+    (("calc", "pi/3", "sin(pi)"), "1.04719755\n0.0\n"),
+    (("convert", "--from", "rpy_deg", "0", "0", "30", "--to", "matrix"), "  matrix  [ 0.866025404 -0.5         0.0 ]\n          [ 0.5          0.866025404 0.0 ]\n          [ 0.0          0.0         1.0 ]\n"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "expected"), NUMBERS, ids=[row[0][0] for row in NUMBERS])
+def test_a_terminal_shows_nine_digits_and_no_rounding_errors(folder: Path, arguments: tuple[str, ...], expected: str) -> None:
+    text = seen(folder, *arguments)
+    assert CODES.sub("", text) == expected
+    assert ("\x1b[2m0.0\x1b[0m" in text) == (" 0.0" in f" {expected}".replace("\n", " "))  # zeros are dim
+    exact = seen(folder, *arguments, *(("--precision", "full") if arguments[0] != "calc" else ()), NO_COLOR="1")
+    piped = subprocess.run([sys.executable, "-m", "frametool", *arguments, "-f", "text"], cwd=folder, capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT)}).stdout
+    longest = [max(map(len, re.findall(r"\d+\.\d+", each))) for each in (exact, piped)]
+    assert all(each > 12 for each in longest[arguments[0] == "calc" :])
+
+
+def test_several_poses_and_uncertain_ones_are_brief_on_a_terminal(folder: Path) -> None:
+    calls = (("mean", "examples/tag_seen.csv"), ("lookup", "examples/drive.yaml", "map", "base_link", "--times", "0,1", "-f", "text"), ("compose", "{xyz: [1, 2, 3], sigma: {xyz: 0.1, rpy_deg: 1}}", "{rpy_deg: [0, 0, 90]}"))
+    for each in calls:
+        text = seen(folder, *each, NO_COLOR="1")
+        assert "quaternion" in text
+        assert "rpy" in text
+        assert "axis-angle" not in text
+        assert "matrix" in seen(folder, *each, "--to", "matrix", NO_COLOR="1")
+    assert "sigma   " in seen(folder, *calls[-1], NO_COLOR="1")
+
+
+def test_sigmas_of_a_drawing_stand_in_a_column_or_nowhere(folder: Path) -> None:
+    entries = "{frames: [{name: a, parent: m, xyz: [1, 2, 3], sigma: {xyz: 0.1, rpy_deg: 1}}, {name: NAME, parent: m, rpy_deg: [30, 0.1, 2], sigma: {xyz: 0.1, rpy_deg: 1}}]}"
+    lines = seen(folder, "tree", entries, NO_COLOR="1").splitlines()
+    assert lines[1].index("\u00b1") == lines[2].index("\u00b1")
+    wide = seen(folder, "tree", entries.replace("NAME", "n" * 40), NO_COLOR="1").splitlines()
+    assert "\u00b1" not in "".join(wide)
+    assert [line for line in wide if line != line.rstrip()] == []
+
+
+def test_check_says_that_it_found_nothing_on_a_terminal_alone(folder: Path) -> None:
+    assert re.fullmatch(r"frametool: examples/robot\.yaml: no findings \(\d+ rules\)\n", seen(folder, "check", "examples/robot.yaml"))
+    piped = subprocess.run([sys.executable, "-m", "frametool", "check", "examples/robot.yaml"], cwd=folder, capture_output=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert (piped.stdout, piped.stderr) == (b"", b"")
+
+
+def test_help_has_styles_on_a_terminal_and_its_width(folder: Path) -> None:
+    text = seen(folder, "--help", COLUMNS="140")
+    assert text.startswith("\x1b[1mUsage:\x1b[0m frametool")
+    assert "\x1b[1mPoses:\x1b[0m\n  \x1b[36mconvert\x1b[0m  " in text
+    assert "\x1b[32mframetool lookup robot.yaml map camera_optical\x1b[0m\n" in text
+    assert 80 < max(map(len, CODES.sub("", text).splitlines())) <= 100
+    assert re.findall(r"(?m)^(\w+):$", CODES.sub("", text)) == ["Options", "Poses", "Trees", "Rows", "Trajectories", "Recordings", "Help", "Turtles"]
+    assert "  \x1b[36m-o\x1b[0m, \x1b[36m--output\x1b[0m FILE" in seen(folder, "lookup", "--help-all", PAGER="", LINES="999")
+    for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+        assert "\x1b" not in seen(folder, "--help", **environment)
+    piped = subprocess.run([sys.executable, "-m", "frametool", "--help"], cwd=folder, capture_output=True, text=True, check=True, env={key: value for key, value in os.environ.items() if key != "COLUMNS"} | {"PYTHONPATH": str(ROOT)})
+    assert max(map(len, piped.stdout.splitlines())) <= 80
+    assert "\x1b" not in piped.stdout
+
+
+@pytest.mark.parametrize("words", [("help", "pose"), ("formats",), ("help", "cookbook"), ("help", "lookup"), ("lookup", "--help-all")], ids=" ".join)
+def test_what_is_longer_than_the_screen_goes_through_the_pager(folder: Path, words: tuple[str, ...]) -> None:
+    paged = seen(folder, *words, PAGER="sed s/^/|/")
+    assert all(line.startswith("|") for line in paged.splitlines())
+    whole = seen(folder, *words, LINES="999", NO_COLOR="1", PAGER="sed s/^/|/")
+    assert paged.replace("|", "", 1).replace("\n|", "\n") == whole
+    piped = subprocess.run([sys.executable, "-m", "frametool", *words], cwd=folder, capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT), "PAGER": "sed s/^/|/"})
+    assert "\n|" not in piped.stdout

@@ -6,7 +6,9 @@ Each command is imported when it is called; help and completion come from the ta
 from __future__ import annotations
 
 import os
+import sys
 from importlib import import_module
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import click
@@ -30,30 +32,33 @@ COMMANDS = {
     "mean": ("frametool.cli.commands.mean", "the mean of poses or rows, and how far they lie from it"),
     "between": ("frametool.cli.commands.between", "the shortest rotation from one direction to another"),
     "interpolate": ("frametool.cli.commands.interpolate", "poses between A and B at fractions of the way"),
+    "calc": ("frametool.cli.commands.calc", "expressions over poses whose frames are checked like units"),
     "lookup": ("frametool.cli.commands.lookup", "where SOURCE is seen from TARGET in a tree of frames"),
+    "tree": ("frametool.cli.commands.tree", "the frames of a tree, drawn or written in another format"),
+    "view": ("frametool.cli.commands.view", "frames in 3D: in the terminal, as an interactive page, as a picture"),
+    "check": ("frametool.cli.commands.check", "mistakes in trees and recordings"),
+    "diff": ("frametool.cli.commands.diff", "what differs between two trees, calibrations or recordings"),
+    "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
+    "fk": ("frametool.cli.commands.fk", "where TIP of a robot is seen from BASE, for joint values"),
+    "solve": ("frametool.cli.commands.solve", "transforms estimated from measurements: trees, cameras, matched points"),
     "apply": ("frametool.cli.commands.apply", "points, vectors and poses moved into another frame"),
     "project": ("frametool.cli.commands.project", "points into the picture of a camera: pixels, depths, overlays"),
     "unproject": ("frametool.cli.commands.unproject", "pixels of a camera as rays, or as points in TARGET"),
+    "batch": ("frametool.cli.commands.batch", "many commands, one a line, in one process"),
     "compare": ("frametool.cli.commands.compare", "how far trajectories are from a reference"),
     "align": ("frametool.cli.commands.align", "the transform that brings a trajectory onto its reference"),
-    "resample": ("frametool.cli.commands.resample", "a trajectory at other moments"),
-    "solve": ("frametool.cli.commands.solve", "the tree, the camera's place or the transform that measurements mean"),
-    "fk": ("frametool.cli.commands.fk", "where TIP of a robot is seen from BASE, for rows of joint values"),
-    "tree": ("frametool.cli.commands.tree", "the tree of frames, drawn or written in another form"),
-    "view": ("frametool.cli.commands.view", "the frames seen: in the terminal, as a page that turns, as a picture"),
-    "calc": ("frametool.cli.commands.calc", "expressions over poses whose frames are checked like units"),
-    "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording goes by"),
-    "record": ("frametool.cli.commands.record", "a recording with edges, frames of poses or its span changed"),
+    "resample": ("frametool.cli.commands.resample", "a trajectory at other times"),
+    "echo": ("frametool.cli.commands.echo", "where SOURCE is seen from TARGET as a recording plays"),
+    "record": ("frametool.cli.commands.record", "a recording with other edges, frames of poses or time span"),
     "monitor": ("frametool.cli.commands.monitor", "rate, interval, gaps and jumps of each edge of a recording"),
-    "static": ("frametool.cli.commands.static", "static_transform_publisher arguments, written and read"),
-    "check": ("frametool.cli.commands.check", "what is wrong or odd in trees and recordings"),
-    "diff": ("frametool.cli.commands.diff", "what differs between two trees, calibrations or recordings"),
-    "batch": ("frametool.cli.commands.batch", "many commands, one a line, in one process"),
-    "formats": ("frametool.cli.commands.formats", "the forms of files that are read and written, and what they mean"),
+    "formats": ("frametool.cli.commands.formats", "the file formats that are read and written, and what they mean"),
     "examples": ("frametool.cli.commands.examples", "the example files and the cookbook, printed or copied"),
-    "help": ("frametool.cli.commands.help", "a subject on one screen, the cookbook, any word: pose, axes, extrinsics"),
+    "help": ("frametool.cli.commands.help", "topics, the cookbook, and any word: pose, axes, extrinsics"),
     "sim": ("frametool.cli.commands.sim", "turtlesim and its followers, without ROS and without a screen"),
 }
+# first command of a group -> its heading
+GROUPS = {"convert": "Poses", "lookup": "Trees", "apply": "Rows", "compare": "Trajectories", "echo": "Recordings",
+          "formats": "Help", "sim": "Turtles"}  # fmt: skip
 TROUBLE = {"diff": 2}  # command -> its one exit code for whatever goes wrong, as that of diff(1)
 
 HELP = """The calculator for rigid-body frames.
@@ -97,8 +102,11 @@ class Group(WithHelp, click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table, without importing any."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, summary) for name, (_, summary) in self.table.items()])
+        width, rows = max(map(len, self.table)), list(self.table.items())
+        starts = [0, *(at for at, name in enumerate(self.table) if at and name in GROUPS)]
+        for begin, end in pairwise([*starts, len(rows)]):
+            with formatter.section(GROUPS.get(rows[begin][0], "Commands")):
+                formatter.write_dl([(name.ljust(width), about) for name, (_, about) in rows[begin:end]])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete command names from the table."""
@@ -153,7 +161,8 @@ def called(arguments: list[str]) -> object:
 
         answer(group, COMPLETION, instruction, " ".join(arguments))
         return 0
-    with group.make_context("frametool", arguments) as ctx:
+    widest = 100 if sys.stdout.isatty() else 80
+    with group.make_context("frametool", arguments, max_content_width=widest) as ctx:
         return group.invoke(ctx)
 
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from frametool.cli.command import EVERYTHING, FILE, Command, Inputs, argument, command_named, option
 from frametool.cli.options import file_options
-from frametool.cli.output import in_colour
-from frametool.cli.sink import writing
+from frametool.cli.sink import in_colour, writing
 from frametool.cli.stderr import folded, say
 from frametool.cli.trees import opened, refuse_two_readers, state
 from frametool.errors import Finding, FormatError, listing, warn
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from frametool.stream.measurements import Measurement
 
 FAILED = 1
-TROUBLE = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<yellow>warning): ")
+TROUBLE = (r"(?m)^\S.*?: (?P<red>error): ", r"(?m)^\S.*?: (?P<magenta>warning): ")
 
 
 class CheckCommand(Command):
@@ -83,8 +82,8 @@ def command(inputs: Inputs) -> int:
         write(in_colour("\n".join(map(folded, text.split("\n"))), TROUBLE) if is_seen else text)
     counts = {kind: sum(level(each) == kind for each in findings) for kind in ("error", "warning", "note")}
     summary = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items() if count)
-    if summary:
-        say(summary)
+    if summary or (form == "text" and sys.stdout.isatty()):
+        say(summary or f"{listing(files)}: no findings ({len(RULES)} rules)")
     return FAILED if counts["error"] or (strict and counts["warning"]) else 0
 
 

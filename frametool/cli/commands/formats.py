@@ -5,6 +5,7 @@ from __future__ import annotations
 from frametool.cli.command import Inputs, argument, command_named
 from frametool.cli.options import Form, list_options
 from frametool.cli.output import Output
+from frametool.cli.sink import show
 from frametool.formats.table import FORMATS
 from frametool.view.report_text import form_entry, write_form, write_forms
 
@@ -27,7 +28,8 @@ def command(inputs: Inputs) -> None:
     output, name = Output(inputs, "report", otherwise="text"), inputs.name
     entries = list(map(form_entry, FORMATS if name is None else [name]))
     if output.style.form == "text":
-        output.text(write_forms(entries) if name is None else write_form(entries[0]))
+        text = write_forms(entries) if name is None else write_form(entries[0])
+        show(text, paged=True) if output.path is None else output.text(text)
         return
     if output.style.form == "csv":  # a list is one cell
         for entry in entries:

@@ -13,6 +13,7 @@ import click
 from frametool import __version__
 from frametool.cli.command import (
     EXIT_CODES,
+    HEADINGS,
     Inputs,
     Text,
     argument,
@@ -27,7 +28,7 @@ from frametool.cli.command import (
 )
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.examples import example
-from frametool.cli.sink import writing
+from frametool.cli.sink import show
 from frametool.errors import any_near, shown
 from frametool.formats.table import FORMATS
 
@@ -145,12 +146,12 @@ def _texts(command: click.Command, ctx: click.Context) -> list[str]:
 
 def common(ctx: click.Context) -> str:
     """Return the options that stand in groups, each as the first command has it that does."""
-    found: dict[str, click.Option] = {}
+    found: dict[str, Any] = {}
     for command in _commands(ctx).values():
-        found = {each.name or "": each for each in command.params if isinstance(each, click.Option)} | found
+        shared = [each for each in command.params if getattr(each, "under", HEADINGS[0]) != HEADINGS[0]]
+        found = {each.name or "": each for each in shared} | found
     formatter = ctx.make_formatter()
-    groups = grouped(found.values())
-    write_options(formatter, {title: options for title, options in groups.items() if title != "Options"})
+    write_options(formatter, grouped(found.values()))
     return f"{MADE['common']}\n\n{formatter.getvalue()}"
 
 
@@ -220,7 +221,7 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
     if inputs.form == "json":
         text = _json(ctx, name, named)
     elif named and name not in topics():  # calc and formats are subjects too
-        show_help(click.Context(named, parent=ctx.parent, info_name=name))
+        show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
         return
     elif not words:
         text = f"Topics (frametool help TOPIC; any other WORD is searched for):\n\n{_listed(topics() | MADE)}\n"
@@ -231,8 +232,7 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
         text = common(ctx) if name == "common" else example("SKILL.md").decode()
     else:
         text = topic(name) if name in topics() else _search(ctx, name)
-    with writing(None) as write:
-        write(text)
+    show(text, paged=True)
 
 
 def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
