@@ -227,7 +227,7 @@ def say_if_verbose(text: str) -> None:
 
 # --- results -------------------------------------------------------------------------------------------------------
 
-_PRECISION = _of_results("--precision N|full", "digits after the point  [default: full; on a terminal 9 in all, overviews 6]", Digits())
+_PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", Digits())
 _PLACE = (
     _of_results("-o --output FILE", "write this file, whole or not at all"),
     _of_results("--force", "let --output replace a file", requires=("output", "report")),
