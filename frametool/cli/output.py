@@ -45,13 +45,15 @@ BLOCK = 1 << 13  # poses of a trajectory
 class Output:
     """Where results go and how they look: what the options of a command say."""
 
+    marks: tuple[str, ...] = (ZEROS,)  # patterns of what has a style in text on a terminal
+    _fault: FrametoolError | None = None  # ends a stream behind its good rows
+
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe.
 
         otherwise: the form that stands in the place of these two
         """
         self._inputs = inputs
-        self._fault: FrametoolError | None = None  # ends a stream behind its good rows
         self.path: str | None = inputs.output
         self.force: bool = self.path is not None and inputs.force
         told: str | None = inputs.format_name
@@ -59,7 +61,6 @@ class Output:
             from frametool.formats.unsupported import refuse_suffix
 
             refuse_suffix(self.path)
-        self.marks: tuple[str, ...] = (ZEROS,)  # patterns of what has a style in text on a terminal
         self.told = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
         if inputs.peek("origin") is not None or any(each.representation.is_place for each in notations):
@@ -75,12 +76,11 @@ class Output:
         self.holds_all = self._in_blocks or form == "csv"  # rows, of which there may be many
         if self._holds_arrays and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
-        machine = form not in ("text", "dot", "mermaid")  # a drawing chooses what a person looks for
-        chosen = notations or ((notation("quaternion"),) if machine else ())
+        usual = () if form in ("text", "dot", "mermaid") else (notation("quaternion"),)  # drawings choose their own
         digits = inputs.peek("precision")
         self.style = Style(
-            form, chosen, degrees=bool(inputs.deg), precision=None if digits == FULL else digits, full=digits == FULL,
-            keep_sign=bool(inputs.keep_sign),
+            form, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
+            full=digits == FULL, keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
         self.style.screen = form == "text" and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)

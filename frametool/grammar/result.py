@@ -87,8 +87,7 @@ class Style:
             form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
             keep_sign=self.keep_sign,
         )  # fmt: skip
-        style.axes, style.in_camera, style.in_cm = self.axes, self.in_camera, self.in_cm
-        style.screen = self.screen and form == self.form
+        style.axes, style.in_camera, style.in_cm, style.screen = self.axes, self.in_camera, self.in_cm, self.screen
         style.recording = self.recording
         style.put_at(self.place)
         return style
@@ -107,9 +106,8 @@ class Style:
         """Write a finite number: shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        if self.precision is not None:
-            return f"{value:z.{self.precision}f}"
-        return repr(_nine_digits(value) if self.screen and not self.full else value + 0.0)
+        value = value + 0.0 if self.full or not self.screen or self.form != "text" else _nine_digits(value)
+        return repr(value) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
         """Tell whether a notation's angles are written in degrees: its own suffix wins."""

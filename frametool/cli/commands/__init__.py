@@ -161,8 +161,7 @@ def called(arguments: list[str]) -> object:
 
         answer(group, COMPLETION, instruction, " ".join(arguments))
         return 0
-    widest = 100 if sys.stdout.isatty() else 80
-    with group.make_context("frametool", arguments, max_content_width=widest) as ctx:
+    with group.make_context("frametool", arguments, max_content_width=100 if sys.stdout.isatty() else 80) as ctx:
         return group.invoke(ctx)
 
 
