@@ -236,17 +236,17 @@ def column_name(text: str) -> str:
 
 
 def needs_time(tree: Branch) -> bool:
-    """Tell whether an expression looks up at the time of the row."""
+    """Return True if an expression looks up at the time of the row."""
     return any(branch.kind == "lookup" and branch.value[2] == "row" for branch in walk(tree))
 
 
 def reads_row(tree: Branch) -> bool:
-    """Tell whether an expression reads the row's own pose, point or vector."""
+    """Return True if an expression reads the row's own pose, point or vector."""
     return any(branch.kind == "name" and branch.value == "row" for branch in walk(tree))
 
 
 def mentions_row(tree: Branch) -> bool:
-    """Tell whether an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
+    """Return True if an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
     return reads_row(tree) or bool(columns_of(tree)) or needs_time(tree)
 
 

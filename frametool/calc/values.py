@@ -154,5 +154,5 @@ def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
 
 
 def meet(a: str | None, b: str | None) -> bool:
-    """Tell whether two frames can be one."""
+    """Return True if two frames can be one."""
     return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)

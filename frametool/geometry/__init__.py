@@ -1,1 +1,1 @@
-"""The core math: knows numbers only, no names, no text, no files."""
+"""Math on numbers: rotations, poses, Euler angles, cameras, covariances, positions on the Earth; no names, no files."""

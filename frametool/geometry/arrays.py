@@ -1,7 +1,7 @@
-"""The functions kernels find in `xp` when their components are numpy arrays, and the walk over long ones in blocks.
+"""The functions that kernels find in `xp` for numpy arrays, and the loop over long arrays in blocks.
 
-The array that a caller wants results in may have any strides, and may lie where the input lies: the results are those
-of a fresh array all the same.  The only module of the core that needs numpy at import.
+An output array passed by the caller may have any strides and may overlap the input; the results are the same as for a
+new array.  This is the only module of the core that imports numpy at import time.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Condition, Four, Indices, Kernel, Number, Two
 
-BLOCK = 16384  # rows: numpy's calls cost little beside their work, and the temporaries of a kernel stay in the cache
-WIDE = 12  # columns in and out: kernels with more have more temporaries, and get three quarters of the rows
+BLOCK = 16384  # rows: amortises the cost of numpy calls, and a kernel's temporaries stay in the cache
+WIDE = 12  # columns in and out: kernels with more have more temporaries and get three quarters of the rows
 SIGN_BIT = np.int64(-(2**63))
-np.empty(2**21)  # 16 MiB given back untouched: from then on glibc reuses the memory of blocks instead of mapping anew
+np.empty(2**21)  # allocate and free 16 MiB once: glibc then reuses the memory of blocks instead of mapping it again
 
 
 def furthest(x: Array, centre: float = 0.0) -> float:
-    """Return how far the furthest value is from a number, NaN if one is NaN.
+    """Return the largest distance of a value from a number, NaN if one value is NaN.
 
-    The guard of all kernels: a minimum and a maximum cost 0.13 ns a row each, half of `abs` and its maximum, and
-    say of finiteness, norm and magnitude at once all that a block needs where nothing is odd.
+    All kernels use it as a guard: minimum and maximum cost 0.13 ns per row each, half of `abs` and its maximum, and
+    check finiteness, norm and magnitude at once, which is all that a regular block needs.
     """
     values = np.asarray(x)
     least, most = values.min(initial=centre), values.max(initial=centre)
@@ -44,14 +44,14 @@ def furthest(x: Array, centre: float = 0.0) -> float:
 
 
 def mask(condition: Condition) -> Any:
-    """Return what `where` needs of a condition, made once for several choices."""
+    """Return what `where` needs of a condition, computed once for several choices."""
     return condition if isinstance(condition, bool) else -condition.astype(np.int64)
 
 
 def where(condition: Any, yes: Array | float, no: Array | float) -> Array:
     """Choose element by element, by a condition or its `mask`.
 
-    By bits: `np.where` branches, which costs 4 ns where neighbours differ; this 0.9, or 0.5 by a mask.
+    On the bits: `np.where` branches, which costs 4 ns where neighbours differ; this costs 0.9, or 0.5 with a mask.
     """
     if isinstance(condition, (bool, np.bool_)):
         return np.where(condition, yes, no)
@@ -63,17 +63,17 @@ def where(condition: Any, yes: Array | float, no: Array | float) -> Array:
 
 
 def least(x: Array) -> float:
-    """Return the least value, NaN if one is NaN."""
+    """Return the minimum, NaN if one value is NaN."""
     return float(np.asarray(x).min(initial=np.inf))
 
 
 def some(condition: Condition) -> bool:
-    """Tell whether a condition holds anywhere; the method of arrays costs half of `np.any`."""
+    """Return True if a condition holds anywhere; the method of arrays costs half of `np.any`."""
     return condition if isinstance(condition, bool) else bool(condition.any())
 
 
 def copysign(size: Array | float, sign: Array) -> Array:
-    """Return numbers of a size, which is not negative, and a sign; by bits it costs half of `np.copysign`."""
+    """Return numbers with a magnitude >= 0 and the sign of another; on the bits this costs half of `np.copysign`."""
     return (_sign_bits(sign) | np.asarray(size, np.float64).view(np.int64)).view(np.float64)
 
 
@@ -84,7 +84,7 @@ def _sign_bits(x: Array | float) -> Indices:
 
 
 def first_nonzero(*values: Array) -> Array:
-    """Return element by element the first value that is not zero, or the last."""
+    """Return element by element the first non-zero value, or the last value."""
     found = values[0]
     for value in values[1:]:
         if np.asarray(found).all():
@@ -94,9 +94,9 @@ def first_nonzero(*values: Array) -> Array:
 
 
 def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:
-    """Return q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0.
+    """Return q or -q such that w > 0, or w == 0 and the first non-zero of x, y, z is positive; no -0 where negated.
 
-    Flipping bits costs 0.2 ns a number, `where` 0.85.  The zero that is added is +0 where the sign was flipped, and
+    Flipping bits costs 0.2 ns per number, `where` 0.85.  The added zero is +0 where the sign was flipped, and
     -0 elsewhere, which changes nothing.
     """
     flip = _sign_bits(first_nonzero(w, x, y, z))
@@ -112,7 +112,7 @@ def canonical_sign(x: Array, y: Array, z: Array, w: Array) -> Four[Array]:
 def doubled_sincos(y: Array) -> Two[Array]:
     """Return sine and cosine of 2y, |y| <= pi/4.
 
-    The rounding of sin y is added to its square, so that the cosine of a right angle vanishes to half an eps.
+    The rounding error of sin y is added to its square, so that the cosine of a right angle vanishes to half an eps.
     """
     squared = y * y
     bend = floats.polynomial(squared, floats.SINE)
@@ -137,7 +137,7 @@ def doubled_sincos(y: Array) -> Two[Array]:
 
 
 def doubled_arctan(tangent: Array) -> Array:
-    """Return 2 atan(t), |t| <= 1, at most 1 eps off; of 1 it is pi/2 to the bit."""
+    """Return 2 atan(t), |t| <= 1, at most 1 eps off; exactly pi/2 for t = 1."""
     squared = tangent * tangent
     rest = floats.polynomial(squared, floats.ARC_ABOVE)
     rest /= floats.monic_polynomial(squared, floats.ARC_BELOW)
@@ -149,9 +149,9 @@ def doubled_arctan(tangent: Array) -> Array:
 
 
 def reduced_exactly(x: Array) -> Two[Array]:
-    """Return what is left of angles less the nearest whole numbers of quarter turns, and those numbers modulo 2.
+    """Return angles minus the nearest multiples of a quarter turn, and these multiples modulo 2.
 
-    Rows near enough for `floats.reduced` have what they have among their like.
+    Rows that are small enough for `floats.reduced` give the same bits as with it.
     """
     x = np.atleast_1d(x)
     rest, turns = floats.reduced(x)
@@ -171,9 +171,9 @@ def run(kernel: Kernel, count: int, parts: Components, *args: object) -> Compone
 def rows(
     kernel: Kernel, inner: tuple[int, ...], parts: Components, *args: object, out: Array | None = None
 ) -> Array:
-    """Apply a kernel to components; return rows (..., *inner), in `out` where the caller gives one.
+    """Apply a kernel to components; return rows (..., *inner), in `out` if the caller passes it.
 
-    Where rows are written over components that are still to be read, a fresh array is made first.
+    If `out` overlaps components that are still to be read, the result is computed in a new array first.
     """
     shape = (*batch_shape(parts), *inner)
     if out is not None:
@@ -192,10 +192,10 @@ def rows(
 
 
 def batch_shape(parts: Components) -> tuple[int, ...]:
-    """Return the shape components broadcast to.
+    """Return the shape to which components broadcast.
 
     Raises:
-        ValueInvalid: they do not.
+       ValueInvalid: they do not broadcast.
     """
     shapes: dict[tuple[int, ...], None] = dict.fromkeys(getattr(part, "shape", ()) for part in parts)
     if len(shapes) == 1:
@@ -207,7 +207,7 @@ def batch_shape(parts: Components) -> tuple[int, ...]:
 
 
 def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *args: object) -> None:
-    """Fill flat targets block by block with what the kernel makes of the parts."""
+    """Fill flat targets block by block with the results of a kernel."""
     with np.errstate(all="ignore"):
         for place, block in cut(parts, len(targets)):
             for target, result in zip(targets, kernel(*block, *args), strict=True):
@@ -215,9 +215,9 @@ def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *a
 
 
 def guarded(kernel: Kernel, complain: Callable[[], object]) -> Kernel:
-    """Watch a kernel's results for what is not finite.
+    """Watch a kernel's results for values that are not finite.
 
-    `complain` then looks at the input itself, raises if that is to blame, and else lets pass.
+    `complain` then checks the input itself and raises an error if the input is the reason.
     """
 
     def watched(*block: object) -> Components:
@@ -230,17 +230,17 @@ def guarded(kernel: Kernel, complain: Callable[[], object]) -> Kernel:
 
 
 def all_finite(results: Components) -> bool:
-    """Tell whether all results are finite, by the first and the last: what goes wrong in a row shows in one of them."""
+    """Return True if all results are finite; the first and the last suffice: an error in a row shows in one of them."""
     return math.isfinite(np.asarray(results[0]).sum() + np.asarray(results[-1]).sum())
 
 
 def finite_throughout(parts: Components) -> bool:
-    """Tell whether all components are finite."""
+    """Return True if all components are finite."""
     return all(np.isfinite(np.min(part)) and np.isfinite(np.max(part)) for _, block in cut(parts, 0) for part in block)
 
 
 def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
-    """Cut components, flat, into blocks of contiguous float64 for a kernel that fills so many targets."""
+    """Cut flat components into blocks of contiguous float64 for a kernel that fills this many targets."""
     shape = batch_shape(parts)
     columns = [_flat(part, shape) if isinstance(part, np.ndarray) else float(part) for part in parts]
     for start, stop in blocks(int(np.prod(shape)), len(parts) + targets):
@@ -248,7 +248,7 @@ def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
 
 
 def _flat(part: Array, shape: tuple[int, ...]) -> Array:
-    """Return a column of a shape as one axis; the calls that most columns need not cost microseconds each."""
+    """Return a column of a shape as one axis; without the calls that most columns do not need (microseconds each)."""
     if part.shape != shape:
         part = np.broadcast_to(part, shape)
     return part if part.ndim == 1 else part.reshape(-1)
@@ -262,12 +262,12 @@ def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:
 
 
 def _cut(column: Number, start: int, stop: int) -> Number:
-    """Return a block of a column as contiguous float64; a float stands for every row."""
+    """Return a block of a column as contiguous float64; a float is used for every row."""
     return column if isinstance(column, float) else np.ascontiguousarray(column[start:stop], dtype=np.float64)
 
 
 def require_fitting(out: object, shape: tuple[int, ...]) -> None:
-    """Raise ValueInvalid unless `out` is a numpy array of float64, writable and of this shape."""
+    """Raise ValueInvalid unless `out` is a writable numpy array of float64 of this shape."""
     if not isinstance(out, np.ndarray):
         found = f"a {type(out).__name__}"
     elif out.dtype != np.float64:
@@ -282,8 +282,8 @@ def require_fitting(out: object, shape: tuple[int, ...]) -> None:
 
 
 def flat_columns(out: Array, axes: int) -> Sequence[Array] | None:
-    """Return flat views of each component of rows that fill the last axes; None where strides allow no such view."""
-    out, shape = out.view(np.ndarray), out.shape[out.ndim - axes :]  # of a np.matrix no component has one axis
+    """Return flat views of each component of rows that fill the last axes; None if the strides allow no such view."""
+    out, shape = out.view(np.ndarray), out.shape[out.ndim - axes :]  # a component of a np.matrix would have two axes
     if out.flags.c_contiguous:
         return list(out.reshape(-1, int(np.prod(shape))).T)
     columns = [out[(..., *place)].reshape(-1) for place in np.ndindex(*shape)]
@@ -291,12 +291,12 @@ def flat_columns(out: Array, axes: int) -> Sequence[Array] | None:
 
 
 def shares_memory(out: Array, parts: Components) -> bool:
-    """Tell whether writing to `out` changes components that are arrays."""
+    """Return True if writing to `out` changes components that are arrays."""
     return any(not isinstance(part, float) and np.shares_memory(out, part) for part in parts)
 
 
 def in_step(out: Array, axes: int, parts: Components) -> bool:
-    """Tell whether components are those of `out` itself, in their order: a row is read before it is written."""
+    """Return True if the components are those of `out` itself, in order: each row is read before it is written."""
     own = [out[(..., *place)] for place in np.ndindex(*out.shape[out.ndim - axes :])]
     return len(own) == len(parts) and all(_place(part) == _place(mine) for part, mine in zip(parts, own, strict=True))
 

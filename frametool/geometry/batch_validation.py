@@ -1,6 +1,6 @@
-"""Check and convert many rotations at once: which rows are none and why, and which were normalised.
+"""Check and convert many rotations at once: which rows are invalid and why, and which were normalised.
 
-The rules are those of one rotation (`Representation.checked`), which also words what is said of a row.
+The rules are those for a single rotation (`Representation.checked`), which also words the error of a row.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ NONE = np.empty(0, np.int64)
 
 
 class Rotations(NamedTuple):
-    """Unit quaternions of n rows, the reasons of those that are no rotation, and the rows that were normalised.
+    """Unit quaternions of n rows, the reasons why rows are invalid, and the rows that were normalised.
 
-    off: how far the worst row was from a rotation, of those that are not refused
+    off: the largest deviation from a rotation among the accepted rows
     """
 
     quaternions: Components
@@ -39,7 +39,7 @@ class Rotations(NamedTuple):
 def read_rotations(
     notation: Notation, numbers: Sequence[Array], *, degrees: bool = False, normalize: bool = False
 ) -> Rotations:
-    """Return the quaternions of rows of numbers in column order; the identity stands for rows that are no rotation."""
+    """Return the quaternions of rows of numbers in column order; invalid rows get the identity."""
     given = tuple(numbers)
     quaternions = np.empty((4, int(np.prod(arrays.batch_shape(given)))))
     off, worst = _convert(notation, given, quaternions, degrees=degrees, normalize=normalize)
@@ -54,12 +54,12 @@ def read_rotations(
 def require_rotations(
     notation: Notation, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
 ) -> Components:
-    """Return the quaternions of columns of any shape; warn once for all rows that were normalised.
+    """Return the quaternions of columns of any shape; warn once about all rows that were normalised.
 
-    into: where they are to stand, (4, ...) of the shape of the columns, contiguous
+    into: output array (4, ...) of the shape of the columns, contiguous
 
     Raises:
-        ValueInvalid: naming the first row that is no rotation, and how many there are.
+       ValueInvalid: rows are not rotations; names the first one and how many there are.
     """
     shape = arrays.batch_shape(given)
     made = np.empty((4, *shape)) if into is None else into
@@ -72,7 +72,7 @@ def require_rotations(
 def _convert(
     notation: Notation, given: Components, quaternions: Array, *, degrees: bool, normalize: bool
 ) -> tuple[Array | None, float]:
-    """Fill quaternions (4, n); return how far each row is off (inf: refused; None: no row needs a word), the worst."""
+    """Fill quaternions (4, n); return the deviation per row (inf: refused; None: nothing to report) and the worst."""
     off, worst = None, 0.0
     with np.errstate(all="ignore"):
         for place, block in arrays.cut(given, 4):
@@ -92,7 +92,7 @@ def _convert(
 def _repaired(
     rule: BatchRule | None, block: Components, *, normalize: bool
 ) -> tuple[Array | None, Components, float]:
-    """Return how far the rows of a block are off, None if no row needs a word; the block made rotations; the worst."""
+    """Return the deviations of a block's rows (None: nothing to report), the block made rotations, and the worst."""
     if rule is None:
         return None, block, 0.0
     worst = rule.furthest(*block, arrays)
@@ -108,7 +108,7 @@ def _repaired(
 
 
 def _with_repaired(rule: BatchRule, block: Components, rough: Indices) -> Components:
-    """Replace the rough rows of a block by rotations."""
+    """Replace the rows of a block that deviate by rotations."""
     if len(rough) == len(block[0]):
         return rule.repair(*block, arrays)
     after = tuple(column.copy() for column in block)
@@ -118,16 +118,16 @@ def _with_repaired(rule: BatchRule, block: Components, rough: Indices) -> Compon
 
 
 def _reason(notation: Notation, row: Sequence[float], normalize: bool) -> str:  # noqa: FBT001
-    """Say why one row is no rotation."""
+    """Return the reason why a row is not a rotation."""
     try:
         notation.representation.checked([float(part) for part in row], normalize=normalize)
     except ValueInvalid as error:
         return str(error)
-    return "the numbers are no rotation"
+    return "the numbers are not a rotation"
 
 
 def _refuse_or_warn(notation: Notation, given: Components, name: str, off: Array, *, normalize: bool) -> None:
-    """Raise for the first row that is refused; warn once for those off beyond silence."""
+    """Raise for the first row that is refused; warn once about those that deviate too much to be silent."""
     rule = notation.representation.batch
     bad, odd = off == np.inf, off > SILENT
     if bad.any():

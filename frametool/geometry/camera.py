@@ -1,11 +1,12 @@
-"""Cameras: the models of lenses with their kernels both ways, and the value of one camera.
+"""Cameras: lens models with their kernels both ways, and the value of one camera.
 
-A kernel takes points in optical axes (x right, y down, z forward) to the plane at distance 1, or places in that plane
-back to directions; K makes pixels of the plane.  u right, v down, the centre of the first pixel is 0, 0.  Where a model
-does not hold there is no number: NaN.  Floats and arrays give the same bits; floats load no numpy.  Knows no files.
+A kernel projects points in optical axes (x right, y down, z forward) to the plane z = 1, or turns positions in it
+back into directions; K maps the plane to pixels.  u right, v down, the centre of the first pixel is 0, 0.  Where a
+model is not valid the result is NaN.  Floats and arrays give the same bits; floats do not import numpy.  Knows no
+files.
 
-Nine models have three kernels each way: the plane of a pinhole is that of `omni` without xi, `ds` is `eucm` seen from
-another centre, `fov` an equidistant lens whose points are stretched before and whose plane is shrunk after.
+Nine models share three pairs of kernels: the pinhole is `omni` without xi, `ds` is `eucm` with another centre, `fov` is
+an equidistant lens with points stretched before and the plane scaled after.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ if TYPE_CHECKING:
     Seen = tuple[N, N, Condition]
     Found = tuple[N, N, N, Condition]
 
-STEEPEST = 1e8  # of (r/z)^2, 89.994 degrees: where a distortion grows up to there it is endless
-REACH = 1e4  # of r/z, where the search for an endless one begins
-AXES = {  # optical axes from those that a camera's frame may have
+STEEPEST = 1e8  # (r/z)^2 at 89.994 degrees: a distortion that grows up to there is taken to grow without end
+REACH = 1e4  # r/z where the search for such a distortion begins
+AXES = {  # optical axes from those of a camera's frame
     "optical": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
     "opengl": (1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0),
     "flu": (0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0),
@@ -44,8 +45,8 @@ RANGES = {"xi": (-0.999999, inf), "alpha": (0.0, 1.0), "beta": (TINY, inf), "w":
 class Lens(NamedTuple):
     """The parameters of a model.
 
-    D: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, or k1 k2 k3 k4 of equidistant; zeros fill it up
-    stretch: of fov, 2 tan(w/2); end: r/z or the angle up to which the model holds
+    D: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, or k1 k2 k3 k4 of equidistant; filled up with zeros
+    stretch: of fov, 2 tan(w/2); end: r/z or the angle up to which the model is valid
     """
 
     D: tuple[float, ...]
@@ -73,7 +74,7 @@ def _slope(coefficients: Sequence[float]) -> list[float]:
 
 
 def _roots(coefficients: Sequence[float], top: float) -> list[float]:
-    """Return where a polynomial changes its sign in (0, top], rising: between the roots of its derivative."""
+    """Return where a polynomial changes its sign in (0, top], ascending: between the roots of its derivative."""
     if not any(coefficients[1:]):
         return []
     found = []
@@ -87,7 +88,7 @@ def _roots(coefficients: Sequence[float], top: float) -> list[float]:
 
 
 def _brown_end(d: Sequence[float]) -> float:
-    """Return r at which r times the radial factor stops growing, or that has a pole."""
+    """Return r at which r times the radial factor stops growing or has a pole."""
 
     def times(a: Sequence[float], b: Sequence[float]) -> list[float]:
         return [sum(a[i] * b[k - i] for i in range(k + 1) if i < len(a) and k - i < len(b)) for k in range(7)]
@@ -99,20 +100,20 @@ def _brown_end(d: Sequence[float]) -> float:
 
 
 def _equidistant_end(d: Sequence[float]) -> float:
-    """Return the angle at which its polynomial stops growing, at most pi."""
+    """Return the angle at which the polynomial stops growing, at most pi."""
     return min([*map(sqrt, _roots(_angle_slope(d), pi * pi)), pi])
 
 
-# ---------------------------------------------------------------- distortions in the plane, and out of them
+# ---------------------------------------------------------------- distortion and undistortion in the plane
 
 
 def _divisor(value: N, xp: Functions[N]) -> N:
-    """Return numbers to divide by: none is 0, at which floats raise."""
+    """Return numbers to divide by, without 0, which raises an error for floats."""
     return xp.where(abs(value) > TINY, value, TINY)
 
 
 def _brown(a: N, b: N, d: Sequence[float], xp: Functions[N]) -> Six[N]:
-    """Return where a place in the plane comes to lie (Brown 1966, as OpenCV has it), and how that goes with a and b."""
+    """Return the distorted position in the plane (Brown 1966, as in OpenCV) and its derivatives by a and b."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = d
     s = a * a + b * b
     m = _divisor(1.0 + s * (k4 + s * (k5 + s * k6)), xp)
@@ -127,7 +128,7 @@ def _brown(a: N, b: N, d: Sequence[float], xp: Functions[N]) -> Six[N]:
 
 
 def _radial(r: N, d: Sequence[float], xp: Functions[N]) -> Two[N]:
-    """Return r times the radial factor, and how fast that grows."""
+    """Return r times the radial factor, and its derivative."""
     k1, k2, _, _, *rest = d[:8]
     x, _, slope, *_ = _brown(r, 0.0 * r, (k1, k2, 0.0, 0.0, *rest, 0.0, 0.0, 0.0, 0.0), xp)
     return x, slope
@@ -138,12 +139,12 @@ def _angle_slope(d: Sequence[float]) -> tuple[float, ...]:
 
 
 def _angular(t: N, d: Sequence[float], _xp: Functions[N]) -> Two[N]:
-    """Return the polynomial of equidistant at an angle, and how fast it grows."""
+    """Return the polynomial of equidistant at an angle, and its derivative."""
     return t * _horner((1.0, *d[:4]), t * t), _horner(_angle_slope(d), t * t)
 
 
 def _inverse(grown: Callable[..., Any], y: N, d: Sequence[float], top: float, tolerance: float, xp: Functions[N]) -> N:
-    """Return where in 0 to the top a growing function has a value: Newton, kept in a bracket that shrinks."""
+    """Invert a growing function on 0 to the top: Newton's method, safeguarded by a shrinking bracket."""
     low, high, t = 0.0 * y, 0.0 * y + top, xp.minimum(y, top)
     for _ in range(60):
         value, slope = grown(t, d, xp)
@@ -158,9 +159,10 @@ def _inverse(grown: Callable[..., Any], y: N, d: Sequence[float], top: float, to
 
 
 def _undistorted(x: N, y: N, lens: Lens, xp: Functions[N]) -> Seen[N]:
-    """Return the place in the plane that is distorted to this one, and whether there is one below the end, to 1e-12.
+    """Return the undistorted position in the plane, to 1e-12, and whether there is one where the model is valid.
 
-    Radially first, then by Newton's steps in two dimensions, each a third of the way from the centre at most.
+    First along the radius, then by Newton's steps in two dimensions, each at most a third of the distance to the
+    centre.
     """
     if not any(lens.D):
         return x, y, x == x  # noqa: PLR0124 - False of NaN, for floats and arrays
@@ -210,7 +212,7 @@ def _omni_limit(lens: Lens) -> float:
 
 
 def _omni_angle(lens: Lens) -> float:
-    """Return the angle at which points have no image, or at which the distortion ends."""
+    """Return the angle at which points have no image, or at which the model ends."""
     x, _, z, found = _from_omni(min(lens.end, STEEPEST), 0.0, lens._replace(D=()), floats)
     return min(acos(-_omni_limit(lens)), atan2(x, z) if found and lens.end < inf else pi)
 
@@ -258,13 +260,13 @@ def _from_equidistant(a: N, b: N, lens: Lens, xp: Functions[N]) -> Found[N]:
 
 
 class CameraModel(NamedTuple):
-    """A model of a lens.
+    """A lens model.
 
-    aliases: its other names; parameters: names of those that are not in D
-    coefficients: how many numbers its D may have; none are zeros
-    to_plane: kernel: x, y, z, lens, xp -> a, b, whether it holds there
-    from_plane: kernel: a, b, lens, xp -> a direction x, y, z of any length, whether there is one
-    end: D -> where the model ends, as Lens has it; end_angle: lens -> from the optical axis on, in radians
+    aliases: other names; parameters: names of those that are not in D
+    coefficients: the possible sizes of D; missing ones are zeros
+    to_plane: kernel: x, y, z, lens, xp -> a, b, and whether it is valid there
+    from_plane: kernel: a, b, lens, xp -> a direction x, y, z of any length, and whether there is one
+    end: D -> `Lens.end`; end_angle: lens -> the largest angle from the optical axis, radians
     """
 
     aliases: tuple[str, ...]
@@ -294,15 +296,15 @@ CAMERA_MODELS = {
 
 
 class Camera:
-    """One camera; frozen.
+    """One camera; immutable.
 
-        camera = Camera("plumb_bob", [500.0, 500.0, 319.5, 239.5], [-0.3, 0.1, 0.0, 0.0], (640, 480))
-        pixels, depth = camera.project(points)      # (.., 3) -> (.., 2), (..); NaN where there is no pixel
-        rays = camera.unproject(pixels)             # unit directions; with depth= or range= points
+       camera = Camera("plumb_bob", [500.0, 500.0, 319.5, 239.5], [-0.3, 0.1, 0.0, 0.0], (640, 480))
+       pixels, depth = camera.project(points)      # (.., 3) -> (.., 2), (..); NaN where there is no pixel
+       rays = camera.unproject(pixels)             # unit directions; with depth= or range= points
 
-    end_angle: from the optical axis on, in radians; beyond it there are no pixels
-    numbers: fx, fy, cx, cy, skew; fields: what the constructor takes
-    Methods whose names end in `_of` take and return components: floats, which load no numpy, or arrays.
+    end_angle: the largest angle from the optical axis, in radians; beyond it there are no pixels
+    numbers: fx, fy, cx, cy, skew; fields: the arguments of the constructor
+    Methods whose names end in `_of` take and return components: floats, which do not import numpy, or arrays.
     """
 
     model: str
@@ -319,13 +321,13 @@ class Camera:
         self, model: str | None, K: Any, D: Any = (), size: Any = None, *, skew: float = 0.0, axes: str = "optical",  # noqa: N803
         R: Any = None, P: Any = None, turn: Any = None, shift: Vector = (0.0, 0.0, 0.0), **parameters: float | None,  # noqa: N803
     ) -> None:  # fmt: skip
-        """Check and keep what a camera is.
+        """Check the parameters of a camera.
 
-        model: a name of `CAMERA_MODELS` or an alias; None: by the parameters and how many numbers D has
+        model: a name of `CAMERA_MODELS` or an alias; None: inferred from the parameters and the size of D
         K: fx, fy, cx, cy or 3 rows of 3, in pixels; skew is K[0][1]; D: the distortion; size: width and height
-        axes: those of the frame that points are seen in: optical, opengl or flu
-        R, P: 9 and 12 numbers that make the rectified picture; parameters: xi, alpha, beta, w, as the model has them
-        turn, shift: 9 numbers that rotate points in optical axes, metres that are added then: of rectified cameras
+        axes: those of the frame in which points are expressed: optical, opengl or flu
+        R, P: 9 and 12 numbers of the rectified image; parameters: xi, alpha, beta, w, as the model needs them
+        turn, shift: for rectified cameras, 9 numbers that rotate points in optical axes, then a translation in metres
         Raises ValueInvalid.
         """
         d = _numbers(D, "D")
@@ -351,16 +353,16 @@ class Camera:
         )  # fmt: skip
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Refuse to change."""
+        """Raise AttributeError: a camera is immutable."""
         raise AttributeError(f"a camera is frozen; {name} cannot be set")
 
     def __repr__(self) -> str:
-        """Show what it is made of."""
+        """Show the arguments of the constructor."""
         return f"Camera({', '.join(f'{name}={value!r}' for name, value in self.mapping().items())})"
 
     @property
     def K(self) -> Array:  # noqa: N802 - as everybody calls it
-        """The matrix of the pinhole, 3 x 3, in pixels."""
+        """The camera matrix, 3 x 3, in pixels."""
         import numpy as np
 
         return np.array(self._rows())
@@ -370,25 +372,25 @@ class Camera:
         return [[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
 
     def mapping(self) -> dict[str, Any]:
-        """Return it as `camera:` of a tree has it."""
+        """Return the camera as the mapping under `camera:` in a tree."""
         usual: tuple[Any, ...] = (0.0, "optical", [], None, (0.0, 0.0, 0.0))
         return {name: value for name, value in self.fields.items() if value not in usual or name in ("xi", "alpha")}
 
-    # --- cameras made of it ---
+    # --- cameras derived from it ---
 
     def changed(self, **fields: Any) -> Camera:
-        """Return one that differs in something that the constructor takes."""
+        """Return a copy with other arguments of the constructor."""
         return Camera(**{**self.fields, **fields})
 
     def flat(self) -> Camera:
-        """Return the pinhole of its K: its picture without distortion."""
+        """Return the pinhole camera with the same K: the image without distortion."""
         return self.changed(model="pinhole", D=(), **dict.fromkeys(CAMERA_MODELS[self.model].parameters))
 
     def rectified(self, *, from_first: bool = False) -> Camera:
-        """Return the camera of the rectified picture: R turns the points, then P's 3 x 3, no distortion.
+        """Return the camera of the rectified image: R rotates the points, P's 3 x 3 projects them, without distortion.
 
-        from_first: points are those of the first camera's rectified frame: P [X; 1], without R
-        Raises ValueInvalid where P is not known.
+        from_first: points are in the first camera's rectified frame: P [X; 1], without R
+        Raises ValueInvalid if P is not known.
         """
         if not (p := self.fields["P"]):
             raise ValueInvalid("the rectified picture is not known: the camera has no P")
@@ -402,9 +404,9 @@ class Camera:
         return flat.changed(shift=((p[3] - cx * p[11] - skew * down) / fx, down, p[11]))
 
     def scaled(self, size: Sequence[int]) -> Camera:
-        """Return the camera of the picture in another size of the same shape; raises ValueInvalid for another shape.
+        """Return the camera of the image resized with the same aspect ratio; raises ValueInvalid for another ratio.
 
-        Where the camera has no size yet it gets this one.
+        A camera without a size gets this one.
         """
         width, height = _size(size)
         known = self.size or (width, height)
@@ -414,7 +416,7 @@ class Camera:
         return self.resampled((across, down), (0.5 * across - 0.5, 0.5 * down - 0.5), (width, height))
 
     def resampled(self, scale: Two[float], shift: Two[float], size: Sequence[int] | None) -> Camera:
-        """Return the camera of a picture whose pixels are scaled and then shifted."""
+        """Return the camera of an image whose pixels are scaled and then shifted."""
 
         def moved(rows: list[list[float]]) -> list[list[float]]:
             *upper, last = rows
@@ -427,15 +429,15 @@ class Camera:
     # --- components ---
 
     def pixels_of(self, x: Number, y: Number, z: Number) -> Vector:
-        """Return u, v and the depth, z in optical axes, of points; u and v are NaN where there is no pixel."""
+        """Return u, v and the depth (z in optical axes) of points; u and v are NaN where there is no pixel."""
         return validation.run(self._project, 3, (x, y, z))
 
     def rays_of(self, u: Number, v: Number) -> Vector:
-        """Return unit directions x, y, z of pixels, in the axes of the camera's frame; NaN where there is none."""
+        """Return unit directions x, y, z of pixels, in the camera's frame; NaN where there is none."""
         return validation.run(self._ray, 3, (u, v))
 
     def points_of(self, u: Number, v: Number, depth: Number = None, range: Number = None) -> Vector:  # noqa: A002
-        """Return points x, y, z in the camera's frame of pixels and their depth, or their range from the camera."""
+        """Return points x, y, z in the camera's frame from pixels and depth, or distance from the camera."""
         return validation.run(partial(self._point, range is None), 3, (u, v, depth if range is None else range))
 
     def plane_points_of(self, u: Number, v: Number, plane_from_camera: Rigid, height: Number = 0.0) -> Vector:
@@ -446,19 +448,20 @@ class Camera:
         return validation.run(self._on_plane, 3, (u, v, height, *plane_from_camera))
 
     def undistorted_of(self, u: Number, v: Number, into: Camera | None = None) -> Two[Number]:
-        """Return where pixels are in the picture of another camera in the same place; otherwise as `undistort`."""
+        """Return pixels in the image of another camera at the same position; otherwise as `undistort`."""
         return (into or self.flat()).pixels_of(*self.rays_of(u, v))[:2]
 
     def is_in_image(self, u: Number, v: Number) -> Any:
-        """Return whether pixels lie in the picture; raises ValueInvalid where it has no size."""
+        """Return True for pixels inside the image; raises ValueInvalid if the camera has no size."""
         if self.size is None:
             raise ValueInvalid("the size of the picture is not known; give it")
         return (u >= -0.5) & (u < self.size[0] - 0.5) & (v >= -0.5) & (v < self.size[1] - 0.5)
 
     def is_behind(self, depth: Number) -> Any:
-        """Return whether points without a pixel have none because they are behind the camera.
+        """Return True for points without a pixel that are behind the camera.
 
-        The others lie beyond the model, `end_angle` from the axis; of a model that looks back all do.
+        The others are outside the valid range of the model, `end_angle` from the axis; so are all if the model sees
+        backwards.
         """
         return (depth <= 0.0) & (self.end_angle <= 0.5 * pi)
 
@@ -467,15 +470,15 @@ class Camera:
     def project(self, points: Numbers) -> tuple[Array, Any]:
         """Return pixels (.., 2) and depths (..) of points (.., 3) in the camera's frame.
 
-        The depth is z in optical axes.  Pixels are NaN behind the camera and where the model does not hold.
+        The depth is z in optical axes.  Pixels are NaN behind the camera and where the model is not valid.
         """
         *pixels, depth = self.pixels_of(*_columns(points, 3, "points"))
         return validation.stacked((*pixels,)), depth
 
     def unproject(self, pixels: Numbers, depth: Numbers | None = None, range: Numbers | None = None) -> Array:  # noqa: A002
-        """Return unit directions (.., 3) of pixels (.., 2) in the camera's frame; points where more is known.
+        """Return unit directions (.., 3) of pixels (.., 2) in the camera's frame; points if depth or range is set.
 
-        depth: z in optical axes; range: the distance from the camera.  NaN where there is none.
+        depth: z in optical axes; range: the distance from the camera.  NaN where there is no direction.
         """
         u, v = _columns(pixels, 2, "pixels")
         given = (("depth", depth), ("range", range))
@@ -485,20 +488,20 @@ class Camera:
         return validation.stacked(self.points_of(u, v, **far) if far else self.rays_of(u, v))
 
     def on_plane(self, pixels: Numbers, plane_from_camera: Transform, height: float = 0.0) -> Array:
-        """Return where the rays of pixels (.., 2) meet z = height of a frame: points (.., 3) in it, NaN for no such."""
+        """Return where the rays of pixels (.., 2) meet z = height of a frame: points (.., 3) in it, else NaN."""
         u, v = _columns(pixels, 2, "pixels")
         return validation.stacked(self.plane_points_of(u, v, plane_from_camera.components, float(height)))
 
     def undistort(self, pixels: Numbers, into: Camera | None = None) -> Array:
-        """Return pixels (.., 2) of the picture without distortion: that of K without D, or of another camera's.
+        """Return pixels (.., 2) of the image without distortion, for the same K or for another camera.
 
-        into: as `camera.rectified()`
+        into: another camera, such as `camera.rectified()`
         """
         u, v = _columns(pixels, 2, "pixels")
         return validation.stacked(self.undistorted_of(u, v, into))
 
     def in_image(self, pixels: Numbers) -> Any:
-        """Return whether pixels (.., 2) lie in the picture."""
+        """Return True for pixels (.., 2) inside the image."""
         return self.is_in_image(*_columns(pixels, 2, "pixels"))
 
     # --- kernels ---
@@ -542,7 +545,7 @@ class Camera:
 
 
 def _columns(value: Numbers, width: int, name: str) -> tuple[Any, ...]:
-    """Take (.., width) numbers apart: floats of one item, or columns; what is not finite passes."""
+    """Split (.., width) numbers: floats of one item, or columns; values that are not finite are accepted."""
     array = validation.as_numbers(value, name)
     if array.ndim == 0 or array.shape[-1] != width:
         raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
@@ -550,7 +553,7 @@ def _columns(value: Numbers, width: int, name: str) -> tuple[Any, ...]:
 
 
 def _numbers(value: Any, what: str, *counts: int) -> tuple[float, ...]:
-    """Flatten lists of finite numbers; raises ValueInvalid for others, and for another count."""
+    """Flatten lists of finite numbers; raises ValueInvalid for other values, and for another count."""
     value = value.tolist() if hasattr(value, "tolist") else value
     flat = [value]
     while any(isinstance(each, (list, tuple)) for each in flat):
@@ -563,7 +566,7 @@ def _numbers(value: Any, what: str, *counts: int) -> tuple[float, ...]:
 
 
 def _intrinsics(value: Any, skew: float) -> tuple[float, ...]:
-    """Return fx, fy, cx, cy, skew of K as four numbers or three rows."""
+    """Return fx, fy, cx, cy, skew of K, four numbers or three rows."""
     k = _numbers(value, "K", 4, 9)
     k = k if len(k) == 9 else (k[0], 0.0, k[2], 0.0, k[1], k[3], 0.0, 0.0, 1.0)
     if k[3] or k[6:] != (0.0, 0.0, 1.0):
@@ -581,9 +584,9 @@ def _size(value: Any) -> tuple[int, int]:
 
 
 def _model_of(model: str | None, count: int, own: dict[str, float]) -> tuple[str, CameraModel]:
-    """Return a model's name and row; without a name that which has such parameters and so many coefficients.
+    """Return a model's name and row; without a name, the model with these parameters and this many coefficients.
 
-    Raises ValueInvalid where several have, and where a model cannot have such numbers.
+    Raises ValueInvalid if several match, and if the model cannot have such numbers.
     """
     if model is None:
         fitting = [each for each, row in CAMERA_MODELS.items() if {*row.parameters} == own.keys()] or ["pinhole"]

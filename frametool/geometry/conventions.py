@@ -1,8 +1,8 @@
 """Named constant rotations between the axes conventions of the field.
 
 Each row `NAME` is the rotation `flu_from_NAME`: the pose of a frame with those axes in a frame with ROS body axes
-(FLU: x forward, y left, z up) at the same place.  `axes_change(a, b)` gives any two.  The world frames are bound as in
-ROS REP 103: a body at rest, facing east, has its axes along ENU.
+(FLU: x forward, y left, z up) at the same position.  `axes_change(a, b)` combines any two.  World frames follow ROS
+REP 103: a body at rest that faces east has its axes along ENU.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ AXES: dict[str, tuple[Rotation, str]] = {
     "ned": (Rotation.of(ROOT, ROOT, 0.0, 0.0), "world of aircraft: x north, y east, z down"),
 }
 
-# flu_from_NAME behind a mirror across y: axes that are left-handed
+# flu_from_NAME of left-handed axes, after a reflection in y
 MIRRORED: dict[str, tuple[Rotation, str]] = {
     "unity": (AXES["optical"][0], "Unity, left-handed: x right, y up, z forward"),
     "unreal": (AXES["flu"][0], "Unreal Engine, left-handed: x forward, y right, z up, in cm"),
@@ -36,24 +36,24 @@ MIRRORED: dict[str, tuple[Rotation, str]] = {
 SYSTEMS = {"ros": ("enu", "flu"), "aircraft": ("ned", "frd")}  # the axes of the world, and of bodies in it
 ALIASES = {"opencv": "optical", "blender": "opengl"}
 IN_CENTIMETRES = "unreal"
-ENGINE_ANGLES = {"unreal": "rpy_unreal", "unity": "euler_unity"}  # what these call roll, pitch, yaw, or Euler angles
-OWN = "x,-y,-z"  # axes of one's own, which make (x, -y, -z) of (x, y, z)
+ENGINE_ANGLES = {"unreal": "rpy_unreal", "unity": "euler_unity"}  # the representation of each engine's own angles
+OWN = "x,-y,-z"  # user-defined axes: (x, y, z) becomes (x, -y, -z)
 
 
 def axes_change(target: str, source: str) -> Rotation:
     """Return the rotation that takes coordinates in the source's axes to the target's: `axes_change("enu", "ned")`.
 
     Raises:
-        ValueInvalid: unknown name; with the nearest and those there are.
+       ValueInvalid: unknown name; lists the nearest name and all names.
     """
     return named_rotation(f"{target}_from_{source}")
 
 
 def named_rotation(text: str) -> Rotation:
-    """Return the rotation that a text names: `optical` is flu_from_optical, `ned_from_enu` any two, or `x,-y,-z`.
+    """Return the rotation named by a text: `optical` is flu_from_optical, `ned_from_enu` any two, or `x,-y,-z`.
 
     Raises:
-        ValueInvalid: unknown name; with the nearest and those there are; a mirror.
+       ValueInvalid: unknown name (lists the nearest and all names), or a reflection.
     """
     change = named_change(text)
     if change.mirrors:
@@ -63,43 +63,43 @@ def named_rotation(text: str) -> Rotation:
 
 
 class AxesChange:
-    """A change of axes that may be a mirror too: first y is turned around if it is one, then comes the rotation."""
+    """A change of axes that may include a reflection: first y is negated if so, then the rotation is applied."""
 
     __slots__ = ("mirrors", "rotation")
 
     def __init__(self, rotation: Rotation, *, mirrors: bool = False) -> None:
-        """Keep the two together."""
+        """Store both."""
         self.rotation = rotation
         self.mirrors = mirrors
 
     def inverse(self) -> AxesChange:
-        """Return the change back."""
+        """Return the inverse change."""
         back = self.rotation.inverse()
         return AxesChange(_in_mirror(back) if self.mirrors else back, mirrors=self.mirrors)
 
     def after(self, other: AxesChange) -> AxesChange:
-        """Return the change by another and then by this one."""
+        """Return the change by another, followed by this one."""
         second = _in_mirror(other.rotation) if self.mirrors else other.rotation
         return AxesChange(self.rotation @ second, mirrors=self.mirrors != other.mirrors)
 
     def behind(self) -> Rotation:
-        """Return the rotation that follows the mirror where this change stands on the right of a pose."""
+        """Return the rotation that follows the reflection if this change is on the right side of a pose."""
         return _in_mirror(self.rotation) if self.mirrors else self.rotation
 
 
 def _in_mirror(rotation: Rotation) -> Rotation:
-    """Return the rotation that is seen in a mirror across y."""
+    """Return a rotation as seen in a mirror across y."""
     x, y, z, w = rotation.components
     return Rotation.of(-x, y, -z, w)
 
 
 def named_change(text: str, *, of_world: bool = False) -> AxesChange:
-    """Return the change of axes that a text names: as `named_rotation`, also mirrored ones such as `unity_from_ros`.
+    """Return the change of axes named by a text: as `named_rotation`, and reflections such as `unity_from_ros`.
 
-    of_world: the names of systems, `ros` and `aircraft`, mean their axes of the world, not those of bodies
+    of_world: the names of systems, `ros` and `aircraft`, mean their world axes, not their body axes
 
     Raises:
-        ValueInvalid: unknown name; with the nearest and those there are.
+       ValueInvalid: unknown name; lists the nearest name and all names.
     """
     if "," in text:
         return _own_axes(text)
@@ -116,7 +116,7 @@ def _flu_from(name: str) -> AxesChange:
 
 
 def _own_axes(text: str) -> AxesChange:
-    """Return the change that makes (x, -y, -z) of (x, y, z) for `x,-y,-z`."""
+    """Return the change from (x, y, z) to (x, -y, -z) for `x,-y,-z`."""
     rows = [[float((letter == each) - (f"-{letter}" == each)) for letter in "xyz"] for each in _letters(text)]
     mirrors = matrix.determinant(*matrix.nine(entry for row in rows for entry in row)) < 0.0
     sign = -1.0 if mirrors else 1.0
@@ -133,13 +133,13 @@ def _letters(text: str) -> list[str]:
 
 
 def sides_of(text: str) -> tuple[str, str]:
-    """Return the changes on the left and on the right that `A_from_B` of both sides is: p becomes W p B.
+    """Return the changes W and B on the left and right side of a pose for `A_from_B` of systems: p becomes W p B.
 
-    Between systems: `aircraft_from_ros` is ned_from_enu and flu_from_frd; one set of axes, and axes of one's own, are
-    those of world and bodies alike, so that B is the inverse of W.
+    `aircraft_from_ros` is ned_from_enu and flu_from_frd.  A single set of axes, also user-defined ones, applies to
+    world and bodies alike, so that B is the inverse of W.
 
     Raises:
-        ValueInvalid: unknown name; no `A_from_B`.
+       ValueInvalid: unknown name; not of the form `A_from_B`.
     """
     if "," in text:
         letters = _letters(text)
@@ -153,23 +153,23 @@ def sides_of(text: str) -> tuple[str, str]:
 
 
 def _system(name: str) -> tuple[str, str]:
-    """Return the axes of the world and of bodies that a name of both means."""
+    """Return the world axes and the body axes of a system."""
     name = ALIASES.get(name, name)
     return SYSTEMS[name] if name in SYSTEMS else (_known(name),) * 2
 
 
 def _system_with(name: str) -> tuple[str, str]:
-    """Return the axes of the system that a name means, or is one of: `ned` is of aircraft."""
+    """Return the axes of the system that a name means or belongs to: `ned` belongs to aircraft."""
     return next((axes for axes in SYSTEMS.values() if name in axes), None) or _system(name)
 
 
 def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bool, Rotation | None]:
-    """Return what axes on the left and on the right of a pose make of it: W mirror(pose) B.
+    """Return W, mirror and B for changes of axes on the left and right side of a pose: W mirror(pose) B.
 
-    Returns W, whether there is a mirror across y, and B; None for a side that stays.
+    W and B are None for an unchanged side; mirror is True for a reflection across y.
 
     Raises:
-        ValueInvalid: unknown name; a mirror on one side only, where the result would be no rotation.
+       ValueInvalid: unknown name; a reflection on one side only, whose result would not be a rotation.
     """
     identity = AxesChange(Rotation.identity())
     left = identity if world is None else named_change(world, of_world=True)
@@ -192,9 +192,9 @@ def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bo
 
 
 def other_side(text: str, *, of_world: bool) -> str:
-    """Name the change on the other side of a pose that goes with `ned_from_enu` or `frd_from_flu`; "" without one.
+    """Return the change on the other side that usually goes with `ned_from_enu` or `frd_from_flu`; "" without one.
 
-    of_world: the text is that of the frame that poses are seen from
+    of_world: the text is the change of the reference frame
     """
     target, _, source = text.partition("_from_")
     pairs = {each[not of_world]: each[of_world] for each in SYSTEMS.values()}
@@ -205,7 +205,7 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
     """Return the Euler conventions in which three angles are this rotation, within `tolerance`; all in radians.
 
     Raises:
-        ValueInvalid: there is none; with the nearest.
+       ValueInvalid: there is none; names the nearest.
     """
     first, second, third = angles
     off = {}
@@ -220,7 +220,7 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
 
 
 def _known(name: str) -> str:
-    """Return a name of axes; a hint never offers axes that look like others with the opposite sense."""
+    """Return a name of axes; a suggestion never has axes that look similar but have the opposite sense."""
     if name in AXES or name in MIRRORED:
         return name
     known = (*AXES, *MIRRORED, *SYSTEMS, *ALIASES)

@@ -1,8 +1,8 @@
-"""Kernels of places on the Earth, WGS84: latitude and longitude in degrees, metres above the ellipsoid, and ECEF.
+"""Kernels of positions on the Earth, WGS84: latitude and longitude in degrees, metres above the ellipsoid, and ECEF.
 
-`ecef` is the Earth's frame: x to lat 0 lon 0, z to the north pole.  Only + - * / and roots, and the project's own sines
-and arc tangents: floats and arrays give the same bits.  What is no place becomes NaN here; `check_lla` and `check_ecef`
-say why.  Knows numbers only; components are floats or arrays of one shape.
+`ecef` is the Earth's frame: x to lat 0 lon 0, z to the north pole.  Only + - * / and square roots, and this package's
+own sines and arc tangents: floats and arrays give the same bits.  Invalid positions become NaN; `check_lla` and
+`check_ecef` return the reason.  Knows numbers only; components are floats or arrays of one shape.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 A, F = 6378137.0, 1.0 / 298.257223563  # the equator's radius in metres, and the flattening
 E2, EC = F * (2.0 - F), 1.0 - F  # the eccentricity squared; the polar radius over the equator's
-NEAREST, FURTHEST = 1e5**2, 1e20**2  # m^2 from the centre: nearer normals cross (to 43 km), farther powers overflow
-STEPS = 3  # of Halley: after the third nothing changes from 100 km to beyond 1e9 km
+NEAREST, FURTHEST = 1e5**2, 1e20**2  # m^2 from the centre: below, normals cross (up to 43 km); above, powers overflow
+STEPS = 3  # of Halley: the third step is the last that changes anything, from 100 km to beyond 1e9 km
 AXES = "enu", "ned", "grid", "ecef"
 
 
@@ -31,7 +31,7 @@ def sincos_deg(angle: N, xp: Functions[N]) -> Two[N]:
 
 
 def within(value: N, least: float, most: float, xp: Functions[N]) -> N:
-    """Return numbers that lie between two bounds, NaN for others."""
+    """Return numbers that are between two bounds, NaN for others."""
     centre, reach = 0.5 * (least + most), 0.5 * (most - least)
     if xp.furthest(value, centre) <= reach:
         return value
@@ -39,7 +39,7 @@ def within(value: N, least: float, most: float, xp: Functions[N]) -> N:
 
 
 def ecef(lat: N, lon: N, alt: N, xp: Functions[N]) -> Three[N]:
-    """Return x, y, z in metres of latitude, longitude in degrees and metres above the ellipsoid; 2 eps off at most."""
+    """Return x, y, z in metres from latitude, longitude in degrees and metres above the ellipsoid; error <= 2 eps."""
     sine, cosine = sincos_deg(within(lat, -90.0, 90.0, xp), xp)
     east, front = sincos_deg(within(lon, -180.0, 360.0, xp), xp)
     normal = A / xp.sqrt(1.0 - E2 * sine * sine)
@@ -48,10 +48,10 @@ def ecef(lat: N, lon: N, alt: N, xp: Functions[N]) -> Three[N]:
 
 
 def lla(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
-    """Return latitude, longitude in degrees and metres above the ellipsoid; lon in (-180, 180], at a pole 0.
+    """Return latitude, longitude in degrees and metres above the ellipsoid; lon in (-180, 180], 0 at a pole.
 
-    NaN within 100 km of the centre, where a place has several latitudes.
-    Source: Fukushima 2006, Halley's method on the sine and cosine of the reduced latitude; three steps settle it.
+    NaN within 100 km of the centre, where the latitude is not unique.
+    Source: Fukushima 2006, Halley's method on the sine and cosine of the reduced latitude; three steps suffice.
     """
     squared = x * x + y * y
     beside = xp.sqrt(squared)
@@ -69,7 +69,7 @@ def lla(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
 
 
 def with_latitude(x: N, y: N, z: N, alt: N, xp: Functions[N]) -> N:
-    """Return the height of positions in ECEF that have a latitude, NaN of others."""
+    """Return the height of positions in ECEF that have a latitude, NaN for others."""
     squared = x * x + y * y + z * z
     if xp.least(squared) >= NEAREST and xp.furthest(squared) <= FURTHEST:
         return alt
@@ -77,7 +77,7 @@ def with_latitude(x: N, y: N, z: N, alt: N, xp: Functions[N]) -> N:
 
 
 def _halley(run: N, rise: N, sine: N, cosine: N, xp: Functions[N]) -> Two[N]:
-    """Return a better sine and cosine of the reduced latitude, times a common factor."""
+    """Return a refined sine and cosine of the reduced latitude, times a common factor."""
     length = xp.sqrt(sine * sine + cosine * cosine)
     cubed = length * length * length
     squared = cosine * cosine
@@ -93,17 +93,17 @@ def _unit(sine: N, cosine: N, xp: Functions[N]) -> Two[N]:
 
 
 def eastward(lon: N, xp: Functions[N]) -> N:
-    """Return a longitude of -360 to 360 degrees in (-180, 180]."""
+    """Return a longitude of -360 to 360 degrees, wrapped to (-180, 180]."""
     if xp.furthest(lon) < 180.0:
         return lon + 0.0
     return lon - xp.where(lon > 180.0, 360.0, xp.where(lon <= -180.0, -360.0, 0.0))
 
 
 def ecef_from_enu(lat: N, lon: N, xp: Functions[N]) -> Four[N]:
-    """Return the quaternion of the axes east, north, up at a place; at a pole lon tells them.
+    """Return the quaternion of the axes east, north, up at a position; at a pole lon defines them.
 
-    The turn about z by 90 degrees + lon, then about x by 90 degrees - lat, with the right angles written out: exact
-    where lat and lon are multiples of 90.
+    It is a rotation about z by 90 degrees + lon, then about x by 90 degrees - lat, with the right angles written out:
+    exact where lat and lon are multiples of 90.
     """
     s1, c1 = half_sincos_deg(lon, xp)
     s2, c2 = half_sincos_deg(lat, xp)
@@ -112,10 +112,10 @@ def ecef_from_enu(lat: N, lon: N, xp: Functions[N]) -> Four[N]:
 
 
 def ecef_from_axes(lat: N, lon: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Four[N]:
-    """Return the quaternion of axes at a place, with the canonical sign.
+    """Return the quaternion of axes at a position, with the canonical sign.
 
     axes: one of `AXES`
-    convergence_deg: of grid axes, how far grid north lies clockwise of true north there
+    convergence_deg: for grid axes, the angle of grid north clockwise of true north
     """
     if axes == "ecef":
         zero = 0.0 * lat + 0.0
@@ -124,27 +124,27 @@ def ecef_from_axes(lat: N, lon: N, axes: str, xp: Functions[N], convergence_deg:
     if axes == "ned":  # the product with enu_from_ned
         x, y, z, w = SQRT_HALF * x, SQRT_HALF * y, SQRT_HALF * z, SQRT_HALF * w
         x, y, z, w = quaternion.settled(w - z, w + z, x - y, 0.0 - x - y)
-    elif convergence_deg is not None:  # with enu_from_grid, a turn about z by minus the convergence
+    elif convergence_deg is not None:  # with enu_from_grid, a rotation about z by minus the convergence
         s, c = half_sincos_deg(convergence_deg, xp)
         x, y, z, w = quaternion.settled(x * c - y * s, y * c + x * s, z * c - w * s, w * c + z * s)
     return xp.canonical_sign(x + 0.0, y + 0.0, z + 0.0, w + 0.0)
 
 
 def pose(lat: N, lon: N, alt: N, axes: str, xp: Functions[N], convergence_deg: N | None = None) -> Seven[N]:
-    """Return ecef_from_axes at a place, of `ecef` and `ecef_from_axes`: x, y, z and the quaternion."""
+    """Return ecef_from_axes at a position, by `ecef` and `ecef_from_axes`: x, y, z and the quaternion."""
     tx, ty, tz = ecef(lat, lon, alt, xp)
     x, y, z, w = ecef_from_axes(lat, lon, axes, xp, convergence_deg)
     return tx, ty, tz, x, y, z, w
 
 
 def seen_from(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, px: N, py: N, pz: N) -> Three[N]:
-    """Return a point of ecef in the axes of a pose in ecef; subtracted first, then rotated: half the rounding."""
+    """Return a point of ecef in the axes of a pose in ecef; subtracting before rotating halves the rounding error."""
     qx, qy, qz, qw = quaternion.conjugate(x, y, z, w)
     return quaternion.rotate(qx, qy, qz, qw, px - tx, py - ty, pz - tz)
 
 
 def check_lla(lat: float, lon: float, alt: float = 0.0) -> None:  # noqa: ARG001 - every finite alt will do
-    """Raise ValueInvalid unless finite numbers are a place."""
+    """Raise ValueInvalid unless finite numbers are a position on the Earth."""
     if abs(lat) > 90.0:
         raise ValueInvalid(f"lat {lat!r} is beyond 90 degrees; are lat and lon swapped?")
     if not -180.0 <= lon <= 360.0:

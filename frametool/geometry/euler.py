@@ -1,7 +1,7 @@
 """Kernels of the 24 Euler conventions, both ways, by one algorithm.
 
-A convention's name is that of tf's `transformations`: `s` (static axes, extrinsic) or `r` (rotating axes, intrinsic)
-and three axis letters in the order of the rotations. Angles stand in the order of the letters. Knows numbers only.
+A convention has the name of tf's `transformations`: `s` (static axes, extrinsic) or `r` (rotating axes, intrinsic)
+and three axis letters in the order of the rotations. Angles are in the order of the letters. Knows numbers only.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from frametool.geometry.types import Condition, Four, Functions, N, Three
 
-LOCK = EPS * EPS  # of the squared radii: beyond 1 eps the angles are still known, and dropping them would be an error
+LOCK = EPS * EPS  # of the squared radii: above 1 eps the angles are determined, and dropping them would be an error
 
 
 def _plan(name: str) -> tuple[int, int, int, float, bool, bool]:
@@ -64,10 +64,10 @@ def to_quaternion(first: N, second: N, third: N, axes: str, xp: Functions[N], *,
 def from_quaternion(x: N, y: N, z: N, w: N, axes: str, xp: Functions[N], *, degrees: bool = False) -> Three[N]:
     """Return the three angles of a convention, in the order of its letters.
 
-    The middle angle lies in [-pi/2, pi/2], or in [0, pi] where the outer axes are the same; the others in (-pi, pi].
+    The middle angle is in [-pi/2, pi/2], or in [0, pi] if the outer axes are the same; the others in (-pi, pi].
     At gimbal lock the third is 0.  Degrees are exact at multiples of 90.
-    Source: Bernardes & Viollet 2022, sum and difference of two angles taken as directions, by a complex product;
-    the middle angle from its sine, so that small ones keep their digits.
+    Source: Bernardes & Viollet 2022, sum and difference of two angles as directions, by a complex product;
+    the middle angle from its sine, so that small angles keep their digits.
     """
     i, j, k, parity, symmetric, static = AXES[axes]
     vector = x, y, z
@@ -78,7 +78,7 @@ def from_quaternion(x: N, y: N, z: N, w: N, axes: str, xp: Functions[N], *, degr
         middle = 2.0 * incline(xp.sqrt(squared_difference), xp.sqrt(squared_sum), xp)
     else:
         middle = incline(2.0 * (w * vector[j] + (vector[i] * vector[k]) * parity), radius, xp)
-    limit = LOCK * (xp.furthest(squared_sum) + xp.furthest(squared_difference))  # of the longest row: none is missed
+    limit = LOCK * (xp.furthest(squared_sum) + xp.furthest(squared_difference))  # of all rows
     if not (xp.least(squared_sum) > limit and xp.least(squared_difference) > limit):
         a, b, c, d, radius = _without_third(a, b, c, d, squared_sum, squared_difference, radius, static, xp)
     ac, bd, ad, bc = a * c, b * d, a * d, b * c
@@ -113,7 +113,7 @@ def as_unity(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False)
 
 
 def locked(x: N, y: N, z: N, w: N, axes: str) -> Condition:
-    """Say whether a convention is at gimbal lock here: the first and third axis coincide to 1 eps."""
+    """Return True if a convention is at gimbal lock: the first and third axis coincide to 1 eps."""
     i, j, k, parity, symmetric, _ = AXES[axes]
     a, b, c, d = _pairs((x, y, z), w, i, j, k, parity, symmetric)
     squared_sum, squared_difference = a * a + b * b, c * c + d * d
@@ -142,9 +142,9 @@ def _without_third(
     a: N, b: N, c: N, d: N, squared_sum: N, squared_difference: N, radius: N,
     static: bool, xp: Functions[N],  # noqa: FBT001
 ) -> tuple[N, N, N, N, N]:  # fmt: skip
-    """Return the pairs, and the product of their lengths, with the pair that vanished at lock set to the other.
+    """Return the pairs and the product of their lengths, the pair that vanished at gimbal lock replaced by the other.
 
-    To its mirror image where the axes are static: so the third angle becomes 0.
+    For static axes by its mirror image: thus the third angle becomes 0.
     """
     limit = LOCK * (squared_sum + squared_difference)
     no_sum, no_difference = squared_sum <= limit, squared_difference <= limit

@@ -1,9 +1,9 @@
-"""The functions kernels find in `xp` when their components are Python floats, and how sines are computed; no numpy.
+"""The functions that kernels find in `xp` for Python floats, and how sines are computed; no numpy.
 
-Sine, cosine and arc tangent of floats and arrays go by the same steps, + - * / and roots, which IEEE 754 rounds right:
-one number and a million give the same bits on every machine, and no C library is asked.  The polynomials stand twice,
-here as one expression and in `arrays` step by step in place, the fastest way each.  Their coefficients come from
-interpolation at Chebyshev nodes with 60 digits; the tests hold the results to theirs.
+Sine, cosine and arc tangent of floats and arrays take the same steps, + - * / and square roots, which IEEE 754 rounds
+correctly: one number and a million give the same bits on every machine, whatever its C library.  The polynomials are
+written twice, here as one expression and in `arrays` step by step in place, the fastest way for each.  Coefficients
+come from interpolation at Chebyshev nodes with 60 digits; the tests compare the results with 60 digits too.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ SINE = (
     -0.16666666666666666, 0.008333333333330948, -0.0001984126983675857,
     2.755731610255057e-06, -2.5051131844614108e-08, 1.5918129266803394e-10,
 )  # fmt: skip
-# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor led by 1, which no product needs: relative error of
-# the angle 2^-55
+# (1 - atan(t)/t)/t^2 as a quotient in t^2, 0 <= t <= 1, the divisor monic, so that one product is saved: relative
+# error of the angle 2^-55
 ARC_ABOVE = (
     404.44958201411697, 905.3726290655958, 709.2810809323058, 230.9790943899718, 28.6344514670043, 0.9024525862982413,
 )  # fmt: skip
@@ -40,16 +40,16 @@ ARC_BELOW = (
 QUARTER_TURN, QUARTER_TURN_REST = 1.57079632673412561417, 6.07710050650619224932e-11
 FAR = 2.0**20
 RIGHT_ANGLE, RIGHT_ANGLE_REST = 0.5 * pi, 6.123233995736766e-17  # pi/2 in two doubles
-LEVEL = 2.0**-27  # the cosine below which it is the angle left to a right one, to the last bit
-WHOLE = 1.5 * 2.0**52  # added and taken off again, it rounds to the nearest whole number, ties to even
+LEVEL = 2.0**-27  # a cosine below it equals the distance to a right angle, to the last bit
+WHOLE = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number, ties to even
 
 
 def half_sincos(angle: N, xp: Functions[N]) -> Two[N]:
     """Return sine and cosine of half an angle in radians, at most 1.5 eps off.
 
-    Source: sin 2y = 2 sin y cos y and cos 2y = 1 - 2 sin^2 y of the quarter y, which |sin y| <= sqrt(1/2) makes
-    well-conditioned; near a right angle the cosine is the angle left to that.  Quarters beyond pi/4 are reduced as
-    Cody & Waite 1980 do, and exactly beyond 2^20.
+    Source: sin 2y = 2 sin y cos y and cos 2y = 1 - 2 sin^2 y of the quarter y, well-conditioned because
+    |sin y| <= sqrt(1/2); near a right angle the cosine is the distance to it.  Quarters beyond pi/4 are reduced as in
+    Cody & Waite 1980, and exactly beyond 2^20.
     """
     quarter = 0.25 * angle
     bound = xp.furthest(quarter)
@@ -85,14 +85,14 @@ def half_sincos_deg(angle: N, xp: Functions[N]) -> Two[N]:
 
 
 def nearest(x: N) -> N:
-    """Return the nearest whole number, |x| < 2^51; zero is +0."""
+    """Return the nearest integer, |x| < 2^51; zero is +0."""
     whole = x + WHOLE
     whole -= WHOLE
     return whole
 
 
 def reduced(x: N) -> Two[N]:
-    """Return what is left of an angle below 2^20 less the nearest whole number of quarter turns, and that number."""
+    """Return an angle below 2^20 minus the nearest multiple of a quarter turn, and that multiple."""
     turns = nearest(x * (2.0 / pi))
     x = x - turns * QUARTER_TURN
     x -= turns * QUARTER_TURN_REST
@@ -102,7 +102,7 @@ def reduced(x: N) -> Two[N]:
 def incline(rise: N, run: N, xp: Functions[N]) -> N:
     """Return the angle of a direction of length 1 to 1e-8, run >= 0.
 
-    Twice that whose tangent is rise / (length + run), which is at most 1; even parts are exactly pi/4.
+    It is twice the angle with tangent rise / (length + run), which is at most 1; equal parts give exactly pi/4.
     """
     length = 0.5 + 0.5 * (rise * rise + run * run)
     angle = xp.doubled_arctan(rise / (length + run))
@@ -111,7 +111,7 @@ def incline(rise: N, run: N, xp: Functions[N]) -> N:
 
 
 def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
-    """Return the angle of a direction of this length in [-pi, pi], NaN for none."""
+    """Return the angle of a direction of this length in [-pi, pi], NaN for no direction."""
     angle = xp.doubled_arctan(y / (radius + abs(x)))
     side = xp.copysign(1.0, x)
     angle *= side
@@ -120,19 +120,19 @@ def bearing(y: N, x: N, radius: N, xp: Functions[N]) -> N:
 
 
 def polynomial(x: N, coefficients: tuple[float, ...]) -> N:
-    """Evaluate a polynomial by Horner's rule, arrays in one of their own; lowest coefficient first."""
+    """Evaluate a polynomial by Horner's rule, arrays in a new array; lowest coefficient first."""
     return horner(x * coefficients[-1], x, coefficients[:-1])
 
 
 def monic_polynomial(x: N, coefficients: tuple[float, ...]) -> N:
-    """Evaluate a polynomial led by a coefficient of 1, which is left out."""
+    """Evaluate a polynomial whose highest coefficient is 1 and is not passed."""
     value = x + coefficients[-1]
     value *= x
     return horner(value, x, coefficients[:-1])
 
 
 def horner(value: N, x: N, coefficients: tuple[float, ...]) -> N:
-    """Add the lower coefficients to the highest term, one power of x after the other, in place."""
+    """Add the lower coefficients to the highest term, one power of x after another, in place."""
     for coefficient in coefficients[:0:-1]:
         value += coefficient
         value *= x
@@ -140,11 +140,11 @@ def horner(value: N, x: N, coefficients: tuple[float, ...]) -> N:
     return value
 
 
-SPARE = 128  # bits behind the point: 64 for the result, 64 for what a double may lie close to a quarter turn
+SPARE = 128  # bits after the point: 64 for the result, 64 for how close a double may be to a multiple of a quarter turn
 
 
 def reduced_exactly(x: float) -> tuple[float, float]:
-    """Return what is left of an angle less the nearest whole number of quarter turns, rounded once, and its parity."""
+    """Return an angle minus the nearest multiple of a quarter turn, rounded once, and the parity of the multiple."""
     if not isfinite(x):
         return nan, 0.0
     above, below = x.as_integer_ratio()
@@ -186,24 +186,24 @@ def where(condition: Condition, yes: float, no: float) -> float:
 
 
 def canonical_sign(x: float, y: float, z: float, w: float) -> tuple[float, float, float, float]:
-    """Return q or -q: w > 0, or w == 0 and the first non-zero of x, y, z positive; zeros of what is negated are +0."""
+    """Return q or -q such that w > 0, or w == 0 and the first non-zero of x, y, z is positive; no -0 where negated."""
     if (w or x or y or z) < 0.0:
         return 0.0 - x, 0.0 - y, 0.0 - z, 0.0 - w
     return x, y, z, w
 
 
 def furthest(value: float, centre: float = 0.0) -> float:
-    """Return how far a number is from another."""
+    """Return the distance of a number from another."""
     return abs(value - centre)
 
 
 def first_nonzero(a: float, b: float, c: float, d: float) -> float:
-    """Return the first value that is not zero, or the last."""
+    """Return the first non-zero value, or the last value."""
     return a or b or c or d
 
 
 def doubled_sincos(y: float) -> tuple[float, float]:
-    """Return sine and cosine of 2y, |y| <= pi/4, by the steps that `arrays` takes."""
+    """Return sine and cosine of 2y, |y| <= pi/4, by the same steps as `arrays`."""
     squared = y * y
     bend = (((((squared * S6 + S5) * squared + S4) * squared + S3) * squared + S2) * squared + S1) * squared * y
     sine = y + bend
@@ -215,7 +215,7 @@ def doubled_sincos(y: float) -> tuple[float, float]:
 
 
 def doubled_arctan(tangent: float) -> float:
-    """Return 2 atan(t), |t| <= 1, by the steps that `arrays` takes."""
+    """Return 2 atan(t), |t| <= 1, by the same steps as `arrays`."""
     squared = tangent * tangent
     above = ((((squared * A6 + A5) * squared + A4) * squared + A3) * squared + A2) * squared + A1
     below = (((((squared + B6) * squared + B5) * squared + B4) * squared + B3) * squared + B2) * squared + B1

@@ -1,6 +1,6 @@
 """Kernels of the rotation matrix, nine components row-major: to the quaternion, and to the nearest rotation.
 
-Six numbers stand for its first two columns, which say all of it (Zhou et al. 2019).
+Six numbers are its first two columns, which determine the third (Zhou et al. 2019).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 ORTHONORMAL = 8 * EPS  # of the Gram matrix: what rounding alone leaves on a correctly rounded rotation
 SINGULAR = 1e-12  # of det / (|row 1| |row 2| |row 3|): below, rounding decides which rotation is nearest
-NEAREST, FURTHEST = 0.81 - 1e-9, 1.21 + 1e-9  # squares of the singular values that --normalize takes: 0.9 .. 1.1
-EQUAL = 2e-3  # of squares: singular values equal to 1e-3 are those of a multiple of a rotation
+NEAREST, FURTHEST = 0.81 - 1e-9, 1.21 + 1e-9  # squares of the singular values that --normalize accepts: 0.9 .. 1.1
+EQUAL = 2e-3  # of squares: if singular values are equal to 1e-3, the matrix is a multiple of a rotation
 PARALLEL = 1e-12  # sine between two columns: below, rounding decides the plane they span
 
 
@@ -49,7 +49,7 @@ def to_quaternion(
 
 
 def determinant(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> N:
-    """Return the determinant: 1 for a rotation, negative for what is mirrored."""
+    """Return the determinant: 1 for a rotation, negative for a reflection."""
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
@@ -62,27 +62,27 @@ def gram(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Six[N]:
 
 
 def defect(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
-    """Return the largest entry of |R R^T - 1|: how far the rows are from orthonormal."""
+    """Return the largest entry of |R R^T - 1|: the deviation of the rows from orthonormal."""
     aa, bb, cc, ab, ac, bc = gram(a, b, c, d, e, f, g, h, i)
     return largest_of([abs(aa - 1.0), abs(bb - 1.0), abs(cc - 1.0), abs(ab), abs(ac), abs(bc)], xp)
 
 
 def is_multiple(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N, one: float = 1.0) -> Condition:
-    """Tell from its Gram matrix whether a matrix is a rotation times another number than 1, whose square is `one`."""
+    """Return True if, by its Gram matrix, a matrix is a rotation times a number other than 1, whose square is `one`."""
     square = (aa + bb + cc) / 3.0
     alike = _within((1.0 - EQUAL) * square, (1.0 + EQUAL) * square, aa, bb, cc, ab, ac, bc)
     return alike & (abs(square - one) > EQUAL * one)
 
 
 def is_near(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
-    """Tell from its Gram matrix G whether all singular values of a matrix lie in 0.9 .. 1.1."""
+    """Return True if, by its Gram matrix, all singular values of a matrix are in 0.9 .. 1.1."""
     return _within(NEAREST, FURTHEST, aa, bb, cc, ab, ac, bc)
 
 
 def _within(low: N | float, high: N | float, aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
-    """Return True if the eigenvalues of a Gram matrix G lie between two numbers.
+    """Return True if the eigenvalues of a Gram matrix G are between two numbers.
 
-    G - low and high - G are both positive definite: so are their leading minors (Sylvester).
+    That is, if G - low and high - G are positive definite, by their leading minors (Sylvester).
     """
     return _is_positive(aa - low, bb - low, cc - low, ab, ac, bc) & _is_positive(
         high - aa, high - bb, high - cc, -ab, -ac, -bc
@@ -94,9 +94,9 @@ def _is_positive(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
 
 
 def furthest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> float:
-    """Return the largest deviation of all rows, inf where one is mirrored or far off.
+    """Return the largest deviation of all rows, inf if one is mirrored or far off.
 
-    By minima and maxima, which cost a quarter of the deviation of each row.
+    It uses minima and maxima, which cost a quarter of the deviation of each row.
     """
     off = [
         xp.furthest(a * a + b * b + c * c, 1.0), xp.furthest(d * d + e * e + f * f, 1.0),
@@ -108,10 +108,10 @@ def furthest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions
 
 
 def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
-    """Return the rotation nearest to a matrix that is near one: its orthogonal polar factor.
+    """Return the rotation nearest to a matrix that is close to one: its orthogonal polar factor.
 
     Source: Higham 1986, Newton's X <- (X + X^-T)/2 with the inverse by cofactors.
-    The convergence is quadratic: a step below 1e-9 leaves 1e-18, and is a row's last.
+    The convergence is quadratic: after a step below 1e-9 the error is 1e-18, and the row is finished.
     """
     x = a, b, c, d, e, f, g, h, i
     moving: Condition | None = None
@@ -140,7 +140,7 @@ def newton(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N) -> Nine[N]:
 
 
 def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> N:
-    """Return how far a matrix is from orthonormal; inf if it is none that --normalize takes."""
+    """Return the deviation of a matrix from orthonormal; inf if --normalize does not accept it."""
     off = defect(a, b, c, d, e, f, g, h, i, xp)
     right: Condition = determinant(a, b, c, d, e, f, g, h, i) > SINGULAR
     if not xp.furthest(off) <= TOLERATED:
@@ -150,7 +150,7 @@ def deviation(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Function
 
 
 def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -> Condition:
-    """Tell whether rows within so much of these may be orthonormal: only the digits they are written with are off."""
+    """Return True if rows within `halves` of these may be orthonormal: then only the printed digits are rounded."""
     found: Any = True
     for a in (0, 3, 6):
         found = found & quaternion.explained(parts[a : a + 3], halves[a : a + 3], xp)
@@ -166,10 +166,10 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
 def check(*values: float, normalize: bool = False) -> Nine[float]:
     """Return the rotation nearest to one matrix, nine entries row-major.
 
-    Orthonormal to 1e-6 in silence, to 1e-3 with a warning; with `normalize` any with singular values in 0.9 .. 1.1.
+    Orthonormal to 1e-6 silently, to 1e-3 with a warning; with `normalize` any with singular values in 0.9 .. 1.1.
 
     Raises:
-        ValueInvalid: not finite, mirrored, singular, a rotation that is scaled, or not orthonormal.
+       ValueInvalid: not finite, mirrored, singular, a scaled rotation, or not orthonormal.
     """
     entries = nine(values)
     problem = complaint(*entries, normalize=normalize)
@@ -184,7 +184,7 @@ def check(*values: float, normalize: bool = False) -> Nine[float]:
 
 
 def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
-    """Make the error for a matrix that is refused; None if it is not."""
+    """Return the error for a matrix that is refused; None if it is accepted."""
     if not all(map(isfinite, entries)):
         return ValueInvalid(f"matrix {_shown(entries)} is not finite; give nine finite numbers", rule="not-finite")
     matrix = nine(entries)
@@ -214,7 +214,7 @@ def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
 
 
 def nine(values: Iterable[N]) -> Nine[N]:
-    """Return nine values as the tuple they are."""
+    """Return nine values as a tuple of known length."""
     a, b, c, d, e, f, g, h, i = values
     return a, b, c, d, e, f, g, h, i
 
@@ -227,8 +227,8 @@ def _shown(entries: tuple[float, ...]) -> str:
 def from_six_d(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
     """Return the quaternion of two columns, orthonormalised by Gram and Schmidt.
 
-    The columns need be neither unit nor at right angles, but not parallel.
-    The second is cleared of the first twice: once leaves a residue where they are nearly parallel (Giraud 2005).
+    The columns need not be unit or orthogonal, but must not be parallel.
+    The second is orthogonalised twice: once leaves a residue if they are nearly parallel (Giraud 2005).
     """
     ax, ay, az = quaternion.unit_vector(ax, ay, az, xp)
     along = ax * bx + ay * by + az * bz
@@ -246,27 +246,27 @@ def as_six_d(x: N, y: N, z: N, w: N) -> Six[N]:
 
 
 def six_d_deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> N:
-    """Return 0 where two columns span a plane, else inf."""
+    """Return 0 if two columns span a plane, else inf."""
     first, second = quaternion.unit_vector(ax, ay, az, xp), quaternion.unit_vector(bx, by, bz, xp)
     sine = length(*quaternion.cross(*first, *second), xp)
     return xp.where(sine > PARALLEL, 0.0, inf)
 
 
 def six_d_furthest(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> float:
-    """Return 0 where all pairs of columns span a plane, else inf."""
+    """Return 0 if all pairs of columns span a plane, else inf."""
     return xp.furthest(six_d_deviation(ax, ay, az, bx, by, bz, xp))
 
 
 def six_d_repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six[N]:
-    """Return two columns as they are: `from_six_d` takes any that span a plane."""
+    """Return two columns unchanged: `from_six_d` accepts any that span a plane."""
     return ax, ay, az, bx, by, bz
 
 
 def check_six_d(*columns: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any two that span a plane
-    """Return one pair of columns back.
+    """Check one pair of columns and return it.
 
     Raises:
-        ValueInvalid: not finite, zero or parallel.
+       ValueInvalid: not finite, zero or parallel.
     """
     ax, ay, az, bx, by, bz = columns
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"

@@ -1,7 +1,7 @@
-"""Poses with what counts beside them: seven components alone, eight with a scale, 43 with a covariance.
+"""Kernels of poses with a scale or a covariance: seven components alone, eight with a scale, 43 with a covariance.
 
-The eighth is s of the similarity p' = s R p + t; the 36 are the entries that `uncertainty` describes.  What is alone is
-exact, and of scale 1.  No pose has both.  Components are floats or arrays of one shape.
+The eighth is s of the similarity p' = s R p + t; the 36 are the entries that `uncertainty` describes.  A pose alone is
+exact and has scale 1.  No pose has both.  Components are floats or arrays of one shape.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def inverse(a: Components) -> Components:
 
 
 def relative(a: Components, b: Components) -> Components:
-    """Return b seen from a: inverse(a) b."""
+    """Return the pose of b in a: inverse(a) b."""
     first, second = pose_of(a), pose_of(b)
     pose = rigid.relative(*first, *second)
     if len(a) == len(b) == EXACT:
@@ -73,10 +73,10 @@ def pose_of(a: Components) -> Rigid:
 
 
 def covariance_of(a: Components) -> Components | None:
-    """Return the covariance of a pose; None where it is exact."""
+    """Return the covariance of a pose; None if it is exact."""
     return a[EXACT:] if len(a) == UNCERTAIN else None
 
 
 def scale_of(a: Components) -> Number:
-    """Return the scale of a similarity; 1 of a pose."""
+    """Return the scale of a similarity; 1 for a pose."""
     return a[EXACT] if len(a) == SCALED else 1.0

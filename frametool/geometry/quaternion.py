@@ -1,6 +1,6 @@
 """Kernels on quaternions x, y, z, w (Hamilton, active): products, norms, signs, arcs.
 
-Knows numbers only. Unless said otherwise the inputs are unit to a few eps; components are floats or arrays.
+Knows numbers only. Unless stated otherwise the inputs are unit to a few eps; components are floats or arrays.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Condition, Five, Four, Functions, N, Nine, Three, Two
 
 EPS = 2.0**-52
-UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: what lies within 4 is left alone, bit for bit
+UNIT = 4 * EPS  # one normalisation leaves |n^2 - 1| below 3 eps: within 4, bits are preserved
 SILENT = 1e-6
 TOLERATED = 1e-3
-FARTHEST = 1e300  # the deviation of what can still be normalised, when squares overflow
+FARTHEST = 1e300  # the deviation reported for what can still be normalised although squares overflow
 TINY = 1e-150  # the least angle divided by: sin(x)/x is 1 there, and parts down to 1e-308 survive the quotient
 
 
 def squared_norm(x: N, y: N, z: N, w: N) -> N:
-    """Return x^2 + y^2 + z^2 + w^2; right for norms between 1e-150 and 1e150."""
+    """Return x^2 + y^2 + z^2 + w^2; accurate for norms between 1e-150 and 1e150."""
     return x * x + y * y + z * z + w * w
 
 
 def compose(ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N) -> Four[N]:
-    """Multiply two unit quaternions and take the rounding off the norm: multiples of 90 degrees stay exact.
+    """Multiply two unit quaternions and correct the rounding of the norm: multiples of 90 degrees stay exact.
 
-    The Hamilton product (1843) and `settled` written as one: the call every lookup makes at every edge.
+    The Hamilton product (1843) and `settled` in one function: every lookup calls it at every edge.
     """
     x = aw * bx + ax * bw + ay * bz - az * by
     y = aw * by - ax * bz + ay * bw + az * bx
@@ -45,10 +45,10 @@ def compose(ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N) -> Four[N]:
 
 
 def settled(x: N, y: N, z: N, w: N) -> Four[N]:
-    """Take the last rounding off the norm of a quaternion that is unit to 1e-8.
+    """Correct the last rounding of the norm of a quaternion that is unit to 1e-8.
 
-    (1 + n^2)/2 is the norm to first order, and needs no root.  Divided by it, the products of 0, 1/2, sqrt(1/2)
-    and 1 that right angles consist of become these doubles again.
+    (1 + n^2)/2 is the norm to first order, without a square root.  Divided by it, the products of 0, 1/2, sqrt(1/2)
+    and 1 that right angles consist of become exactly these doubles again.
     """
     norm = 0.5 + 0.5 * (x * x + y * y + z * z + w * w)
     return x / norm, y / norm, z / norm, w / norm
@@ -60,7 +60,7 @@ def conjugate(x: N, y: N, z: N, w: N) -> Four[N]:
 
 
 def unit(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
-    """Normalise a quaternion of moderate norm; what is unit to 4 eps keeps its bits."""
+    """Normalise a quaternion of moderate norm; the bits of one that is unit to 4 eps are preserved."""
     squared = x * x + y * y + z * z + w * w
     if xp.furthest(squared, 1.0) <= UNIT:
         return x, y, z, w
@@ -80,7 +80,7 @@ def normalized(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
 
 
 def largest_of(values: Sequence[N], xp: Functions[N]) -> N:
-    """Return element by element the largest of some numbers."""
+    """Return element by element the largest of several numbers."""
     found = values[0]
     for value in values[1:]:
         found = xp.maximum(found, value)
@@ -88,24 +88,24 @@ def largest_of(values: Sequence[N], xp: Functions[N]) -> N:
 
 
 def canonical(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
-    """Choose between q and -q: w > 0, or w == 0 and the first non-zero of x, y, z positive."""
+    """Choose q or -q such that w > 0, or w == 0 and the first non-zero of x, y, z is positive."""
     return xp.canonical_sign(x, y, z, w)
 
 
 def from_quaternion(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
-    """Return the quaternion as it leaves: unit, with the canonical sign."""
+    """Return the quaternion for output: unit, with the canonical sign."""
     return canonical(*unit(x, y, z, w, xp), xp)
 
 
 def angle(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
-    """Return the rotation angle in [0, pi] radians, accurate at both ends: that of a direction, doubled."""
+    """Return the rotation angle in [0, pi] radians, accurate at both ends: twice that of a direction."""
     return 2.0 * incline(length(x, y, z, xp), abs(w), xp)
 
 
 def arc(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> N:  # fmt: skip
-    """Return the angle in [0, pi/2] between two quaternions as vectors, q and -q being one: half the rotation's.
+    """Return the angle in [0, pi/2] between two quaternions as vectors, q and -q being equal: half the rotation angle.
 
     Source: Kahan, 2 atan2(|b - a|, |b + a|); it keeps its relative accuracy for the smallest arcs.
     """
@@ -125,20 +125,20 @@ def halves(
 def distance(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> N:  # fmt: skip
-    """Return the angle in [0, pi] of the rotation between two."""
+    """Return the angle in [0, pi] of the rotation between two orientations."""
     return 2.0 * arc(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
 def toward(
     ax: N, ay: N, az: N, aw: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> Five[N]:  # fmt: skip
-    """Return the unit quaternion c at right angles to a, in the plane of a and b, and half the arc to b in radians.
+    """Return the unit quaternion c orthogonal to a, in the plane of a and b, and half the arc to b in radians.
 
-    The arc is the shorter one; at exactly half a turn both are, and the sign of b decides.
-    With s and c the sine and cosine of half the arc: (b - a) / 2sc + a s/c, which keeps its digits where b is near a.
+    The arc is the shorter one; at exactly 180 degrees of rotation both are, and the sign of b decides.
+    With s and c the sine and cosine of half the arc: (b - a) / 2sc + a s/c, which is accurate also for b near a.
     """
     apart, along = halves(ax, ay, az, aw, bx, by, bz, bw, xp)
-    half_arc = incline(apart, along, xp)  # 0 between equal ends: they stay as they are at every fraction
+    half_arc = incline(apart, along, xp)  # 0 between equal ends, which are then unchanged at every fraction
     apart = xp.maximum(apart, TINY)
     sign = xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
     ahead, beside = 0.5 / (apart * along), apart / along
@@ -154,9 +154,9 @@ def slerp(
 ) -> Four[N]:  # fmt: skip
     """Interpolate two unit quaternions along the shorter arc.
 
-    fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
-    Returns x, y, z, w, unit: a cos(fraction arc) + c sin(fraction arc), where c is what `toward` returns.
-    Source: Shoemake 1985, by the steps of `segment`, which prepares c once for many fractions.
+    fraction: 0 gives exactly a and 1 exactly b; values outside extrapolate.
+    Returns x, y, z, w, unit: a cos(fraction arc) + c sin(fraction arc), with c as returned by `toward`.
+    Source: Shoemake 1985, in the steps of `segment`, which prepares c once for many fractions.
     """
     cx, cy, cz, cw, half_arc = toward(ax, ay, az, aw, bx, by, bz, bw, xp)
     sine, cosine = half_sincos(4.0 * (fraction * half_arc), xp)
@@ -180,7 +180,7 @@ def either(first: Condition, a: N, second: Condition, b: N, other: N, xp: Functi
 def to_matrix(x: N, y: N, z: N, w: N) -> Nine[N]:
     """Return the rotation matrix r11 .. r33, row-major.
 
-    Dividing by the norm actually computed makes multiples of 90 degrees exact and forgives a few eps of norm.
+    Division by the computed norm makes multiples of 90 degrees exact and corrects a few eps of norm.
     """
     scale = 2.0 / (x * x + y * y + z * z + w * w)
     xs, ys, zs = x * scale, y * scale, z * scale
@@ -195,13 +195,13 @@ def to_matrix(x: N, y: N, z: N, w: N) -> Nine[N]:
 
 
 def rotate(x: N, y: N, z: N, w: N, px: N, py: N, pz: N) -> Three[N]:
-    """Rotate a vector, through the matrix: the shorter cross products leave residue at 90 degrees."""
+    """Rotate a vector by the matrix: the shorter formula of cross products leaves a residue at 90 degrees."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = to_matrix(x, y, z, w)
     return r11 * px + r12 * py + r13 * pz, r21 * px + r22 * py + r23 * pz, r31 * px + r32 * py + r33 * pz
 
 
 def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
-    """Return how far the norm is from 1 (to first order below 1e-6); inf for what has no direction or is not finite."""
+    """Return the deviation of the norm from 1 (first order below 1e-6); inf for zero and values that are not finite."""
     squared = x * x + y * y + z * z + w * w
     off = abs(squared - 1.0)
     if xp.furthest(off) <= SILENT:
@@ -212,7 +212,7 @@ def deviation(x: N, y: N, z: N, w: N, xp: Functions[N]) -> N:
 
 
 def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -> Condition:
-    """Tell whether numbers within so much of these have norm 1: then only the digits they are written with are off."""
+    """Return True if numbers within `halves` of these have norm 1: then only the printed digits are rounded."""
     pairs = [*zip(map(abs, parts), halves, strict=True)]
     nearest = [xp.maximum(size - half, 0.0 * half) for size, half in pairs]
     least = sum((size * size for size in nearest), 0.0)
@@ -222,12 +222,12 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
 
 
 def furthest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> float:
-    """Return how far the squared norm furthest from 1 is: the deviation where all are within 1e-6, more elsewhere."""
+    """Return the largest deviation of a squared norm from 1: the deviation if all are within 1e-6, larger elsewhere."""
     return xp.furthest(x * x + y * y + z * z + w * w, 1.0)
 
 
 def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
-    """Normalise quaternions that are not unit to 4 eps; only far ones take the longer way."""
+    """Normalise quaternions that are not unit to 4 eps; only those with a large deviation take the slower path."""
     squared = x * x + y * y + z * z + w * w
     far = abs(squared - 1.0) > 3.0 * TOLERATED
     norm = xp.where(far, 1.0, xp.sqrt(squared))
@@ -242,12 +242,12 @@ def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
 
 
 def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> tuple[float, float, float, float]:
-    """Return one quaternion as a unit one.
+    """Check one quaternion and return it as a unit quaternion.
 
-    Within 1e-6 of norm 1 in silence, within 1e-3 with a warning; with `normalize` any non-zero finite one.
+    Silently within 1e-6 of norm 1, within 1e-3 with a warning; with `normalize` any non-zero finite one.
 
     Raises:
-        ValueInvalid: zero, not finite, or not of norm 1.
+       ValueInvalid: zero, not finite, or not of norm 1.
     """
     if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT:
         return x, y, z, w
@@ -263,13 +263,13 @@ def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) ->
 
 
 def _shown_norm(x: float, y: float, z: float, w: float) -> str:
-    """Write a norm with six digits, or as many as tell it from 1."""
+    """Format a norm with six digits, or as many as distinguish it from 1."""
     norm = magnitude(magnitude(x, y, z, floats), w, 0.0, floats)
     return f"{norm:.6g}" if f"{norm:.6g}" != "1" else f"{norm:.9g}"
 
 
 def complaint(x: float, y: float, z: float, w: float, *, normalize: bool = False) -> ValueInvalid | None:
-    """Make the error for a quaternion that is refused; None if it is not."""
+    """Return the error for a quaternion that is refused; None if it is accepted."""
     shown = f"quaternion {x:g} {y:g} {z:g} {w:g}"
     off = deviation(x, y, z, w, floats)
     if x == y == z == w == 0.0:
@@ -283,11 +283,11 @@ def complaint(x: float, y: float, z: float, w: float, *, normalize: bool = False
 
 
 def between(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[N]:
-    """Return the shortest rotation that turns the direction a into the direction b.
+    """Return the shortest rotation from the direction a to the direction b.
 
-    The turn by twice the angle between a and the bisector a + b.  Near opposite directions the bisector is all
-    rounding along a - b, which is taken out of it (a + b itself is exact there); opposite to 1 eps: half a turn
-    about an axis at right angles to a.
+    It rotates by twice the angle between a and the bisector a + b.  Near opposite directions the bisector is mostly
+    rounding error along a - b, which is removed (a + b itself is exact there).  Opposite to 1 eps: 180 degrees about an
+    axis orthogonal to a.
     """
     ax, ay, az = unit_vector(ax, ay, az, xp)
     bx, by, bz = unit_vector(bx, by, bz, xp)
@@ -304,7 +304,7 @@ def between(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> Four[
 
 
 def _sideways(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
-    """Return a vector at right angles to a unit vector, from the coordinate axis farthest from it."""
+    """Return a vector orthogonal to a unit vector, from the coordinate axis farthest from it."""
     use_x = (abs(x) <= abs(y)) & (abs(x) <= abs(z))
     use_y = abs(y) <= abs(z)
     zero = 0.0 * x
@@ -331,7 +331,7 @@ def unit_vector(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
 
 
 def direction(x: N, y: N, z: N, xp: Functions[N]) -> Four[N]:
-    """Return the direction and the length of any vector; that of zero is x and 0."""
+    """Return the direction and the length of any vector; for zero, x and 0."""
     still = (x == 0.0) & (y == 0.0) & (z == 0.0)
     x, y, z, exponent = _scaled(xp.where(still, 1.0, x), y, z, xp)
     norm = length(x, y, z, xp)
@@ -339,7 +339,7 @@ def direction(x: N, y: N, z: N, xp: Functions[N]) -> Four[N]:
 
 
 def magnitude(x: N, y: N, z: N, xp: Functions[N]) -> N:
-    """Return the length of any vector; only squares out of range take the longer way."""
+    """Return the length of any vector; only squares out of range take the slower path."""
     squared = x * x + y * y + z * z
     odd = (squared < 1e-280) | (squared > 1e300)
     plain = xp.sqrt(squared)
@@ -347,13 +347,13 @@ def magnitude(x: N, y: N, z: N, xp: Functions[N]) -> N:
 
 
 def _scaled(x: N, y: N, z: N, xp: Functions[N]) -> tuple[N, N, N, Any]:
-    """Divide a vector by the power of two of its largest component, which is exact; return the exponent, too."""
+    """Divide a vector by the power of two of its largest component, which is exact; return the exponent too."""
     exponent = xp.frexp(largest_of((abs(x), abs(y), abs(z)), xp))[1]
     return xp.ldexp(x, -exponent), xp.ldexp(y, -exponent), xp.ldexp(z, -exponent), exponent
 
 
 def length(x: N, y: N, z: N, xp: Functions[N]) -> N:
-    """Return the length of a vector, right between 1e-150 and 1e150; hypot is not the same on every machine."""
+    """Return the length of a vector, accurate between 1e-150 and 1e150; hypot differs between machines."""
     return xp.sqrt(x * x + y * y + z * z)
 
 
@@ -363,10 +363,10 @@ def cross(ax: N, ay: N, az: N, bx: N, by: N, bz: N) -> Three[N]:
 
 
 def largest_eigenvector(moment: Sequence[Sequence[N]], xp: Functions[N]) -> Four[N]:
-    """Return a unit eigenvector of the largest eigenvalue of a symmetric 4 by 4 matrix without negative ones.
+    """Return a unit eigenvector of the largest eigenvalue of a positive semidefinite symmetric 4 by 4 matrix.
 
-    Squared again and again the matrix becomes the projection on that eigenvector, whose longest column is it.
-    Sixty squarings settle eigenvalues that differ by one eps.
+    Repeated squaring converges to the projection on that eigenvector, whose longest column is the result.
+    Sixty squarings separate eigenvalues that differ by one eps.
     """
     for _ in range(60):
         trace = moment[0][0] + moment[1][1] + moment[2][2] + moment[3][3]

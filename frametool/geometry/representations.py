@@ -1,7 +1,7 @@
-"""The one table of rotation notations: their names, columns, units, and the way to and from a quaternion.
+"""The table of all rotation notations: names, columns, units, and the conversion to and from a quaternion.
 
 Files, options, CSV headers, help and tests are derived from REPRESENTATIONS. Degrees are handled here and in the
-kernels this calls, nowhere else. Knows no syntax of any file.
+kernels this calls, nowhere else. Knows no file syntax.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class Whole:
     """How a notation writes a whole pose, position and rotation in one: the 4x4 matrix.
 
     columns: names of its numbers, in their order
-    join: the position and the rotation's numbers to those of the pose
-    split: those of the pose to the position and the rotation's numbers
-    tail: what the last of its numbers always are
+    join: from the position and the rotation's numbers to those of the pose
+    split: from those of the pose to the position and the rotation's numbers
+    tail: the constant last numbers
     """
 
     __slots__ = ("columns", "join", "split", "tail")
@@ -50,16 +50,16 @@ def _no_rotation(*_: Any) -> Any:
 
 
 class BatchRule:
-    """How many rows of a notation are checked at once, where not every finite row is a rotation as it stands.
+    """How many rows of a notation are checked at once, if not every finite row is a rotation.
 
     what: what the rows are, in the plural
-    deviation: kernel (components, xp) of how far each row is from a rotation; inf where nothing can be made of it
-    furthest: function (components, xp) of how far the furthest row is, at least where none is beyond `exact`; else
-        anything beyond it, or NaN
+    deviation: kernel (components, xp) of the deviation of each row from a rotation; inf if it cannot be repaired
+    furthest: function (components, xp) of the largest deviation, at least where none is above `exact`; otherwise
+       any value above it, or NaN
     repair: kernel (components, xp) that makes rotations of rows
     exact: the deviation up to which a row keeps its bits
-    explained: function (components, halves, xp) that tells whether what is written is a rotation but for half a unit
-        of the last digit of each number; None where nothing is to be explained
+    explained: function (components, halves, xp) that returns True if a row is a rotation up to half a unit of the last
+       printed digit of each number; None if there is nothing to explain
     """
 
     __slots__ = ("deviation", "exact", "explained", "furthest", "repair", "what")
@@ -68,7 +68,7 @@ class BatchRule:
         self, what: str, deviation: Callable[..., Any], furthest: Callable[..., float], repair: Kernel, exact: float,
         explained: Callable[..., Any] | None = None,
     ) -> None:  # fmt: skip
-        """Bind the kernels."""
+        """Store the kernels."""
         self.what = what
         self.deviation = deviation
         self.furthest = furthest
@@ -78,21 +78,22 @@ class BatchRule:
 
 
 class Representation:
-    """One notation and everything that is known about it: no other list or table names it.
+    """One notation and everything that is known about it; no other list or table names it.
 
-    columns: bare names of its numbers, in tables and messages; angles: which of them are angles
-    summary, label: a line of help; what it is called in text for people
+    columns: bare names of its numbers, in tables and messages; angles: the indices of those that are angles
+    summary, label: a line of help; its name in text for people
     names: short names of its numbers, for people and as keys of a map
-    shape: how documents hold the numbers: LIST, MAP (a list is read too), NAMED (a map only), ROWS, or a dict of the
-        keys of a map with how many numbers each holds
-    axes: Euler axes: "" none, NAMED_AXES where the user names them, else the fixed ones
-    whole: how it carries the position too, if it can; searched: whether headers are searched for its columns
-    alone: columns that say the last number where the others are missing and 0
-    batch: how many rows are checked at once; without it those are refused whose quaternion is not finite
-    in_degrees: whether its angles are degrees where their name says no unit
+    shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or a dict of
+    the
+       keys of a map with the number of values of each
+    axes: Euler axes: "" none, NAMED_AXES if the user names them, else the fixed ones
+    whole: how it holds the position too, if it can; searched: whether headers are searched for its columns
+    alone: columns that suffice for the last number if the others are missing and 0
+    batch: how many rows are checked at once; without it rows are refused whose quaternion is not finite
+    in_degrees: whether its angles are degrees if their name states no unit
     overview: the units in which an overview shows it ("" for no unit)
-    is_place: it says a position on the Earth and no rotation: a row of POSITIONS
-    kernels: of a position the `module:name` of its arithmetic, a `place.Kernels`
+    is_place: it is a position on the Earth and not a rotation: a row of POSITIONS
+    kernels: for a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
     __slots__ = (
@@ -111,8 +112,8 @@ class Representation:
         """Describe a notation.
 
         forward, backward: take (components, xp, degrees, axes)
-        check: takes the components of one rotation, and `normalize`; None where any finite numbers are a rotation
-        kept: takes a unit quaternion whose sign stays as it is; None where the notation has no such sign
+        check: takes the components of one rotation, and `normalize`; None if any finite numbers are a rotation
+        kept: takes a unit quaternion and preserves its sign; None if the notation has no such sign
         """
         self.name = ""
         self.columns = tuple(columns.split())
@@ -141,7 +142,7 @@ class Representation:
 
     @property
     def can_fail(self) -> bool:
-        """Tell whether finite numbers may be no rotation: a norm, an axis, a matrix; three angles always are one."""
+        """Return True if finite numbers may not be a rotation (norm, axis, matrix); three angles always are."""
         return self._check is not None
 
     @property
@@ -152,7 +153,7 @@ class Representation:
     def to_quaternion(
         self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
     ) -> Quaternion:
-        """Return x, y, z, w of components in column order; `degrees` touches the angle columns only, `axes` Euler's."""
+        """Return x, y, z, w of components in column order; `degrees` applies to angle columns only, `axes` to Euler."""
         result: Quaternion = self._forward(components, xp, degrees, axes)
         return result
 
@@ -160,17 +161,17 @@ class Representation:
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz",
         keep_sign: bool = False,
     ) -> Components:  # fmt: skip
-        """Return the components in column order of a unit quaternion; `keep_sign` leaves a quaternion's sign alone."""
+        """Return the components in column order of a unit quaternion; `keep_sign` preserves a quaternion's sign."""
         if keep_sign and self._kept is not None:
             return self._kept(x, y, z, w)
         result: Components = self._backward((x, y, z, w), xp, degrees, axes)
         return result
 
     def checked(self, components: Sequence[float], *, normalize: bool = False) -> Components:
-        """Check the floats of one rotation; return them as near to a rotation as they must be.
+        """Check the floats of one rotation; return them, corrected to a rotation.
 
         Raises:
-            ValueInvalid: wrong count, not finite, or no rotation.
+           ValueInvalid: wrong count, not finite, or not a rotation.
         """
         if len(components) != len(self.columns):
             expected = f"{len(self.columns)} numbers ({' '.join(self.columns)})"
@@ -212,7 +213,7 @@ def _wxyz(x: Any, y: Any, z: Any, w: Any) -> Components:
 
 
 def _in_wxyz(kernel: Kernel) -> Kernel:
-    """Let a kernel of x, y, z, w take and return w, x, y, z."""
+    """Return a kernel of w, x, y, z made from a kernel of x, y, z, w."""
     return lambda w, x, y, z, *xp, **options: _wxyz(*kernel(x, y, z, w, *xp, **options))
 
 
@@ -221,7 +222,7 @@ def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
 
 
 def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """Let a function of x, y, z, w take w, x, y, z."""
+    """Return a function of w, x, y, z made from a function of x, y, z, w."""
     return lambda w, x, y, z, xp: kernel(x, y, z, w, xp)
 
 
@@ -333,7 +334,7 @@ POSITIONS = {
     "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down",
                           kernels=f"{PLACE}:LOCAL_KERNELS"),
 }  # fmt: skip
-EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
+EARTH_FRAMES = ("ecef", "earth")  # names of one frame, in which positions on the Earth are expressed
 ROTATIONS = {**REPRESENTATIONS}
 REPRESENTATIONS |= POSITIONS
 for _name, _row in REPRESENTATIONS.items():
@@ -341,12 +342,12 @@ for _name, _row in REPRESENTATIONS.items():
 
 
 class Notation:
-    """A representation with its axes and unit bound: what `rpy_deg` or `euler:rzyx` spells."""
+    """A representation with its axes and unit: what `rpy_deg` or `euler:rzyx` means."""
 
     __slots__ = ("axes", "degrees", "representation", "spec")
 
     def __init__(self, spec: str, representation: Representation, axes: str | None, *, degrees: bool | None) -> None:
-        """Bind; `axes` is None where none were named, `degrees` where the unit was not said."""
+        """Store them; `axes` is None if none were named, `degrees` if the unit was not stated."""
         self.spec = spec
         self.representation = representation
         self.axes = axes
@@ -354,11 +355,11 @@ class Notation:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Name the columns; angles carry the unit where it was said."""
+        """Return the names of the columns; angles carry the unit if it was stated."""
         return self.columns_in(degrees=None)
 
     def columns_in(self, *, degrees: bool | None) -> tuple[str, ...]:
-        """Name the columns; angles carry the notation's unit, else say that they are `degrees`."""
+        """Return the names of the columns; angles carry the notation's unit, or else that of `degrees`."""
         row = self.representation
         suffix = "_deg" if (self.degrees or (degrees and self.degrees is None)) else "_rad" * (self.degrees is False)
         return tuple(name + suffix * (index in row.angles) for index, name in enumerate(row.columns))
@@ -383,31 +384,31 @@ class Notation:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Return how many numbers say a rotation, and how many a whole pose."""
+        """Return how many numbers make a rotation, and how many a whole pose."""
         size, whole = len(self.representation.columns), self.representation.whole
         return (size, size + 3, len(whole.columns)) if whole else (size, size + 3)
 
     @property
     def counted(self) -> str:
-        """Say how many numbers it takes, for messages."""
+        """Return how many numbers it takes, for messages."""
         size, placed, *whole = self.counts
         if whole:
             return f"{self.spec} has {size} numbers, {placed} (three rows of a pose) or {whole[0]}"
         return f"{self.spec} has {size} numbers ({' '.join(self.columns)}), or {placed} with x y z before them"
 
     def in_degrees(self, default: bool) -> bool:  # noqa: FBT001 - the one thing it is about
-        """Tell whether angles are degrees: as the notation says, else as `default`."""
+        """Return True if angles are degrees: as the notation states, else as `default`."""
         return default if self.degrees is None else self.degrees
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
-        """Return x, y, z, w; `degrees` counts where the notation itself says no unit."""
+        """Return x, y, z, w; `degrees` applies if the notation itself states no unit."""
         unit = self.in_degrees(degrees)
         return self.representation.to_quaternion(components, xp, degrees=unit, axes=self.bound_axes())
 
     def from_quaternion(
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, keep_sign: bool = False
     ) -> Components:
-        """Return the components of a unit quaternion; `degrees` counts where the notation itself says no unit."""
+        """Return the components of a unit quaternion; `degrees` applies if the notation itself states no unit."""
         return self.representation.from_quaternion(
             x, y, z, w, xp, degrees=self.in_degrees(degrees), axes=self.bound_axes(), keep_sign=keep_sign
         )
@@ -418,19 +419,19 @@ class Notation:
         """Check the floats of one rotation and return its quaternion.
 
         Raises:
-            ValueInvalid: wrong count, not finite, or no rotation.
+           ValueInvalid: wrong count, not finite, or not a rotation.
         """
         return self.to_quaternion(self.representation.checked(components, normalize=normalize), xp, degrees=degrees)
 
     def bound_axes(self) -> str:
-        """Return the Euler axes; raise ValueInvalid where they have to be named and were not."""
+        """Return the Euler axes; raise ValueInvalid if they have to be named and were not."""
         if self.representation.axes == NAMED_AXES and self.axes is None:
             raise ValueInvalid(f"{self.spec} needs its axes: write euler:rzyx (one of {', '.join(sorted(euler.AXES))})")
         return self.axes or "sxyz"
 
 
 def _upper_rows() -> Notation:
-    """Make the notation of a pose as the first three rows of its 4x4: what a row of a KITTI trajectory is."""
+    """Return the notation of a pose as the first three rows of its 4x4, as in a KITTI trajectory."""
     row = Representation(
         "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "three rows of the matrix of a pose",
         shape=ROWS, whole=Whole(" ".join(HOMOGENEOUS.columns[:12]), _three_rows, _of_homogeneous),
@@ -442,7 +443,7 @@ def _upper_rows() -> Notation:
 
 
 def _heading_row() -> Representation:
-    """Make the rotation that a heading says: level, x so far clockwise from north; as a turn about down."""
+    """Return the notation of a heading: a level rotation, x pointing so far clockwise of north."""
 
     def forward(components: Components, xp: Namespace, degrees: bool, _axes: str) -> Quaternion:  # noqa: FBT001 - all do
         zero = components[0] - components[0]
@@ -453,15 +454,16 @@ def _heading_row() -> Representation:
     return row
 
 
-UPPER_ROWS = _upper_rows()  # no name spells it: twelve numbers of a file say it
-HEADING = _heading_row()  # nor this: it is read beside a place on the Earth, whose axes say which way is up
+UPPER_ROWS = _upper_rows()  # it has no name: twelve numbers of a file select it
+HEADING = _heading_row()  # no name either: it is read with a position on the Earth, whose axes state which way is up
 
 
 def notation(spec: str) -> Notation:
     """Read the name of a notation: `rpy`, `rpy_deg`, `euler:rzyx`, `euler_deg:rzyx`.
 
     Raises:
-        ValueInvalid: unknown name or axes, a unit where there is no angle; with the nearest name and those there are.
+       ValueInvalid: unknown name or axes, a unit without an angle; lists the nearest name and all names.
+
     """
     name, colon, axes = spec.partition(":")
     bare, degrees = name, None
@@ -481,20 +483,20 @@ def notation(spec: str) -> Notation:
 
 
 def _near_names(name: str) -> str:
-    """Name the nearest representation, and those nearly as near that have the same numbers in another order."""
+    """Return the nearest representation, and those nearly as near that have the same numbers in another order."""
     near = nearest(name, REPRESENTATIONS)
     rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
     return f"; did you mean {' or '.join(map(shown, rivals))}?" if near else ";"
 
 
 def notations(spec: str) -> tuple[Notation, ...]:
-    """Read the name of a notation, or `euler:all` for the 24 conventions there are; raises as `notation` does."""
+    """Read the name of a notation, or `euler:all` for all 24 conventions; raises as `notation` does."""
     name, _, axes = spec.partition(":")
     return tuple(notation(f"{name}:{each}") for each in sorted(euler.AXES)) if axes == "all" else (notation(spec),)
 
 
 def checked_axes(axes: str) -> str:
-    """Return the name of an Euler convention back if it is one; else raise ValueInvalid with the nearest."""
+    """Return the name of an Euler convention; raise ValueInvalid, naming the nearest, if it is not one."""
     if axes in euler.AXES:
         return axes
     near = _both_readings(axes.lower()) or _near_axes(axes.lower()) or ";"
@@ -504,12 +506,12 @@ def checked_axes(axes: str) -> str:
 
 
 def _near_axes(axes: str) -> str:
-    """Name the nearest convention with the same first letter: static axes are never offered for rotating ones."""
+    """Return the nearest convention with the same first letter: static axes are never suggested for rotating ones."""
     return did_you_mean(axes, [each for each in euler.AXES if each[0] == axes[:1]])
 
 
 def _both_readings(letters: str) -> str:
-    """Name the two conventions that three letters may mean, bare or behind another than s and r; else nothing."""
+    """Return a suggestion of the two conventions that three letters may mean, bare or with another prefix; else ""."""
     letters = letters[1:] if letters[:1] not in ("s", "r") and f"r{letters[1:]}" in euler.AXES else letters
     if f"r{letters}" not in euler.AXES:
         return ""
@@ -517,7 +519,7 @@ def _both_readings(letters: str) -> str:
 
 
 def axes_name(order: str, frame: str) -> str:
-    """Return the tf name of Euler axes told as order and frame: `zyx`, `intrinsic` is `rzyx`."""
+    """Return the tf name of Euler axes from order and frame: `zyx`, `intrinsic` is `rzyx`."""
     prefix = {"intrinsic": "r", "extrinsic": "s"}.get(frame)
     if prefix is None:
         choices = "intrinsic (rotating axes) or extrinsic (static axes)"

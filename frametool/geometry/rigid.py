@@ -1,8 +1,8 @@
 """Kernels of rigid transforms: translation tx, ty, tz in metres, then the unit quaternion x, y, z, w.
 
-Products and inverses; the way between two poses, prepared once and walked at many fractions, its rotation that of
-`quaternion.slerp` to the bit; chains of joints, whose fixed pieces cost nothing where they are zero; and twists and
-wrenches seen from another frame (linear part first), by the adjoint.
+Products and inverses; interpolation of two poses, prepared once for many fractions, with exactly the rotation of
+`quaternion.slerp`; chains of joints, whose constant zeros cost nothing; and twists and wrenches in another frame
+(linear part first), by the adjoint.
 Knows numbers only; components are floats or arrays of one shape, and both take the same steps.
 """
 
@@ -67,7 +67,7 @@ def inverse(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Seven[N]:
 
 
 def apply(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, px: N, py: N, pz: N) -> Three[N]:
-    """Move a point: rotate, then shift."""
+    """Transform a point: rotate, then translate."""
     rx, ry, rz = quaternion.rotate(x, y, z, w, px, py, pz)
     return rx + tx, ry + ty, rz + tz
 
@@ -76,7 +76,7 @@ def relative(
     atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
     btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N,
 ) -> Seven[N]:  # fmt: skip
-    """Return inverse(a) b; the translations are subtracted first, so that near poses keep their digits."""
+    """Return inverse(a) b; the translations are subtracted first, so that close poses keep their digits."""
     x, y, z, w = quaternion.conjugate(ax, ay, az, aw)
     tx, ty, tz = quaternion.rotate(x, y, z, w, btx - atx, bty - aty, btz - atz)
     qx, qy, qz, qw = quaternion.compose(x, y, z, w, bx, by, bz, bw)
@@ -84,7 +84,7 @@ def relative(
 
 
 def mirrored(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Seven[N]:
-    """Return a pose as a mirror across y shows it: both its frames have left-handed axes then."""
+    """Return a pose reflected across y: both its frames become left-handed."""
     return tx, -ty, tz, -x, y, -z, w
 
 
@@ -93,9 +93,9 @@ def interpolate(
     btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N,
     fraction: N, xp: Functions[N],
 ) -> Seven[N]:  # fmt: skip
-    """Return the pose between two: the translation along the straight line, the rotation by slerp, as tf2 does.
+    """Interpolate two poses: the translation linearly, the rotation by slerp, as tf2 does.
 
-    fraction: 0 gives a and 1 gives b to the bit; outside is extrapolated.
+    fraction: 0 gives exactly a and 1 exactly b; values outside extrapolate.
     """
     x, y, z, w = quaternion.slerp(ax, ay, az, aw, bx, by, bz, bw, fraction, xp)
     tx, ty, tz = _line(atx, btx, fraction, xp), _line(aty, bty, fraction, xp), _line(atz, btz, fraction, xp)
@@ -103,7 +103,7 @@ def interpolate(
 
 
 def _line(start: N, end: N, fraction: N, xp: Functions[N]) -> N:
-    """Interpolate two numbers from the nearer end; the ends to the bit."""
+    """Interpolate two numbers from the nearer end; exact at both ends."""
     step = end - start
     between = xp.where(fraction < 0.5, start + fraction * step, end - (1.0 - fraction) * step)
     return either(fraction == 0.0, start, fraction == 1.0, end, between, xp)
@@ -113,13 +113,13 @@ def distance(
     atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
     btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> Two[N]:  # fmt: skip
-    """Return the metres and the radians between two poses."""
+    """Return the distance in metres and the angle in radians between two poses."""
     metres = quaternion.magnitude(btx - atx, bty - aty, btz - atz, xp)
     return metres, quaternion.distance(ax, ay, az, aw, bx, by, bz, bw, xp)
 
 
 def extent(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Two[N]:
-    """Return how far a transform shifts, in metres, and turns, in [0, pi] radians."""
+    """Return the translation of a transform in metres and its angle in [0, pi] radians."""
     return quaternion.magnitude(tx, ty, tz, xp), quaternion.angle(x, y, z, w, xp)
 
 
@@ -130,13 +130,13 @@ def to_matrix(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N) -> Twelve[N]:
 
 
 def to_homogeneous(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, _xp: Functions[N]) -> Components:
-    """Return the sixteen entries of the homogeneous matrix, row-major; floats stand for every row."""
+    """Return the sixteen entries of the homogeneous matrix, row-major; floats are constant for all rows."""
     upper: Components = to_matrix(tx, ty, tz, x, y, z, w)
     return *upper, 0.0, 0.0, 0.0, 1.0
 
 
 def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float) -> None:
-    """Raise ValueInvalid for a twist that is not finite, or turns so far that no digit of the angle is left."""
+    """Raise ValueInvalid for a twist that is not finite, or so large that no digit of its angle is left."""
     if not all(isfinite(value) for value in (vx, vy, vz)):
         raise ValueInvalid(f"twist {vx:g} {vy:g} {vz:g} is not finite; give finite numbers")
     vectors.check_rotvec(wx, wy, wz)
@@ -185,7 +185,7 @@ def prepare(
     atx: N, aty: N, atz: N, ax: N, ay: N, az: N, aw: N,
     btx: N, bty: N, btz: N, bx: N, by: N, bz: N, bw: N, xp: Functions[N],
 ) -> Eight[N]:  # fmt: skip
-    """Return the step dx, dy, dz in metres, then what `quaternion.toward` does: c as x, y, z, w, and half the arc."""
+    """Return the step dx, dy, dz in metres, then the result of `quaternion.toward`: c as x, y, z, w, half the arc."""
     cx, cy, cz, cw, half_arc = quaternion.toward(ax, ay, az, aw, bx, by, bz, bw, xp)
     return btx - atx, bty - aty, btz - atz, cx, cy, cz, cw, half_arc
 
@@ -195,9 +195,9 @@ def along(
     dx: N, dy: N, dz: N, cx: N, cy: N, cz: N, cw: N, half_arc: N,
     fraction: N, xp: Functions[N],
 ) -> Seven[N]:  # fmt: skip
-    """Return the pose at a fraction of the way from a, by what `prepare` gave; unit to some eps.
+    """Return the pose at a fraction of the segment from a, as prepared by `prepare`; unit to a few eps.
 
-    fraction: 0 to 1, so that the angle never needs to be reduced.
+    fraction: 0 to 1, so that the angle needs no reduction.
     """
     sine, cosine = xp.doubled_sincos(fraction * half_arc)
     return (
@@ -207,25 +207,25 @@ def along(
 
 
 def turned(ax: float, ay: float, az: float, angle: N, xp: Functions[N], *, degrees: bool = False) -> Rigid:
-    """Return the motion of a revolute or continuous joint: a turn about its axis, in radians or degrees."""
+    """Return the motion of a revolute or continuous joint: a rotation about its axis, in radians or degrees."""
     sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
     return 0.0, 0.0, 0.0, _times(ax, sine), _times(ay, sine), _times(az, sine), cosine
 
 
 def slid(ax: float, ay: float, az: float, distance: N) -> Rigid:
-    """Return the motion of a prismatic joint: a shift along its axis, in metres."""
+    """Return the motion of a prismatic joint: a translation along its axis, in metres."""
     return _times(ax, distance), _times(ay, distance), _times(az, distance), 0.0, 0.0, 0.0, 1.0
 
 
 def _times(part: float, values: Number) -> Number:
-    """Multiply by a part of an axis, which mostly is 0: then a plain float stays one and costs nothing further on."""
+    """Multiply by a component of an axis, mostly 0: then the product is the plain float 0 and costs nothing."""
     return part * values if part else 0.0
 
 
 def go_on(pose: Rigid, piece: Rigid) -> Rigid:
-    """Return the pose at the end of a piece: the bits of `compose`, but plain zeros cost nothing.
+    """Return the pose at the end of a segment: the same bits as `compose`, but plain zeros cost nothing.
 
-    Most parts of robots are such zeros, where their values are arrays.
+    Most components of robot models are such zeros, while joint values are arrays.
     """
     tx, ty, tz, x, y, z, w = pose
     px, py, pz, bx, by, bz, bw = piece
@@ -247,7 +247,7 @@ def go_on(pose: Rigid, piece: Rigid) -> Rigid:
 
 
 def _rotated(rotation: Quaternion, vector: Vector) -> Vector:
-    """Rotate a vector by the columns of the matrix that it needs, as `quaternion.rotate` does."""
+    """Rotate a vector by only those columns of the matrix that it needs, as `quaternion.rotate` does."""
     x, y, z, w = rotation
     vx, vy, vz = vector
     scale = 2.0 / (x * x + y * y + z * z + w * w)
@@ -268,7 +268,7 @@ def _is_zero(number: Number) -> bool:
 
 
 def _sum(*terms: tuple[Number, Number]) -> Number:
-    """Add up products, those with a plain 0 left out."""
+    """Add products, omitting those that are a plain 0."""
     total = None
     for one, other in terms:
         if _is_zero(one) or _is_zero(other):

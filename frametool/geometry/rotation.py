@@ -1,7 +1,7 @@
-"""The value of a rotation, or of many: components inside, numpy at its face.
+"""The value of a rotation, or of many: components inside, numpy arrays outside.
 
-Knows no text and no files; radians only. One item is four Python floats and needs no numpy until it shows an array.
-`Batched` is what it shares with `Transform`: one item or an array of them, numpy's ways of choosing.
+Knows no text and no files; radians only. One item is four Python floats and needs no numpy until it returns an array.
+`Batched` is what it shares with `Transform`: one item or an array of them, with numpy's indexing.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Components, Numbers, Quaternion
 
 _new_batched = object.__new__
-OTHER_NAMES = {  # of SciPy and others, and what is called so here; of a Transform also by way of its rotation
+OTHER_NAMES = {  # attributes of SciPy and others, and their names here; for a Transform also through its rotation
     "from_quat": "from_quaternion", "as_quat": "as_quaternion", "from_dcm": "from_matrix", "as_dcm": "as_matrix",
     "inv": "inverse", "magnitude": "angle", "translation": "xyz", "from_translation": "from_parts",
 }  # fmt: skip
 
 
 def no_attribute(owner: type, name: str) -> AttributeError:
-    """Return the error for an attribute that is not there, with what it is called here."""
+    """Return the error for a missing attribute, with the name that it has here."""
     own = OTHER_NAMES.get(name, name)
     if own not in dir(owner):
         through = f"from_parts({own[5:]}=..)" if own.startswith("from_") else f"rotation.{own}"
@@ -38,7 +38,7 @@ def no_attribute(owner: type, name: str) -> AttributeError:
 
 
 class OtherNames(type):
-    """Names what is called otherwise elsewhere where an attribute of the class is missing."""
+    """Errors for missing attributes of the class that suggest the name used here."""
 
     if not TYPE_CHECKING:  # a checker finds what is missing by itself
 
@@ -48,7 +48,7 @@ class OtherNames(type):
 
 
 class Batched(metaclass=OtherNames):
-    """One item, or an array of them of any shape; frozen."""
+    """One item, or an array of them of any shape; immutable."""
 
     __slots__ = ("_components",)
     __array_ufunc__ = None  # an array times a value is refused, not tried element by element
@@ -56,7 +56,7 @@ class Batched(metaclass=OtherNames):
 
     @classmethod
     def _of_columns(cls, components: Components) -> Self:
-        """Trust components, all floats or all arrays of one shape."""
+        """Create from trusted components, all floats or all arrays of one shape."""
         made = _new_batched(cls)
         made._components = components  # noqa: SLF001 - its own class
         return made
@@ -64,7 +64,7 @@ class Batched(metaclass=OtherNames):
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise AttributeError, with what it is called here."""
+            """Raise AttributeError, with the name that the attribute has here."""
             raise no_attribute(type(self), name)
 
     @property
@@ -73,49 +73,50 @@ class Batched(metaclass=OtherNames):
         return getattr(self._components[-1], "shape", ())
 
     def __len__(self) -> int:
-        """Count along the first axis; one item has no length."""
+        """Return the length of the first axis; one item has no length."""
         if not self.shape:
             raise TypeError(f"one {type(self).__name__.lower()} has no length")
         return self.shape[0]
 
     def __getitem__(self, index: Any) -> Self:
-        """Choose elements as numpy does."""
+        """Select elements as numpy does."""
         if not self.shape:
             raise TypeError(f"one {type(self).__name__.lower()} has no elements")
         return self._of_columns(validation.chosen(self._components, index))
 
     def __iter__(self) -> Iterator[Self]:
-        """Go along the first axis."""
+        """Iterate over the first axis."""
         return (self[index] for index in range(len(self)))
 
 
-NEAR = 1e-9  # rad: rotations closer than this count as close, three digits above the rounding of long chains
+NEAR = 1e-9  # rad: the default of `is_close`, three digits above the rounding of long chains
 
 _new = object.__new__
 _form = cache(notation)
 
 
 class Rotation(Batched):
-    """One rotation, or an array of them of any shape; frozen.
+    """One rotation, or an array of them of any shape; immutable.
 
     Active, right-handed; quaternions are Hamilton's, x, y, z, w.  `@` composes (the right one acts first), `apply`
-    turns vectors.  Every `from_X` takes leading axes (..., k), every `as_X` gives them; nothing given is changed.
+    rotates vectors.  Every `from_X` accepts leading axes (..., k), every `as_X` returns them; arguments are never
+    changed.
 
     `out=` of `as_X` and `apply`: a writable numpy array of float64 in native byte order, of the result's shape, with
-    any strides (a memmap too), which is filled and returned.  It may be, or overlap, what is read:
-    `r.apply(points, out=points)` turns points where they are, or raises and leaves them as they were.
+    any strides (also a memmap); it is filled and returned.  It may be, or overlap, the input:
+    `r.apply(points, out=points)` rotates points in place, or raises an error and leaves them unchanged.
     """
 
     __slots__ = ()
     _components: Quaternion
 
     def __init__(self, xyzw: Numbers) -> None:
-        """Take quaternions x, y, z, w of shape (..., 4), as `from_quaternion` does."""
+        """Create from quaternions x, y, z, w of shape (..., 4), as `from_quaternion`."""
         self._components = Rotation.from_quaternion(xyzw).components
 
     @classmethod
     def of(cls, x: Any, y: Any, z: Any, w: Any) -> Rotation:
-        """Trust components to be unit, all floats or all arrays of one shape: the fast door without checks."""
+        """Create from unit components without checks, all floats or all arrays of one shape."""
         made = _new(cls)
         made._components = (x, y, z, w)  # noqa: SLF001 - its own class
         return made
@@ -127,12 +128,12 @@ class Rotation(Batched):
 
     @classmethod
     def identity(cls) -> Rotation:
-        """Return the rotation that turns nothing."""
+        """Return the identity rotation."""
         return cls.of(0.0, 0.0, 0.0, 1.0)
 
     @classmethod
     def random(cls, n: int | None = None, *, seed: Any = None) -> Rotation:
-        """Draw one rotation, or n, uniformly over all; a seed makes them repeatable.
+        """Return one random rotation, or n, uniformly distributed; a seed makes them reproducible.
 
         Source: Muller 1959, a normal vector of four has no preferred direction.
         """
@@ -143,31 +144,31 @@ class Rotation(Batched):
 
     @classmethod
     def from_quaternion(cls, xyzw: Numbers, *, normalize: bool = False) -> Rotation:
-        """Take quaternions x, y, z, w of shape (..., 4).
+        """Create from quaternions x, y, z, w of shape (..., 4).
 
-        Norms within 1e-6 of 1 are normalised in silence, within 1e-3 with a warning; with `normalize` any non-zero.
+        Norms within 1e-6 of 1 are normalised silently, within 1e-3 with a warning; with `normalize` any non-zero one.
 
         Raises:
-            ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
+           ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
         """
         return cls.from_columns("xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Rotation:
-        """Take matrices of shape (..., 3, 3), rows orthonormal to 1e-6 (to 1e-3: nearest rotation and a warning).
+        """Create from matrices of shape (..., 3, 3), orthonormal to 1e-6 (to 1e-3: nearest rotation and a warning).
 
-        With `normalize` the nearest rotation (the polar factor) where all singular values lie in 0.9 .. 1.1.
+        With `normalize`, the nearest rotation (the polar factor) if all singular values are in 0.9 .. 1.1.
 
         Raises:
-            ValueInvalid: wrong shape, not finite, mirrored, scaled, not orthonormal; names the first such row.
+           ValueInvalid: wrong shape, not finite, mirrored, scaled, not orthonormal; names the first such row.
         """
         return cls.from_columns("matrix", validation.matrices(matrices, 3, "matrix"), "matrix", normalize=normalize)
 
     @classmethod
     def from_notation(cls, name: str, numbers: Numbers, *, normalize: bool = False) -> Rotation:
-        """Take a representation by its name, `rpy_deg` or `euler:rzyx`: shape (..., its columns), matrices (..., 3, 3).
+        """Create from a representation, `rpy_deg` or `euler:rzyx`: shape (..., its columns), matrices (..., 3, 3).
 
-        A quaternion is asked for by its order, xyzw or wxyz.
+        Quaternions need an explicit order, xyzw or wxyz.
         """
         form = _form(name)
         form.bound_axes()
@@ -180,40 +181,40 @@ class Rotation(Batched):
 
     @classmethod
     def from_rotvec(cls, rotvec_xyz: Numbers) -> Rotation:
-        """Take rotation vectors, axis times angle in radians, of shape (..., 3)."""
+        """Create from rotation vectors, axis times angle in radians, of shape (..., 3)."""
         return cls.from_columns("rotvec", validation.columns(rotvec_xyz, 3, "rotvec"), "rotvec")
 
     @classmethod
     def from_axis_angle(cls, axis: Numbers, angle: Numbers) -> Rotation:
-        """Take axes of shape (..., 3), of any length but 0, and angles in radians of shape (...); they broadcast."""
+        """Create from axes of shape (..., 3), non-zero, and angles in radians of shape (...); they broadcast."""
         given = (*validation.columns(axis, 3, "axis"), validation.scalars(angle, "angle"))
         return cls.from_columns("axis_angle", given, "axis")
 
     @classmethod
     def from_euler(cls, axes: str, angles: Numbers) -> Rotation:
-        """Take angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`."""
+        """Create from angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`."""
         return cls.from_columns(f"euler:{axes}", validation.columns(angles, 3, "angles"), "angles")
 
     @classmethod
     def from_rpy(cls, rpy: Numbers) -> Rotation:
-        """Take roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
+        """Create from roll, pitch, yaw in radians about the fixed axes x, y, z, of shape (..., 3)."""
         return cls.from_columns("rpy", validation.columns(rpy, 3, "rpy"), "rpy")
 
     @classmethod
     def from_mrp(cls, parameters: Numbers) -> Rotation:
-        """Take modified Rodrigues parameters, axis times tan(angle/4), of shape (..., 3)."""
+        """Create from modified Rodrigues parameters, axis times tan(angle/4), of shape (..., 3)."""
         return cls.from_columns("mrp", validation.columns(parameters, 3, "mrp"), "mrp")
 
     @classmethod
     def from_six_d(cls, columns: Numbers) -> Rotation:
-        """Take the first two matrix columns, one after the other, of shape (..., 6); they are orthonormalised."""
+        """Create from the first two matrix columns, one after another, of shape (..., 6); they are orthonormalised."""
         return cls.from_columns("six_d", validation.columns(columns, 6, "six_d"), "six_d")
 
     @classmethod
     def between(cls, start: Numbers, end: Numbers) -> Rotation:
-        """Return the shortest rotation that turns one direction, shape (..., 3), into another; lengths do not matter.
+        """Return the shortest rotation from one direction, shape (..., 3), to another; lengths do not matter.
 
-        For opposite directions the axis is at right angles to the start and to the coordinate axis farthest from it.
+        For opposite directions the axis is orthogonal to the start and to the coordinate axis farthest from it.
         """
         parts = (*validation.columns(start, 3, "start"), *validation.columns(end, 3, "end"))
         made = validation.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions)
@@ -223,7 +224,7 @@ class Rotation(Batched):
     def from_columns(
         cls, spec: str, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
     ) -> Rotation:
-        """Check and convert the columns of a notation; errors call them `name`, `into` is where many come to stand."""
+        """Check and convert the columns of a notation; errors call them `name`, `into` receives the result of many."""
         form = _form(spec)
         if validation.single(given):
             return cls.of(*form.checked_quaternion(given, floats, normalize=normalize))
@@ -232,7 +233,7 @@ class Rotation(Batched):
         return cls._of_columns(require_rotations(form, given, name, normalize=normalize, into=into))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
-        """Return rows of the columns of a notation, of another shape where one is told, in `out` if given."""
+        """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""
         form = _form(spec)
         return validation.rows(form.from_quaternion, inner or (len(form.columns),), self._components, out=out)
 
@@ -241,7 +242,7 @@ class Rotation(Batched):
         return self._as("xyzw", out)
 
     def as_matrix(self, *, out: Array | None = None) -> Array:
-        """Return matrices of shape (..., 3, 3); columns are the turned axes."""
+        """Return matrices of shape (..., 3, 3); their columns are the rotated axes."""
         return self._as("matrix", out, (3, 3))
 
     def as_rotvec(self, *, out: Array | None = None) -> Array:
@@ -251,7 +252,7 @@ class Rotation(Batched):
     def as_axis_angle(self, *, out: Array | None = None) -> tuple[Array, Any]:
         """Return unit axes of shape (..., 3) and angles in [0, pi] of shape (...); the identity has the axis x.
 
-        `out`, of shape (..., 4), takes axis and angle side by side; what is returned are views of it.
+        `out`, of shape (..., 4), receives axis and angle in one row; the returned arrays are views of it.
         """
         four = self._as("axis_angle", out)
         return four[..., :3], four[..., 3] if four.ndim > 1 else float(four[3])
@@ -259,7 +260,7 @@ class Rotation(Batched):
     def as_euler(self, axes: str, *, out: Array | None = None) -> Array:
         """Return angles in radians of shape (..., 3), in the order of the letters of a tf name such as `rzyx`.
 
-        The middle one lies in [-pi/2, pi/2], or in [0, pi] where first and third axis are the same; at gimbal lock
+        The middle one is in [-pi/2, pi/2], or in [0, pi] if first and third axis are the same; at gimbal lock
         (see `gimbal_lock`) the third is 0.
         """
         return self._as(f"euler:{axes}", out)
@@ -273,11 +274,11 @@ class Rotation(Batched):
         return self._as("mrp", out)
 
     def as_six_d(self, *, out: Array | None = None) -> Array:
-        """Return the first two matrix columns, one after the other, of shape (..., 6)."""
+        """Return the first two matrix columns, one after another, of shape (..., 6)."""
         return self._as("six_d", out)
 
     def gimbal_lock(self, axes: str) -> Any:
-        """Say per element whether the angles of a convention are at gimbal lock, to 1 eps."""
+        """Return True for each element whose angles in a convention are at gimbal lock, to 1 eps."""
         locked = euler.locked(*self._components, checked_axes(axes))
         return bool(locked) if validation.single(self._components) else locked
 
@@ -293,15 +294,15 @@ class Rotation(Batched):
         return self._of_columns(validation.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Rotation:
-        """Return the rotation back."""
+        """Return the inverse rotation."""
         return Rotation.of(*quaternion.conjugate(*self._components))
 
     def canonical(self) -> Rotation:
-        """Return the same rotation, its quaternion with the canonical sign."""
+        """Return the same rotation with a quaternion of canonical sign."""
         return self._of_columns(validation.run(quaternion.from_quaternion, 4, self._components))
 
     def apply(self, vectors: Numbers, *, out: Array | None = None) -> Array:
-        """Turn vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
+        """Rotate vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         given = validation.columns(vectors, 3, "vectors")
         parts = self._components
         return validation.moved(quaternion.rotate, parts, given, "vectors", flatten=quaternion.to_matrix, out=out)
@@ -315,11 +316,11 @@ class Rotation(Batched):
         return validation.number(quaternion.distance, (*self._components, *require(other, "other").components))
 
     def is_close(self, other: Rotation, *, angle: float = NEAR) -> Any:
-        """Say per element whether two rotations are within an angle in radians; q and -q are one."""
+        """Return True for each element whose rotations differ by at most an angle in radians; q and -q are the same."""
         return self.distance(other) <= angle
 
     def slerp(self, other: Rotation, fraction: Numbers) -> Rotation:
-        """Interpolate along the shorter arc; fraction 0 gives this one and 1 the other to the bit.
+        """Interpolate along the shorter arc; fraction 0 returns exactly this rotation and 1 exactly the other.
 
         fraction: a number, or an array that broadcasts with the rotations.
         """
@@ -344,7 +345,7 @@ class Rotation(Batched):
 
 
 def require(value: object, name: str) -> Rotation:
-    """Return a rotation back; raise ValueInvalid for anything else."""
+    """Return a rotation; raise ValueInvalid for anything else."""
     if isinstance(value, Rotation):
         return value
     raise ValueInvalid(f"{name}: expected a Rotation, got {type(value).__name__}")

@@ -1,4 +1,4 @@
-"""How far transforms lie from their mean, and whether there is one."""
+"""The mean of transforms, whether it exists, and the distances of the transforms from it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Numbers
 
-LEAST_GAP = 1e-9  # between the two largest eigenvalues, as a part of their sum
+LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
 
 
 class Spread(NamedTuple):
-    """Distances from a mean, in metres and radians: the root of their weighted mean square, and the largest."""
+    """Distances from a mean, in metres and radians: the weighted root mean square, and the largest."""
 
     distance_rms: float
     distance_max: float
@@ -24,10 +24,10 @@ class Spread(NamedTuple):
 
 
 def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[Transform, Spread]:
-    """Return the weighted mean of transforms, as `Transform.mean`, and how far they lie from it.
+    """Return the weighted mean of transforms, as `Transform.mean`, and their distances from it.
 
-    What has no weight counts for nothing.
-    Raises ValueInvalid where weights are none, or the rotations point so many ways that none is the mean.
+    Transforms with weight 0 have no effect.
+    Raises ValueInvalid for invalid weights, and if the rotations are so different that they have no mean.
     """
     mass = validation.masses(weights, poses.shape)
     moment = validation.second_moment(poses.components[3:], mass)
@@ -45,7 +45,7 @@ def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[T
 
 
 def _refuse_no_mean(moment: Any) -> None:
-    """Stop where two eigenvectors of sum(w q q^T) are as good as each other."""
+    """Raise an error if two eigenvectors of sum(w q q^T) are equally good."""
     import numpy as np
 
     *_, second, first = np.linalg.eigvalsh(np.array(moment))

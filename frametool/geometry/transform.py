@@ -1,6 +1,6 @@
-"""The value of a rigid transform, or of many: seven components inside, numpy at its face.
+"""The value of a rigid transform, or of many: seven components inside, numpy arrays outside.
 
-Knows no names and no time. `a_from_b` takes points seen in b to the same points seen in a, and is the pose of b in a.
+Knows no names and no time. `a_from_b` maps points in b to the same points in a, and is the pose of b in a.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Numbers, Rigid
 
-NEAR_BY = 1e-9  # metres: translations closer than this count as close
+NEAR_BY = 1e-9  # metres: the default of `is_close` for translations
 _new = object.__new__
 
 
 class Transform(Batched):
-    """One rigid transform, or an array of them of any shape; frozen.
+    """One rigid transform, or an array of them of any shape; immutable.
 
     `a_from_c = a_from_b @ b_from_c`; `point_in_a = a_from_b.apply(point_in_b)`.  Metres and radians.
 
     `out=` of `as_matrix`, `log` and every `apply`: a writable numpy array of float64 of the result's shape, which is
-    filled and returned; it may be what is read.  `Rotation` says precisely what is taken.
+    filled and returned; it may be the input itself.  See `Rotation` for details.
     """
 
     __slots__ = ()
     _components: Rigid
 
     def __init__(self, rotation: Rotation, translation: Numbers) -> None:
-        """Join a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
+        """Create from a rotation and a translation of shape (..., 3) in metres; batch shapes broadcast."""
         if not isinstance(rotation, Rotation):
             kind = type(rotation).__name__
             advice = "Transform(rotation, xyz) takes a Rotation first; from_parts(xyz=.., rpy=..) says which is which"
@@ -43,7 +43,7 @@ class Transform(Batched):
 
     @classmethod
     def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
-        """Trust components, all floats or all arrays of one shape, the quaternion unit: the fast door."""
+        """Create from components without checks, all floats or all arrays of one shape, the quaternion unit."""
         made = _new(cls)
         made._components = (tx, ty, tz, x, y, z, w)  # noqa: SLF001 - its own class
         return made
@@ -55,12 +55,12 @@ class Transform(Batched):
 
     @classmethod
     def identity(cls) -> Transform:
-        """Return the transform that moves nothing."""
+        """Return the identity transform."""
         return cls.of(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
     @classmethod
     def random(cls, n: int | None = None, *, seed: Any = None, radius: float = 1.0) -> Transform:
-        """Draw one transform, or n: rotations uniform, translations normal with this deviation in metres."""
+        """Return one random transform, or n: uniform rotations, normal translations with this deviation in metres."""
         import numpy as np
 
         generator = np.random.default_rng(seed)
@@ -69,12 +69,12 @@ class Transform(Batched):
 
     @classmethod
     def from_parts(cls, xyz: Numbers = (0.0, 0.0, 0.0), *, normalize: bool = False, **rotation: Any) -> Transform:
-        """Make one, or many, of a position and a rotation: `Transform.from_parts(xyz=[1, 2, 3], rpy_deg=[0, 0, 90])`.
+        """Create one, or many, from position and rotation: `Transform.from_parts(xyz=[1, 2, 3], rpy_deg=[0, 0, 90])`.
 
         xyz: metres, shape (..., 3)
-        rotation: at most one, named as `frametool help rotations` has it: rpy, rpy_deg, xyzw, wxyz, rotvec, matrix ..;
-            or `rotation=` a Rotation, as of `Rotation.from_euler`.
-        Raises ValueInvalid for any other name, wrong shapes, not finite, or no rotation.
+        rotation: at most one, with a name of `frametool help rotations`: rpy, rpy_deg, xyzw, wxyz, rotvec, matrix ..;
+           or `rotation=` a Rotation, such as `Rotation.from_euler(..)`.
+        Raises ValueInvalid for any other name, wrong shapes, values that are not finite, or not a rotation.
         """
         if isinstance(xyz, Rotation):
             raise ValueInvalid("xyz: the position comes first, the rotation by its name: from_parts(xyz, rotation=..)")
@@ -87,20 +87,20 @@ class Transform(Batched):
 
     @classmethod
     def from_arrays(cls, xyz: Numbers, xyzw: Numbers, *, normalize: bool = False) -> Transform:
-        """Take translations of shape (..., 3) in metres and quaternions x, y, z, w of shape (..., 4).
+        """Create from translations of shape (..., 3) in metres and quaternions x, y, z, w of shape (..., 4).
 
         Raises:
-            ValueInvalid: wrong shapes, not finite, or no rotation; names the first such row.
+           ValueInvalid: wrong shapes, not finite, or not a rotation; names the first such row.
         """
         shift = validation.columns(xyz, 3, "xyz")
         return cls._read(shift, "xyz", "xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
-        """Take homogeneous matrices of shape (..., 4, 4), the last row 0 0 0 1.
+        """Create from homogeneous matrices of shape (..., 4, 4), the last row 0 0 0 1.
 
         Raises:
-            ValueInvalid: wrong shape, another last row, not finite, or no rotation; names the first such row.
+           ValueInvalid: wrong shape, another last row, not finite, or not a rotation; names the first such row.
         """
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")
@@ -111,7 +111,7 @@ class Transform(Batched):
     def _read(
         cls, shift: Components, shift_name: str, spec: str, turn: Components, turn_name: str, *, normalize: bool
     ) -> Transform:
-        """Check and convert columns; rotations as many as translations are made where they stay, without a copy."""
+        """Check and convert columns; if there are as many rotations as translations, without a copy."""
         shape = validation.batch_shape(shift)
         if not shape or validation.batch_shape(turn) != shape:
             rotation = Rotation.from_columns(spec, turn, turn_name, normalize=normalize)
@@ -171,32 +171,32 @@ class Transform(Batched):
         return self._of_columns(validation.run(rigid.inverse, 7, self._components, functions=False))
 
     def relative(self, other: Transform) -> Transform:
-        """Return the pose of the other seen from this one: self.inverse() @ other, near poses keeping their digits."""
+        """Return the pose of the other in this one: self.inverse() @ other, accurate also for close poses."""
         return self._of_columns(
             validation.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
         )
 
     def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
-        """Move points of shape (..., 3); transforms and points broadcast over the leading axes."""
+        """Transform points of shape (..., 3); transforms and points broadcast over the leading axes."""
         given = validation.columns(points, 3, "points")
         return validation.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix, out=out)
 
     def apply_vector(self, vectors: Numbers, *, out: Array | None = None) -> Array:
-        """Turn vectors of shape (..., 3): directions and velocities, which do not shift."""
+        """Rotate vectors of shape (..., 3): directions and velocities, which are not translated."""
         return self.rotation.apply(vectors, out=out)
 
     def apply_twist(self, twists: Numbers, *, out: Array | None = None) -> Array:
-        """Move velocities (vx, vy, vz, wx, wy, wz), shape (..., 6): that of the same body at this side's origin."""
+        """Transform twists (vx, vy, vz, wx, wy, wz), shape (..., 6): of the same body, at the target's origin."""
         given = validation.columns(twists, 6, "twists")
         return validation.moved(rigid.move_twist, self._components, given, "twists", out=out)
 
     def apply_wrench(self, wrenches: Numbers, *, out: Array | None = None) -> Array:
-        """Move wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to this side's origin."""
+        """Transform wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to the target's origin."""
         given = validation.columns(wrenches, 6, "wrenches")
         return validation.moved(rigid.move_wrench, self._components, given, "wrenches", out=out)
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
-        """Interpolate: translation along the line, rotation by slerp; fractions 0 and 1 give the ends to the bit.
+        """Interpolate: translation linearly, rotation by slerp; fractions 0 and 1 return the ends exactly.
 
         fraction: a number, or an array that broadcasts with the transforms.
         """
@@ -204,22 +204,22 @@ class Transform(Batched):
         return self._of_columns(validation.run(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
-        """Return the metres and the radians between two."""
+        """Return the distance in metres and the angle in radians between two."""
         metres, radians = validation.run(rigid.distance, 2, (*self._components, *_components_of(other)))
         return metres, radians
 
     def is_close(self, other: Transform, *, angle: float = NEAR, distance: float = NEAR_BY) -> Any:
-        """Say per element whether two are within an angle in radians and a distance in metres; q and -q are one."""
+        """Return True per element if two differ by at most an angle in radians and a distance in metres."""
         metres, radians = self.distance(other)
         close = (metres <= distance) & (radians <= angle)
         return bool(close) if type(metres) is float else close
 
     def canonical(self) -> Transform:
-        """Return the same transform, its quaternion with the canonical sign."""
+        """Return the same transform with a quaternion of canonical sign."""
         return Transform.of(*self._components[:3], *self.rotation.canonical().components)
 
     def mean(self, weights: Numbers | None = None) -> Transform:
-        """Return the weighted mean of all elements: of the translations, and the chordal one of the rotations."""
+        """Return the weighted mean of all elements: of the translations, and the chordal mean of the rotations."""
         if not self.shape:
             return self
         mass = validation.masses(weights, self.shape)

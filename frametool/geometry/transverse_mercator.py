@@ -1,11 +1,12 @@
 """Kernels of UTM on WGS84: zones, easting, northing, convergence and scale from latitude and longitude, and back.
 
 A zone is a number, 1 to 60, negative for the south: 32.0 is 32N, -32.0 is 32S; lat 0 is north.  Krueger's series to
-n^6, whose truncation is below a nanometre 30 degrees from the meridian.  Only + - * / and roots, and the project's own
-sines and arc tangents; what is out of UTM's reach becomes NaN, and `check_utm` and `check_grid` say why.
+n^6, whose truncation is below a nanometre 30 degrees from the meridian.  Only + - * / and square roots, and this
+package's own sines and arc tangents; what UTM does not cover becomes NaN; `check_utm` and `check_grid` return the
+reason.
 
 Source: Krueger 1912; Karney 2011, Transverse Mercator with an accuracy of a few nanometers, eq. 7 to 36;
-Karney 2024, On auxiliary latitudes, for the conformal one.
+Karney 2024, On auxiliary latitudes, for the conformal latitude.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Four, Functions, N, Seven, Two
 
-SOUTH, NORTH, REACH = -80.0, 84.0, 30.0  # degrees: where UTM ends, and how far a zone that is held may reach
-SLACK = 1e-4  # degrees, 11 m: a place at the edge that was written in whole metres still comes back
+SOUTH, NORTH, REACH = -80.0, 84.0, 30.0  # degrees: where UTM ends, and how far a fixed zone may reach
+SLACK = 1e-4  # degrees, 11 m: a position at the edge that was written in whole metres can still be read
 WIDEST = 0.6  # Krueger's eta in radians, above that of 30 degrees on the equator, 0.55
 FALSE_EASTING, FALSE_NORTHING = 5e5, 1e7
 ZONES = "", *(f"{zone}N" for zone in range(1, 61)), *(f"{zone}S" for zone in range(60, 0, -1))  # -32 is 32S too
@@ -49,7 +50,7 @@ def _in_powers(factors: Sequence[float], slope: float) -> tuple[float, ...]:
 def _sums(*rows: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the polynomials in cos 2x that are the sum of c_k sin 2kx over sin 2x, and its derivative.
 
-    Row k holds what c_k has of n^k and of the powers after it.
+    Row k holds the factors of n^k and of the following powers in c_k.
     """
     series = [N3**power * polynomial(N3, (*row, 0.0)) for power, row in enumerate(rows, 1)]
     return _in_powers(series, 2.0), _in_powers([0.0, *(2.0 * k * part for k, part in enumerate(series, 1))], 1.0)
@@ -67,7 +68,7 @@ BACK, _ = _sums(
     (-1 / 48, -1 / 15, 437 / 1440, -46 / 105, 1118711 / 3870720), (-17 / 480, 37 / 840, 209 / 4480, -5569 / 90720),
     (-4397 / 161280, 11 / 504, 830251 / 7257600), (-4583 / 161280, 108847 / 3991680), (-20648693 / 638668800,),
 )  # fmt: skip
-# the conformal latitude less the latitude, and the latitude less the conformal one (Karney 2024)
+# the conformal latitude minus the latitude, and the latitude minus the conformal one (Karney 2024)
 CONFORMAL, _ = _sums(
     (-2, 2 / 3, 4 / 3, -82 / 45, 32 / 45, 4642 / 4725), (5 / 3, -16 / 15, -13 / 9, 904 / 315, -1522 / 945),
     (-26 / 15, 34 / 21, 8 / 5, -12686 / 2835), (1237 / 630, -12 / 5, -24832 / 14175),
@@ -83,7 +84,7 @@ SINH = tuple(1.0 / factorial(2 * k + 1) for k in range(11))  # sinh(y)/y in y^2,
 
 
 def standard_zone(lat: N, lon: N, xp: Functions[N]) -> N:
-    """Return the zone of a place: six degrees each, but 32V of Norway wider and four zones over Svalbard."""
+    """Return the zone of a position: six degrees each, except 32V of Norway and four zones over Svalbard."""
     lon = earth.eastward(lon, xp)
     sixth = _steps(lon, 6.0, xp) + 31.0
     zone = xp.where(sixth > 60.0, 1.0, sixth)  # lon 180
@@ -96,10 +97,10 @@ def standard_zone(lat: N, lon: N, xp: Functions[N]) -> N:
 
 
 def zone_number(name: object) -> float:
-    """Return the number of a zone as it is written, `32N` or `32S`: a minus is the south.
+    """Return the number of a zone written as `32N` or `32S`, negative for the south.
 
     Raises:
-        ValueInvalid: no zone, one without its hemisphere, or one with the letter of a band.
+       ValueInvalid: not a zone, no hemisphere, or the letter of a band.
     """
     text = "".join(name.split()).lstrip("0").upper() if isinstance(name, str) else str(name)
     if text in ZONES[1:]:
@@ -114,23 +115,23 @@ def zone_number(name: object) -> float:
 
 
 def _steps(x: N, width: float, xp: Functions[N]) -> N:
-    """Return how many whole steps of a width a number is from 0, rounded down; exact at every edge."""
+    """Return the number of whole steps of a width from 0, rounded down; exact at every edge."""
     whole = nearest(x / width)
     return whole - xp.where(whole * width > x, 1.0, 0.0)
 
 
 def beside_meridian(lon: N, zone: N) -> N:
-    """Return how many degrees a longitude lies east of a zone's meridian, by one subtraction that rounds."""
+    """Return the degrees of a longitude east of a zone's meridian, by one subtraction that rounds."""
     meridian = 6.0 * abs(zone) - 183.0
     return lon - (meridian + 360.0 * nearest((lon - meridian) / 360.0))
 
 
 def utm(zone: N, lat: N, lon: N, xp: Functions[N]) -> Four[N]:
-    """Return easting, northing, convergence in degrees and grid scale of a place in a zone.
+    """Return easting, northing, convergence in degrees and grid scale of a position in a zone.
 
-    Convergence is how far grid north lies clockwise of true north.  Zone by zone exact to 5e-9 m, 30 degrees wide.
-    The conformal latitude needs no logarithm so: chi = lat + sum c_k sin 2k lat; on the sphere sin chi and cos chi
-    give xi and eta, and Krueger's series in xi + i eta the rest; its derivative turns and scales.
+    Convergence is the angle of grid north clockwise of true north.  Accurate to 5e-9 m in each zone, 30 degrees wide.
+    The conformal latitude needs no logarithm: chi = lat + sum c_k sin 2k lat; on the sphere sin chi and cos chi
+    give xi and eta, and Krueger's series in xi + i eta the rest; its derivative gives convergence and scale.
     """
     s, c = sincos_deg(within(lat, SOUTH, NORTH, xp), xp)
     east, front = sincos_deg(within(beside_meridian(within(lon, -180.0, 360.0, xp), zone), -REACH, REACH, xp), xp)
@@ -175,7 +176,7 @@ def lat_lon(zone: N, easting: N, northing: N, xp: Functions[N]) -> Two[N]:
 
 
 def _turned(s: N, c: N, d: N) -> Two[N]:
-    """Return sine and cosine of an angle further by d, below 0.004 radians."""
+    """Return sine and cosine of an angle increased by d, below 0.004 radians."""
     squared = d * d
     sine = d - (d * squared) * (1 / 6 - squared * (1 / 120))
     rest = squared * (0.5 - squared * (1 / 24))
@@ -206,12 +207,12 @@ def _complex_polynomial(x: N, y: N, coefficients: tuple[float, ...]) -> Two[N]:
 
 
 def grid_pose(zone: N, lat: N, lon: N, alt: N, xp: Functions[N]) -> Seven[N]:
-    """Return ecef_from_axes of the axes of a zone's grid at a place: x along grid east, y along grid north, z up."""
+    """Return ecef_from_axes of the axes of a zone's grid at a position: x along grid east, y along grid north, z up."""
     return earth.pose(lat, lon, alt, "grid", xp, utm(zone, lat, lon, xp)[2])
 
 
 def check_utm(zone: float, lat: float, lon: float, alt: float = 0.0) -> None:
-    """Raise ValueInvalid unless finite numbers are a place that UTM has, within 30 degrees of the zone's meridian."""
+    """Raise ValueInvalid unless finite numbers are a position within UTM and 30 degrees of the zone's meridian."""
     earth.check_lla(lat, lon, alt)
     if not SOUTH <= lat <= NORTH:
         raise ValueInvalid(f"lat {lat!r}: UTM ends at 84 N and 80 S; use lla, ecef or enu")
@@ -222,7 +223,7 @@ def check_utm(zone: float, lat: float, lon: float, alt: float = 0.0) -> None:
 
 
 def check_grid(zone: float, easting: float, northing: float) -> None:
-    """Raise ValueInvalid unless a position in a zone is a place that UTM has."""
+    """Raise ValueInvalid unless a position in a zone is covered by UTM."""
     if isnan(sum(lat_lon(zone, easting, northing, floats))):
         place = f"utm {ZONES[int(zone)]} {easting!r} {northing!r}"
         raise ValueInvalid(f"{place} is beyond 84 N, 80 S or 30 degrees of the meridian; easting and northing swapped?")

@@ -1,8 +1,8 @@
-"""Name the kinds of numbers the kernels take; nothing here exists at run time.
+"""The kinds of numbers that kernels take, for type checking; nothing here exists at run time.
 
-A kernel is written once, for floats and for float64 arrays of one shape: `N` is the one or the other, and mypy checks
+A kernel is written once, for floats and for float64 arrays of one shape: `N` is either of them, and mypy checks
 a kernel's body for each.  `Functions[N]` is what it finds in `xp`: the module `floats` or the module `arrays`.  A float
-among arrays stands for every element.
+among arrays is constant for every element.
 """
 
 # ruff: noqa: D102 - the functions of a namespace are those of `math`; the others say what they do where they stand
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     Twelve: TypeAlias = tuple[N, N, N, N, N, N, N, N, N, N, N, N]
 
     class Functions(Protocol[N]):
-        """The functions a kernel needs beyond arithmetic; all are exact or rounded right on every machine."""
+        """The functions that a kernel needs beyond arithmetic; all are exact or correctly rounded on every machine."""
 
         def sqrt(self, x: N, /) -> N: ...
         def copysign(self, size: N | float, sign: N, /) -> N: ...
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         def doubled_arctan(self, tangent: N, /) -> N: ...
         def reduced_exactly(self, x: N, /) -> Two[N]: ...
 
-    # Outside the kernels a value holds floats or arrays, which of them only its maker knows: no type tells.
+    # outside the kernels a value holds floats or arrays; the type does not state which
     Number: TypeAlias = Any
     Namespace: TypeAlias = Functions[Any]
     Vector: TypeAlias = tuple[Number, Number, Number]

@@ -1,9 +1,9 @@
-"""Covariances of poses, points, twists and wrenches, to first order: how they move, compose and invert.
+"""Covariances of poses, points, twists and wrenches, to first order: transformation, composition and inversion.
 
-Of a pose: over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of its parent, as ROS has it:
+Of a pose: over (x, y, z, rotation about X, Y, Z), metres and radians, along the fixed axes of its parent, as in ROS:
 t + d[:3], Exp(d[3:]) R.  Entries are row-major, 36 of a pose and 9 of a point, floats or arrays; None is exact.
-Results are symmetric to the bit: what is below the diagonal is written from above it.
-Source: Barfoot 2017, section 7.3; in the parent's axes both Jacobians are a lever arm and a turn.
+Results are exactly symmetric: entries below the diagonal are copies of those above it.
+Source: Barfoot 2017, section 7.3; in the parent's axes both Jacobians are a lever arm and a rotation.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 POSE, POINT = 36, 9  # entries
 INFINITE = float("inf")
 ORDER = {POSE: "x y z, turns about X Y Z", POINT: "x y z"}
-UNKNOWN = -1.0  # as a covariance begins in ROS, where nothing is known
+UNKNOWN = -1.0  # the first entry of an unknown covariance in ROS
 ASYMMETRY = 1e-6  # of the root of the product of the two variances
 NEGATIVE = 1e-9  # of the largest eigenvalue
 WIDE = 0.2  # radians
@@ -33,32 +33,32 @@ FIRST_ORDER = "sigma of a turn is {:.2g} rad: the first order is a few per cent 
 
 
 def propagate(jacobian: Rows, entries: Entries) -> Components:
-    """Return J A J'; floats give the same bits as a row of columns."""
+    """Return J A J'; one item gives the same bits as a row of an array."""
     import numpy as np
 
     flat = [number for row in jacobian for number in row]
     whole = np.stack(np.broadcast_arrays(*flat, *entries), axis=-1)
     side = len(jacobian[0])
     j, a = (part.reshape(*whole.shape[:-1], -1, side) for part in np.split(whole, [len(flat)], axis=-1))
-    with np.errstate(all="ignore"):  # what is not finite is refused where it would be written
+    with np.errstate(all="ignore"):  # values that are not finite are refused when they are written
         found = _product(_product(j, a), np.swapaxes(j, -1, -2))
     rows = found.tolist() if found.ndim == 2 else np.moveaxis(found, (-2, -1), (0, 1))
     return symmetric([number for row in rows for number in row])
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Multiply matrices, each sum in its order: BLAS has another one on every processor."""
+    """Multiply matrices, adding in a fixed order: that of BLAS depends on the processor."""
     return sum(a[..., :, at, None] * b[..., None, at, :] for at in range(a.shape[-1]))  # type: ignore[return-value]
 
 
 def propagate_compose(a: Rigid, of_a: Entries | None, b: Rigid, of_b: Entries | None) -> Components | None:
-    """Return the covariance of a_from_c of those of a_from_b and b_from_c: J A J' + R B R', J the adjoint of R t_b."""
+    """Return the covariance of a_from_c from those of a_from_b and b_from_c: J A J' + R B R', J = adjoint(R t_b)."""
     arm = quaternion.rotate(*a[3:], *b[:3])
     return total(of_a and propagate(adjoint(*arm), of_a), of_b and rotate_covariance(of_b, *a[3:]))
 
 
 def propagate_inverse(pose: Rigid, entries: Entries) -> Components:
-    """Return the covariance of b_from_a of that of a_from_b: J A J', J = [R', R'[t]x; 0, R']."""
+    """Return the covariance of b_from_a from that of a_from_b: J A J', J = [R', R'[t]x; 0, R']."""
     x, y, z, *rotation = pose
     back = quaternion.conjugate(*rotation)
     crossed = [quaternion.rotate(*back, *each) for each in ((x - x, z, -y), (-z, x - x, x), (y, -x, x - x))]
@@ -68,19 +68,19 @@ def propagate_inverse(pose: Rigid, entries: Entries) -> Components:
 
 
 def of_point(pose: Rigid, entries: Entries | None, point: Components, of_point: Entries | None) -> Components | None:
-    """Return the 3 x 3 covariance of a moved point: [I, -[R p]x] A [..]' + R C R'."""
+    """Return the 3 x 3 covariance of a transformed point: [I, -[R p]x] A [..]' + R C R'."""
     jacobian = adjoint(*quaternion.rotate(*pose[3:], *point))[:3]
     return total(entries and propagate(jacobian, entries), of_point and rotate_covariance(of_point, *pose[3:]))
 
 
 def of_vector(pose: Rigid, entries: Entries | None, vector: Components, of_vector: Entries | None) -> Components | None:
-    """Return the 3 x 3 covariance of a turned vector: [0, -[R v]x] A [..]' + R C R'."""
+    """Return the 3 x 3 covariance of a rotated vector: [0, -[R v]x] A [..]' + R C R'."""
     jacobian = [[0.0] * 3 + row[3:] for row in adjoint(*quaternion.rotate(*pose[3:], *vector))[:3]]
     return total(entries and propagate(jacobian, entries), of_vector and rotate_covariance(of_vector, *pose[3:]))
 
 
 def adjoint(x: Number, y: Number, z: Number) -> Rows:
-    """Return [I, -[v]x; 0, I]: what a pose's d does to a point fixed to the frame, at v from its origin."""
+    """Return [I, -[v]x; 0, I]: the effect of a pose's d on a point fixed to the frame, at v from its origin."""
     identity = [[float(i == j) for j in range(6)] for i in range(6)]
     identity[0][4:], identity[1][3:], identity[2][3:5] = [z, -y], [-z, 0.0, x], [y, -x]
     return identity
@@ -99,13 +99,13 @@ def _rows(x: Number, y: Number, z: Number, w: Number) -> Rows:
 
 
 def of_moved(move: Callable[..., Components], pose: Rigid, entries: Entries) -> Components:
-    """Return that of a twist or wrench that `move` moves by an exact pose."""
+    """Return the covariance of a twist or wrench that `move` transforms by an exact pose."""
     columns = [move(*pose, *[float(i == j) for j in range(6)]) for i in range(6)]
     return propagate([list(row) for row in zip(*columns, strict=True)], entries)
 
 
 def total(a: Entries | None, b: Entries | None) -> Components | None:
-    """Return the covariance of independent things together."""
+    """Return the covariance of a sum of independent quantities."""
     if a is None or b is None:
         only = b if a is None else a
         return None if only is None else tuple(only)
@@ -113,16 +113,16 @@ def total(a: Entries | None, b: Entries | None) -> Components | None:
 
 
 def symmetric(entries: Entries) -> Components:
-    """Return the entries with those below the diagonal written from above it."""
+    """Return the entries with those below the diagonal copied from above it."""
     side = round(len(entries) ** 0.5)
     return tuple(entries[side * min(i, j) + max(i, j)] for i in range(side) for j in range(side))
 
 
-# --- what is a covariance, and which is too wide for the first order ---
+# --- checks: is it a covariance, and is it small enough for the first order? ---
 
 
 def taken(given: Any, size: int = POSE) -> Components:
-    """Return the entries of a covariance that Python gives, checked: numbers or rows of them, of numpy or not."""
+    """Check a covariance passed from Python, numbers or rows of them, and return its entries."""
     rows, side = given.tolist() if hasattr(given, "tolist") else given, round(size**0.5)
     try:
         listed = [row if hasattr(row, "__iter__") else (row,) for row in rows]
@@ -140,7 +140,7 @@ def taken(given: Any, size: int = POSE) -> Components:
 
 
 def wrong_count(count: int, sizes: Sequence[int]) -> str:
-    """Say how many numbers there are and how many it takes."""
+    """Return a message with the number of entries and the numbers accepted."""
     each = [f"{size} are needed ({size**0.5:g}x{size**0.5:g}, row-major: {ORDER[size]})" for size in sizes]
     return f"covariance has {count} number{'s' * (count != 1)}; {' or '.join(each)}"
 
@@ -154,7 +154,7 @@ def check(entries: Sequence[float]) -> None:
 
 
 def problems(rows: Array) -> dict[int, str]:
-    """Return what is wrong with covariances (n, 36) or (n, 9), by row; one that is not finite is left to others."""
+    """Return what is wrong with covariances (n, 36) or (n, 9), by row; values must be finite."""
     import numpy as np
 
     side = round(rows.shape[1] ** 0.5)
@@ -177,7 +177,7 @@ def problems(rows: Array) -> dict[int, str]:
 
 
 def short(value: float) -> str:
-    """Write a number for a message: six digits, and 1e-4 rather than 0.0001 or 1e-04."""
+    """Format a number for a message: six digits, and 1e-4 rather than 0.0001 or 1e-04."""
     if 1e-3 <= abs(value) < 1e6 or not value:
         return f"{value:g}"
     digits, _, exponent = f"{value:.5e}".partition("e")
@@ -185,7 +185,7 @@ def short(value: float) -> str:
 
 
 def widest_turn(entries: Sequence[float]) -> float:
-    """Return the largest sigma of a turn about any axis, radians; what is surely below `WIDE` counts as 0."""
+    """Return the largest sigma of a rotation about any axis, radians; 0 if it is certainly below `WIDE`."""
     if len(entries) != 36 or entries[21] + entries[28] + entries[35] <= WIDE * WIDE:
         return 0.0
     import numpy as np
@@ -195,12 +195,12 @@ def widest_turn(entries: Sequence[float]) -> float:
 
 
 def doubt(entries: Sequence[float]) -> str:
-    """Say that a turn is too uncertain for the first order; "" where it is not."""
+    """Return a warning if a rotation is too uncertain for the first order, else ""."""
     width = widest_turn(entries)
     return FIRST_ORDER.format(width) if width > WIDE else ""
 
 
 def warn_if_wide(found: Iterable[Sequence[float]]) -> None:
-    """Warn once if a turn is so uncertain that the first order is off by some per cent."""
+    """Warn once if a rotation is so uncertain that the first order is off by a few per cent."""
     if told := doubt(max(found, key=widest_turn, default=())):
         warn(told, rule=WIDE_RULE)

@@ -1,4 +1,4 @@
-"""The doors of the public face: lists and arrays in, checked components out, kernels run on them, rows out.
+"""The entry points of the public API: lists and arrays in, checked components out, kernels applied, rows out.
 
 One item becomes Python floats without numpy; more become columns, views of the caller's array that are never
 written to. Errors name the argument, the shapes and the first bad row.
@@ -25,20 +25,20 @@ if TYPE_CHECKING:
 
 
 def single(components: Components) -> bool:
-    """Say whether components are the floats of one item."""
+    """Return True if components are the floats of one item."""
     return all(type(part) is float for part in components)
 
 
 def batch_shape(parts: Components) -> tuple[int, ...]:
-    """Return the shape of components that have one shape; () for one item."""
+    """Return the shape of components of equal shape; () for one item."""
     return getattr(parts[-1], "shape", ())
 
 
 def columns(value: Any, width: int, name: str) -> Components:
-    """Take `(..., width)` numbers apart into columns; those of one item become floats and are checked to be finite.
+    """Split `(..., width)` numbers into columns; those of one item become floats and are checked to be finite.
 
     Raises:
-        ValueInvalid: another shape, no numbers, or one item that is not finite.
+       ValueInvalid: another shape, not numbers, or one item that is not finite.
     """
     if isinstance(value, (list, tuple)) and len(value) == width and all(type(part) in (float, int) for part in value):
         return finite(tuple(map(float, value)), name)
@@ -49,17 +49,17 @@ def columns(value: Any, width: int, name: str) -> Components:
 
 
 def parts(array: Array, name: str) -> Components:
-    """Take the last axis of an array apart."""
+    """Split the last axis of an array."""
     if array.ndim == 1:
         return finite(tuple(map(float, array.tolist())), name)
     return tuple(array[..., index] for index in range(array.shape[-1]))
 
 
 def matrices(value: Numbers, size: int, name: str) -> Components:
-    """Take `(..., size, size)` numbers apart into size * size columns, row-major.
+    """Split `(..., size, size)` numbers into size * size columns, row-major.
 
     Raises:
-        ValueInvalid: another shape, no numbers, or one item that is not finite.
+       ValueInvalid: another shape, not numbers, or one item that is not finite.
     """
     array = as_numbers(value, name)
     if array.shape[-2:] != (size, size):
@@ -68,10 +68,10 @@ def matrices(value: Numbers, size: int, name: str) -> Components:
 
 
 def scalars(value: Any, name: str) -> Any:
-    """Take one number as a float, or an array of any shape as it is.
+    """Return one number as a float, or an array of any shape unchanged.
 
     Raises:
-        ValueInvalid: no numbers, or not finite.
+       ValueInvalid: not numbers, or not finite.
     """
     if type(value) in (float, int):
         return finite((float(value),), name)[0]
@@ -80,10 +80,10 @@ def scalars(value: Any, name: str) -> Any:
 
 
 def as_numbers(value: Numbers, name: str) -> Array:
-    """Make an array of real numbers of what is given, without a copy where it is one.
+    """Return an array of real numbers, without a copy if the argument is one.
 
     Raises:
-        ValueInvalid: ragged, or of another kind.
+       ValueInvalid: ragged, or of another kind.
     """
     import numpy as np
 
@@ -97,14 +97,14 @@ def as_numbers(value: Numbers, name: str) -> Array:
 
 
 def finite(values: tuple[float, ...], name: str) -> tuple[float, ...]:
-    """Return the floats of one item back; raise ValueInvalid unless all are finite."""
+    """Return the floats of one item; raise ValueInvalid unless all are finite."""
     if all(map(isfinite, values)):
         return values
     raise ValueInvalid(f"{name}: {' '.join(f'{value:g}' for value in values)} is not finite; give finite numbers")
 
 
 def all_finite(columns: Components, name: str) -> Components:
-    """Return columns back; raise ValueInvalid for the first row that is not finite."""
+    """Return columns; raise ValueInvalid for the first row that is not finite."""
     import numpy as np
 
     bad = ~np.logical_and.reduce([np.isfinite(column) for column in np.broadcast_arrays(*columns)])
@@ -114,7 +114,7 @@ def all_finite(columns: Components, name: str) -> Components:
 
 
 def at_first(name: str, bad: Any) -> str:
-    """Name the first bad row: `xyzw[3]`."""
+    """Return the name of the first bad row: `xyzw[3]`."""
     import numpy as np
 
     place = np.unravel_index(int(np.argmax(bad)), bad.shape)
@@ -130,12 +130,12 @@ def first_row(columns: Components, bad: Any) -> tuple[float, ...]:
 
 
 def shown_row(columns: Components, bad: Any) -> str:
-    """Show the numbers of the first bad row."""
+    """Format the numbers of the first bad row."""
     return " ".join(f"{value:g}" for value in first_row(columns, bad))
 
 
 def joined(given: Components, name: str) -> Components:
-    """Bring components to one kind and shape, the first three finite, nothing shared with the caller."""
+    """Broadcast components to one kind and shape, the first three finite; nothing is shared with the caller."""
     if single(given):
         return given
     import numpy as np
@@ -150,7 +150,7 @@ def joined(given: Components, name: str) -> Components:
 
 
 def copy_finite(given: Components, out: Array, name: str) -> None:
-    """Copy columns into others, which they broadcast to; raise ValueInvalid for the first row that is not finite."""
+    """Copy columns into others, to which they broadcast; raise ValueInvalid for the first row that is not finite."""
     import numpy as np
 
     from frametool.geometry import arrays
@@ -178,7 +178,7 @@ def check_last_row(entries: Components, name: str) -> None:
 
 
 def _is_last_row(last: Components) -> bool:
-    """Tell whether all are 0 0 0 1 to 1e-6, block by block; it may deny it of rows that nearly are not."""
+    """Return True if all last rows are 0 0 0 1 to 1e-6, block by block; may be False for rows that barely are."""
     if single(last):
         return bool(sum(abs(entry - wanted) for entry, wanted in zip(last, LAST_ROW, strict=True)) <= SILENT)
     from frametool.geometry import arrays
@@ -191,7 +191,7 @@ def _is_last_row(last: Components) -> bool:
 
 
 def weights(value: Numbers, shape: tuple[int, ...]) -> Array:
-    """Check weights: of the batch's shape, finite, none negative, not all 0."""
+    """Check weights: of the batch's shape, finite, not negative, not all 0."""
     import numpy as np
 
     array = as_numbers(value, "weights").astype(np.float64)
@@ -204,7 +204,7 @@ def weights(value: Numbers, shape: tuple[int, ...]) -> Array:
 
 
 def checked(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Components:
-    """Run a kernel that not every finite input suits; `check` looks at one item, and at the first row that fails."""
+    """Run a kernel that not every finite input suits; `check` validates one item, and the first row that fails."""
     if single(given):
         check(*given)
         return kernel(*given, floats)
@@ -214,14 +214,14 @@ def checked(kernel: Kernel, count: int, given: Components, name: str, check: Cal
 
 
 def watched(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Kernel:
-    """Make the kernel for arrays that lets `check` say why the first row that fails does."""
+    """Return the kernel for arrays in which `check` reports the first row that fails."""
     from frametool.geometry import arrays
 
     return arrays.guarded(kernel, lambda: _recheck(kernel, count, given, name, check))
 
 
 def _recheck(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> None:
-    """Find the first row a kernel failed on and say why."""
+    """Find the first row for which a kernel failed and report the reason."""
     import numpy as np
 
     from frametool.geometry import arrays
@@ -236,7 +236,7 @@ def _recheck(kernel: Kernel, count: int, given: Components, name: str, check: Ca
 
 
 def run(kernel: Kernel, count: int, given: Components, *, functions: bool = True) -> Components:
-    """Run a kernel on trusted components; one of arithmetic alone takes no namespace of functions."""
+    """Run a kernel on trusted components; a kernel of arithmetic alone takes no namespace of functions."""
     if single(given):
         return kernel(*given, floats) if functions else kernel(*given)
     from frametool.geometry import arrays
@@ -252,7 +252,7 @@ def number(kernel: Callable[..., Any], given: Components) -> Any:
 def rows(
     kernel: Kernel, inner: tuple[int, ...], given: Components, *args: object, out: Array | None = None
 ) -> Array:
-    """Run a kernel that needs functions; return its components as rows (..., *inner), in `out` where it is given."""
+    """Run a kernel that needs functions; return its components as rows (..., *inner), in `out` if passed."""
     if single(given):
         return _one_row(kernel(*given, *args, floats), inner, out)
     from frametool.geometry import arrays
@@ -264,9 +264,9 @@ def moved(
     kernel: Kernel, mover: Components, given: Components, name: str, *,
     flatten: Kernel | None = None, out: Array | None = None,
 ) -> Array:  # fmt: skip
-    """Move vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster.
+    """Transform vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster.
 
-    Vectors that are overwritten are looked at before: where one is not finite, all stay as they were.
+    Vectors that are overwritten are checked first: if one is not finite, all are unchanged.
     """
     inner = (len(given),)
     if single(given) and single(mover):
@@ -284,7 +284,7 @@ def moved(
 
 
 def _one_row(components: Components, inner: tuple[int, ...], out: Array | None) -> Array:
-    """Return the components of one item as an array, in `out` where it is given."""
+    """Return the components of one item as an array, in `out` if passed."""
     row = stacked(components).reshape(inner)
     if out is None:
         return row
@@ -296,7 +296,7 @@ def _one_row(components: Components, inner: tuple[int, ...], out: Array | None) 
 
 
 def _matrix_kernel(entries: Components) -> Kernel:
-    """Make the kernel of one matrix, three rows of three or of four; sums in place save it a tenth."""
+    """Return the kernel of one matrix, three rows of three or of four; sums in place save a tenth of the time."""
     width = len(entries) // 3
     matrix = [entries[start : start + width] for start in range(0, len(entries), width)]
 
@@ -315,14 +315,14 @@ def _matrix_kernel(entries: Components) -> Kernel:
 
 
 def stacked(components: Components) -> Array:
-    """Return components as rows of a fresh array."""
+    """Return components as rows of a new array."""
     import numpy as np
 
     return np.stack(components, axis=-1)
 
 
 def chosen(components: Components, index: Any) -> Components:
-    """Index every component; what is left of one element becomes floats."""
+    """Index every component; single elements become floats."""
     return tuple(part[index] if getattr(part[index], "shape", ()) else float(part[index]) for part in components)
 
 
@@ -339,7 +339,7 @@ def second_moment(components: Components, mass: Array) -> list[list[float]]:
 
 
 def total(values: Array) -> float:
-    """Return a sum, adding halves onto each other in place: numpy's own order depends on the machine."""
+    """Return a sum by adding halves onto each other in place: numpy's own order depends on the machine."""
     sums = values.reshape(-1)
     while sums.size > 1:
         half = sums.size // 2
@@ -349,10 +349,10 @@ def total(values: Array) -> float:
 
 
 def masses(heavy: Numbers | None, shape: tuple[int, ...]) -> Array:
-    """Return weights of a batch's shape, 1 each if none are told.
+    """Return weights of a batch's shape, 1 each if none are passed.
 
     Raises:
-        ValueInvalid: the batch is empty, or the weights are none.
+       ValueInvalid: the batch is empty, or the weights are invalid.
     """
     import numpy as np
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 def from_rotvec(rx: N, ry: N, rz: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
     """Return the quaternion x, y, z, w of a rotation vector in radians or degrees.
 
-    Exact down to 1e-300: an angle too small to be divided by stands for all smaller ones, with the same quotient.
-    The unit axis is taken first, so that multiples of 90 degrees about a coordinate axis are exact.
+    Exact down to 1e-300: an angle too small to divide by is replaced by one with the same quotient.
+    The unit axis is computed first, so that multiples of 90 degrees about a coordinate axis are exact.
     """
     angle = xp.maximum(length(rx, ry, rz, xp), TINY)
     sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
@@ -27,7 +27,7 @@ def from_rotvec(rx: N, ry: N, rz: N, xp: Functions[N], *, degrees: bool = False)
 def as_rotvec(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False) -> Three[N]:
     """Return the rotation vector of a unit quaternion, of length 0 to pi (or 180 degrees).
 
-    Relative accuracy holds down to 1e-300.  Half a turn leaves with the sign the quaternion has.
+    Relative accuracy holds down to 1e-300.  The sign of the quaternion decides at 180 degrees.
     """
     sine = xp.maximum(length(x, y, z, xp), TINY)
     angle = xp.copysign(2.0 * incline(sine, abs(w), xp), w)
@@ -37,10 +37,10 @@ def as_rotvec(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False
 
 
 def check_rotvec(*vector: float, what: str = "rotation vector", normalize: bool = False) -> Components:  # noqa: ARG001
-    """Return one back.
+    """Check one rotation vector and return it.
 
     Raises:
-        ValueInvalid: not finite, or so long that its square overflows.
+       ValueInvalid: not finite, or so long that its square overflows.
     """
     x, y, z = vector
     if not x * x + y * y + z * z < inf:
@@ -50,7 +50,7 @@ def check_rotvec(*vector: float, what: str = "rotation vector", normalize: bool 
 
 
 def from_axis_angle(ax: N, ay: N, az: N, angle: N, xp: Functions[N], *, degrees: bool = False) -> Four[N]:
-    """Return the quaternion x, y, z, w of a turn about a non-zero axis of any length, in radians or degrees."""
+    """Return the quaternion x, y, z, w of a rotation about a non-zero axis of any length, in radians or degrees."""
     ux, uy, uz = unit_vector(ax, ay, az, xp)
     sine, cosine = half_sincos_deg(angle, xp) if degrees else half_sincos(angle, xp)
     return ux * sine, uy * sine, uz * sine, cosine
@@ -59,7 +59,7 @@ def from_axis_angle(ax: N, ay: N, az: N, angle: N, xp: Functions[N], *, degrees:
 def as_axis_angle(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = False) -> tuple[N, N, N, N]:
     """Return unit axis and angle in [0, pi] (or 180 degrees); the identity has the axis x.
 
-    At half a turn, where both directions are right, the first non-zero component of the axis is positive.
+    At 180 degrees, where both directions are correct, the first non-zero component of the axis is positive.
     """
     x, y, z, w = canonical(x, y, z, w, xp)
     ux, uy, uz, sine = direction(x, y, z, xp)
@@ -68,10 +68,10 @@ def as_axis_angle(x: N, y: N, z: N, w: N, xp: Functions[N], *, degrees: bool = F
 
 
 def check_axis_angle(*axis_and_angle: float, normalize: bool = False) -> Components:  # noqa: ARG001 - any length is an axis
-    """Return one axis and angle back.
+    """Check one axis and angle and return them.
 
     Raises:
-        ValueInvalid: not finite, or the axis is zero.
+       ValueInvalid: not finite, or the axis is zero.
     """
     ax, ay, az, angle = axis_and_angle
     if not all(map(isfinite, axis_and_angle)):
@@ -90,6 +90,6 @@ def from_mrp(px: N, py: N, pz: N) -> Four[N]:
 
 
 def as_mrp(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Three[N]:
-    """Return modified Rodrigues parameters of length 0 to 1: those of the shorter turn."""
+    """Return modified Rodrigues parameters of length 0 to 1: those of the shorter rotation."""
     divisor = xp.copysign(1.0 + abs(w), xp.first_nonzero(w, x, y, z))
     return x / divisor, y / divisor, z / divisor

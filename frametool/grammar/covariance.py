@@ -78,7 +78,7 @@ def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tupl
 
 
 def is_sigma(name: str) -> bool:
-    """Tell whether a column is called as a sigma is: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
+    """Return True if a column is called as a sigma is: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
     return name.startswith("sigma_") and re.match(_SIGMA_COLUMN + r"\s*(?:[\[(]|$)", name) is not None
 
 

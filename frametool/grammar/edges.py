@@ -208,7 +208,7 @@ class Topics:
         return not self.chosen or topic.strip("/") in self.chosen
 
     def chooses(self, topic: str) -> bool:
-        """Tell whether a topic was named; only then are messages read that are poses and no transforms."""
+        """Return True if a topic was named; only then are messages read that are poses and no transforms."""
         return topic.strip("/") in self.chosen
 
     def conflict(self, topic: str, child: str) -> str:

@@ -92,12 +92,12 @@ def _is_known(name: str) -> bool:
 
 
 def may_be_on_earth(name: str) -> bool:
-    """Tell whether a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
+    """Return True if a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
     return re.search(_EARTH, name) is not None or name in FLAT_NAMES
 
 
 def may_be_uncertain(name: str) -> bool:
-    """Tell whether a column may be the first of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
+    """Return True if a column may be the first of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
     return name == "c11" or FIX in name or name.startswith(("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p"))
 
 

@@ -409,7 +409,7 @@ def matrix_pose(rows: Rows, form: Notation, *, told: bool = False) -> dict[str, 
 
 
 def is_rotation(rows: Rows) -> bool:
-    """Tell whether the texts of 3x3 numbers make a rotation to 1e-3."""
+    """Return True if the texts of 3x3 numbers make a rotation to 1e-3."""
     try:
         m = [[parse_number(cell) for cell in row] for row in rows]
     except ValueInvalid:

@@ -100,7 +100,7 @@ class Pose(NamedTuple):
 
     @property
     def is_exact(self) -> bool:
-        """Tell whether there is neither a covariance nor a scale."""
+        """Return True if there is neither a covariance nor a scale."""
         return self.covariance is None and self.scale == 1.0
 
     @property

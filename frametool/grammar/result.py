@@ -110,7 +110,7 @@ class Style:
         return repr(value) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
-        """Tell whether a notation's angles are written in degrees: its own suffix wins."""
+        """Return True if a notation's angles are written in degrees: its own suffix wins."""
         return notation.in_degrees(self.degrees)
 
 
@@ -287,17 +287,17 @@ def edge_results(tree: Frames) -> Iterator[Result]:
 
 
 def carries_position(notation: Notation) -> bool:
-    """Tell whether a notation takes the position of a pose into itself."""
+    """Return True if a notation takes the position of a pose into itself."""
     return notation.representation.whole is not None
 
 
 def holds_scale(notations: Sequence[Notation]) -> bool:
-    """Tell whether a similarity is written as one matrix, whose 3 x 3 is s R."""
+    """Return True if a similarity is written as one matrix, whose 3 x 3 is s R."""
     return len(notations) == 1 and carries_position(notations[0])
 
 
 def is_locked(pose: Pose, notation: Notation) -> bool:
-    """Tell whether the Euler angles asked for are not unique here: the third was set to 0."""
+    """Return True if the Euler angles asked for are not unique here: the third was set to 0."""
     axes = notation.euler_axes
     return axes is not None and pose.rotation is not None and bool(euler.locked(*pose.rotation, axes))
 

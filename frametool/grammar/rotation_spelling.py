@@ -46,14 +46,14 @@ ROTATION_KEYS = _rotation_keys()
 
 
 def is_position(key: str, value: Any) -> bool:
-    """Tell whether a key of a position says one with this value: of the words of others a list or mapping does."""
+    """Return True if a key of a position says one with this value: of the words of others a list or mapping does."""
     if key in ("t", "T"):
         return type(value) is list and len(value) in (1, 3) and len(places_in(value)) == len(XYZ)
     return key not in LISTED_WORDS or type(value) in (list, dict)
 
 
 def is_rotation(key: str, value: Any) -> bool:
-    """Tell whether a key says a rotation with this value; raises nothing, what is wrong with it reading says."""
+    """Return True if a key says a rotation with this value; raises nothing, what is wrong with it reading says."""
     if key not in LISTED_WORDS:
         return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
     if key not in ROTATION_WORDS or type(value) not in (list, dict):

@@ -85,7 +85,7 @@ YEAR_S = 31_557_600
 
 
 def clocks_differ(entries: Sequence[dict[str, Any]]) -> bool:
-    """Tell whether stamps and the recorder count from other years: of simulated time a delay says nothing."""
+    """Return True if stamps and the recorder count from other years: of simulated time a delay says nothing."""
     return any(abs(entry["delay_max_s"] or 0.0) > YEAR_S for entry in entries)
 
 

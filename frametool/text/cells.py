@@ -142,7 +142,7 @@ def torn_record(text: bytes, delimiter: bytes) -> int | None:
 
 
 def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:
-    """Tell whether whole lines certainly end outside quotes."""
+    """Return True if whole lines certainly end outside quotes."""
     return b'"' not in lines or _inside_quotes(framed(lines), MARGIN + len(lines), delimiter) is not None
 
 

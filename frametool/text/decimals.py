@@ -54,7 +54,7 @@ def shortest_decimals(size: Floats) -> Decimals:
 
 
 def _are_short(size: Floats) -> bool:
-    """Tell whether all numbers have at most six decimals and fifteen digits."""
+    """Return True if all numbers have at most six decimals and fifteen digits."""
     power = 10.0**_SHORT_DECIMALS
     digits = np.rint(size * power)
     return bool(((digits / power == size) & (digits < _GREATEST_SHORT)).all())
