@@ -75,7 +75,7 @@ def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> dict[tuple[str, s
 
     tree = load_tree(inputs.fix[0], inputs.fix[1:], Rules(normalize=inputs.normalize))
     if moving := next((track.child for track in tree.tracks() if not track.is_static), None):
-        raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; what is fixed stands still (tree --at TIME)")
+        raise ValueInvalid(f"{tree.name}: {shown(moving)} moves; fixed frames must be static (tree --at TIME)")
     if not {*tree.frames} & {*measured}:
         known = alternatives(one := tree.frames[0], measured, "frames")
         raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{known}")

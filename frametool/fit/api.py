@@ -121,7 +121,7 @@ def solve(
 
     trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
     if moving := next((each for each in trees if each.moves), None):
-        raise ValueInvalid(f"{moving.name} moves; what is fixed stands still")
+        raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
     fixed = [(track, tree.covariances.get(track.child)) for tree in trees for track in tree.tracks()]
     edges = [(track.parent, track.child, track.components) for track, _ in fixed]
     found = solve_tree(_measurements(measurements), root=root, fixed=edges, robust=robust)

@@ -1,4 +1,4 @@
-"""Frames that move: transforms in, any lookup at any time out, as tf2's buffer answers it, without ROS."""
+"""Moving frames: a buffer of transforms with lookups at any time, with the results of tf2's buffer, without ROS."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
 
 
 class TransformBuffer(Frames):
-    """Hold transforms over time; answer where one frame is seen from another, and when.
+    """Store transforms over time; look up the pose of one frame in another at any time.
 
-    Stamps are integer nanoseconds, in any order. Between two samples translations are interpolated along the line and
-    rotations by slerp, edge by edge. Nothing is pruned unless `keep_ns` says so. The latest time is None; 0 is a time.
+    Stamps are integer nanoseconds, in any order. Between two samples translations are interpolated linearly and
+    rotations by slerp, edge by edge. Nothing is pruned unless `keep_ns` is set. The latest time is None; 0 is a time.
 
         buffer = TransformBuffer()
         buffer.insert("map", "base", map_from_base, 1_700_000_000_000_000_000)
-        buffer.insert("base", "camera", base_from_camera)                 # no stamp: stands still
-        buffer.lookup("map", "camera", 1_700_000_000_000_000_000)         # map_from_camera then; without a time: latest
+        buffer.insert("base", "camera", base_from_camera)                 # no stamp: static
+        buffer.lookup("map", "camera", 1_700_000_000_000_000_000)         # map_from_camera then; default: latest
     """
 
     def __init__(self, *, keep_ns: int | None = None, name: str = "") -> None:
         """Create an empty buffer.
 
-        keep_ns: keep only so much before each frame's newest sample; None keeps everything.
-        name: says in error messages where the frames come from.
+        keep_ns: drop samples older than this before each frame's newest sample; None keeps everything.
+        name: of the source of the frames, for error messages.
         """
         super().__init__(name)
         self.keep_ns = keep_ns
@@ -45,12 +45,12 @@ class TransformBuffer(Frames):
         self, parent: str, child: str, transform: Transform, stamp_ns: int | None = None, *,
         static: bool | None = None, authority: str = DEFAULT_AUTHORITY, covariance: Any = None,
     ) -> None:  # fmt: skip
-        """Add parent_from_child, the pose of the child in its parent, at a time; without a time the frame stands still.
+        """Add parent_from_child, the pose of the child in its parent, at a time; without a time the frame is static.
 
-        static: says so where a standing frame comes with a stamp, which is then ignored.  authority: for tf2's listing.
-        covariance: how uncertain the frame is, one for all its samples, said with any of them; None says nothing.
-        A different pose at a stamp that is already there replaces the old one, with a warning.
-        Raises ValueInvalid; BadTopology for two standing poses or covariances, standing and moving at once, a cycle.
+        static: marks a static frame although it has a stamp, which is ignored.  authority: for tf2's listing.
+        covariance: of the edge, the same for all its samples, passed with any of them; None changes nothing.
+        A different pose at an existing stamp replaces the old one, with a warning.
+        Raises ValueInvalid; BadTopology for two static poses or covariances, a static frame that moves, a cycle.
         """
         components = transform.components
         if type(components[6]) is not float and transform.shape:
@@ -69,7 +69,7 @@ class TransformBuffer(Frames):
     ) -> bool:  # fmt: skip
         """Add tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `insert`.
 
-        Returns whether other data at the same stamp were replaced; the caller may know where both were written.
+        Returns True if other data at the same stamp were replaced; the caller may know where both were written.
         """
         track = self._tracks.get(child)
         if (
@@ -90,14 +90,14 @@ class TransformBuffer(Frames):
             if track.add_if_new(stamp_ns, components):
                 return False
         topology.check_edge(parent, child, components)
-        standing = stamp_ns is None if static is None else static
+        static = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
-        return self._admit(parent, child, components, stamp, standing=standing, authority=authority)
+        return self._admit(parent, child, components, stamp, static=static, authority=authority)
 
     def insert_many(self, parent: str, child: str, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
-        """Add poses of one frame that moves, each later than the one before and than all that is known of the frame.
+        """Add poses of a moving frame in ascending order of time, all later than the samples it already has.
 
-        Otherwise as `insert_components`, and much faster; where that rule or `keep_ns` needs a look at each pose, they
+        Equivalent to `insert_components`, and much faster.  If a rule or `keep_ns` requires a check of each pose, they
         are added one by one.
         """
         self.insert_components(parent, child, components[0], stamps_ns[0])
@@ -110,16 +110,16 @@ class TransformBuffer(Frames):
             track.extend(stamps_ns[1:], components[1:])
 
     def _admit(
-        self, parent: str, child: str, components: Rigid, stamp_ns: int, *, standing: bool, authority: str,
+        self, parent: str, child: str, components: Rigid, stamp_ns: int, *, static: bool, authority: str,
     ) -> bool:  # fmt: skip
-        """Add what may be the first of its frame, out of order, or against a rule."""
+        """Add a sample that may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
-        if track is not None and track.is_static != standing:
+        if track is not None and track.is_static != static:
             raise topology.static_and_moving(child)
         replaced = False
         if track is None:
-            self._refuse_cycle(parent, child, stamp_ns, standing=standing)
-            if standing:
+            self._refuse_cycle(parent, child, stamp_ns, static=static)
+            if static:
                 track = self._put(StaticTransform(child, parent, components))
             else:
                 track = self._put(MovingTrack(child, stamp_ns, parent, components))
@@ -132,7 +132,7 @@ class TransformBuffer(Frames):
         return replaced
 
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:
-        """Add a further sample of a frame that moves; returns whether it replaced another one."""
+        """Add a further sample of a moving frame; return True if it replaced another one."""
         if self.keep_ns is not None:
             _check_age(track, stamp_ns, self.keep_ns)
         if known := track.samples_at(stamp_ns):
@@ -143,7 +143,7 @@ class TransformBuffer(Frames):
             track.replace(stamp_ns, parent, components)
             return True
         if parent != track.parent:
-            self._refuse_cycle(parent, track.child, stamp_ns, standing=False)
+            self._refuse_cycle(parent, track.child, stamp_ns, static=False)
             self._varies = True
             self._queries.clear()
         track.add(stamp_ns, parent, components)
@@ -151,21 +151,21 @@ class TransformBuffer(Frames):
             track.drop_before(track.last_ns - self.keep_ns)
         return False
 
-    def _refuse_cycle(self, parent: str, child: str, stamp_ns: int, *, standing: bool) -> None:
-        """Raise BadTopology if the child is its parent's ancestor at the same time."""
+    def _refuse_cycle(self, parent: str, child: str, stamp_ns: int, *, static: bool) -> None:
+        """Raise BadTopology if the child is an ancestor of its parent at the same time."""
         if child not in self._frames:
             return
         line = [parent]
-        at_ns = None if standing else stamp_ns
+        at_ns = None if static else stamp_ns
         while (track := self._tracks.get(line[-1])) is not None and _holds(track, at_ns):
             line.append(track.parent)
             if line[-1] == child:
                 raise topology.cycle([*line, parent])
             if len(line) > len(self._tracks):
-                return  # round in a circle of others, whose edges held at different times when they came
+                return  # a cycle of other frames, whose edges were valid at different times when they were added
 
     def make_static(self, frame: str) -> None:
-        """Take the newest sample of a moving frame for its pose at all times."""
+        """Make a moving frame static, with the pose of its newest sample."""
         moved = self._tracks[frame]
         self._put(StaticTransform(frame, moved.parent, moved.components))
 
@@ -186,7 +186,7 @@ def _check_age(track: MovingTrack, stamp_ns: int, keep_ns: int) -> None:
 
 
 def _holds(track: Track, at_ns: int | None) -> bool:
-    """Return whether an edge under its newest parent has data at a time; None asks for standing ones."""
+    """Return True if an edge under its newest parent has data at a time; None asks for static ones."""
     if track.is_static:
         return True
     return at_ns is not None and track.covers(at_ns) and track.parent_at(at_ns) == track.parent

@@ -1,6 +1,6 @@
-"""What can be said of edges: how often they come, from when to when, where they pause, jump or go back.
+"""Statistics of edges: their rate, first and last stamp, gaps, jumps and backward stamps.
 
-Of the samples of a recording in the order they came, and of what a tree holds: in a few words, and as tf2 lists it.
+For the samples of a recording in order of arrival, and for the edges of a tree: as a short text, and as tf2 lists it.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from frametool.frames.track import MovingTrack, Track
     from frametool.geometry.types import Rigid
 
-JUMP_FACTOR = 10.0  # a jump is a step so many times the median step of its edge ..
-JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and also longer than what noise and slow frames do
-GAP_FACTOR = 5.0  # a gap is a pause so many times the median pause
+JUMP_FACTOR = 10.0  # a jump is a step of at least this many median steps of its edge ..
+JUMP_METRES, JUMP_RADIANS = 0.1, 0.2  # .. and longer than noise and low rates explain
+GAP_FACTOR = 5.0  # a gap is a pause of at least this many median pauses
 
 
-LEAST_RETURNS = 3  # so many times there and back are no accident
-RETURN_FACTOR = 0.1  # a way there and back ends so near to its begin, measured by the step there
+LEAST_RETURNS = 3  # oscillations that are not an accident
+RETURN_FACTOR = 0.1  # an oscillation ends this close to its start, relative to its step
 
 
 class SampleStep(NamedTuple):
-    """The way from one stamp to the next: where it ends, how far and how long it was, and whether it leads back.
+    """The step from one stamp to the next: its end, distance and duration, and whether it leads back.
 
-    Under another parent there is no distance: metres and radians are 0.  `returns` says that the two steps up to here
-    both went far and end near to where they began.
+    Between different parents there is no distance: metres and radians are 0.  `returns` is True if the last two steps
+    are both large and the second ends near the start of the first.
     """
 
     stamp_ns: int
@@ -46,30 +46,30 @@ class SampleStep(NamedTuple):
 
 
 class EdgeLog:
-    """The samples of one child frame, in the order they came; stamps in nanoseconds."""
+    """The samples of one child frame, in order of arrival; stamps in nanoseconds."""
 
     def __init__(self, child: str) -> None:
         """Create an empty log."""
         self.child = child
         self.parent = ""  # the newest
-        self.parents: dict[str, int] = {}  # each once, numbered as it was first named
-        self.topics: dict[str, int] = {}  # how many samples came by each, where that is known
+        self.parents: dict[str, int] = {}  # in the order in which they were first named
+        self.topics: dict[str, int] = {}  # number of samples by topic, if the topic is known
         self.changes = 0
         self.count = 0
         self.is_static = False
         self.first_ns: int | None = None
         self.last_ns: int | None = None
-        self.backward = 0  # samples that came after a later stamp
+        self.backward = 0  # samples that arrived after a later stamp
         self.delays_ns: list[int] = []
-        self._stamps: list[int] = []  # of any size: what a broken clock says is no less data
+        self._stamps: list[int] = []  # Python integers: a broken clock may exceed 64 bits
         self._lines = array("q")
         self._under = array("q")  # the number of the parent
-        self._poses = array("d")  # seven numbers a sample
+        self._poses = array("d")  # seven numbers per sample
 
     def add(
         self, parent: str, components: Rigid, stamp_ns: int | None, line: int = 0, received_ns: int | None = None
     ) -> None:
-        """Take one sample in; without a stamp the frame stands still."""
+        """Add one sample; without a stamp the frame is static."""
         self.changes += self.count > 0 and parent != self.parent
         self.count += 1
         self.parent = parent
@@ -88,12 +88,12 @@ class EdgeLog:
         self._poses.extend(components)
 
     def is_late(self, stamp_ns: int) -> bool:
-        """Return whether a stamp comes after a later one."""
+        """Return True if a stamp arrives after a later one."""
         return self.last_ns is not None and stamp_ns < self.last_ns
 
     @cached_property
     def steps(self) -> list[SampleStep]:
-        """Return the ways between stamps in the order of time, once all are in; the last of equal stamps counts."""
+        """Return the steps between stamps in order of time, once all are in; the last of equal stamps counts."""
         last = {stamp: at for at, stamp in enumerate(self._stamps)}
         order = [last[stamp] for stamp in sorted(last)]
         found: list[SampleStep] = []
@@ -105,7 +105,7 @@ class EdgeLog:
         return found
 
     def _apart(self, before: int, at: int) -> tuple[float, float]:
-        """Return metres and radians between two samples; 0 under different parents."""
+        """Return metres and radians between two samples; 0 between different parents."""
         if self._under[before] != self._under[at]:
             return 0.0, 0.0
         metres, radians = rigid.distance(*self._pose(before), *self._pose(at), xp=floats)
@@ -117,7 +117,7 @@ class EdgeLog:
         return tx, ty, tz, x, y, z, w
 
     def _is_return(self, begin: int, end: int, there: SampleStep, back: tuple[float, float]) -> bool:
-        """Return whether two successive steps lead far off and back again."""
+        """Return True if two successive steps lead far away and back again."""
         far = there.metres, there.radians
         least = JUMP_METRES, JUMP_RADIANS
         return any(
@@ -127,33 +127,33 @@ class EdgeLog:
 
     @property
     def moves(self) -> bool:
-        """Return whether there are two different stamps."""
+        """Return True if there are two different stamps."""
         return not self.is_static and self.first_ns != self.last_ns
 
     @property
     def span(self) -> tuple[int, int]:
-        """Return the first and the last stamp of an edge that moves."""
+        """Return the first and the last stamp of a moving edge."""
         return self.first_ns or 0, self.last_ns or 0
 
     @property
     def rate(self) -> float | None:
-        """Return samples a second between the first and the last stamp; None for an edge that stands still."""
+        """Return samples per second between the first and the last stamp; None for a static edge."""
         first, last = self.span
         return (self.count - 1) * BILLION / (last - first) if self.moves else None
 
     def gaps(self) -> list[SampleStep]:
-        """Return the steps that waited far longer than usual."""
+        """Return the steps that took far longer than usual."""
         usual = _median([step.pause_ns for step in self.steps])
         return [step for step in self.steps if step.pause_ns > GAP_FACTOR * usual]
 
     def jumps(self) -> list[SampleStep]:
-        """Return the steps that went far further than usual."""
+        """Return the steps that are far larger than usual."""
         metres, radians = (_median([step[field] for step in self.steps]) for field in (2, 3))
         far, turned = max(JUMP_METRES, JUMP_FACTOR * metres), max(JUMP_RADIANS, JUMP_FACTOR * radians)
         return [step for step in self.steps if step.metres > far or step.radians > turned]
 
     def returns(self) -> list[SampleStep]:
-        """Return the steps back where an edge goes back and forth all the time, as of two publishers that disagree."""
+        """Return the steps back if an edge oscillates all the time, as with two publishers that disagree."""
         back = [step for step in self.steps if step.returns]
         return back if len(back) >= max(LEAST_RETURNS, len(self.steps) / 3) else []
 
@@ -163,7 +163,7 @@ def _median(values: list[float]) -> float:
 
 
 def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
-    """Name the children of the edges between two frames, by their newest parents, from target to source.
+    """Return the children of the edges between two frames, by their newest parents, from target to source.
 
     Raises UnknownFrame, NotConnected.
     """
@@ -175,11 +175,11 @@ def chain(logs: dict[str, EdgeLog], target: str, source: str) -> list[str]:
     return [*reversed(down), *reversed(up)]
 
 
-SHORTEST = 0.0001  # seconds: tf2 divides by no less
+SHORTEST = 0.0001  # seconds: tf2 divides by at least this
 
 
 def motion(track: MovingTrack) -> str:
-    """Return in a few words how a frame moves: `41 at 10 Hz, 0 .. 4 s`."""
+    """Return a short description of a frame's motion: `41 at 10 Hz, 0 .. 4 s`."""
     first, last = track.span
     if first == last:
         return f"one at {seconds(first)} s" if track.count == 1 else f"{track.count} at once"
@@ -191,10 +191,10 @@ def motion(track: MovingTrack) -> str:
 
 
 class CacheEntry:
-    """What tf2 says about one edge of its cache; a standing one has no stamps."""
+    """An entry of tf2's cache listing; a static one has no stamps."""
 
     def __init__(self, track: Track) -> None:
-        """Count."""
+        """Count the samples of a track."""
         oldest, newest = (0, 0) if track.is_static else track.span
         self.child, self.parent, self.authority = track.child, track.parent, track.authority
         self.oldest, self.newest = oldest / BILLION, newest / BILLION
@@ -203,12 +203,12 @@ class CacheEntry:
 
 
 def listed_motion(rate: float, length: float, newest: float) -> str:
-    """Return in a few words how an edge moves of which tf2 has listed this: hertz, and seconds."""
+    """Return a short description of an edge's motion from tf2's listing: hertz, and seconds."""
     if length > 0.0:
         return f"{rate:.4g} Hz over {length:.4g} s"
     return f"one at {newest:.9g} s" if newest else "static"
 
 
 def cache_entries(tree: Frames) -> list[CacheEntry]:
-    """Return what tf2 lists, in the order of first mention."""
+    """Return tf2's listing, in the order of first mention."""
     return [CacheEntry(track) for frame in tree.frames if (track := tree.track(frame))]

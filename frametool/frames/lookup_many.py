@@ -1,6 +1,6 @@
-"""Many lookups at once: the samples of each edge as arrays, walked at sorted times, block by block.
+"""Many lookups at once: the samples of each edge as arrays, evaluated at sorted times, block by block.
 
-Needs numpy at import; the buffer imports it when it is asked.
+Imports numpy; the buffer imports this module on demand.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Way = tuple[tuple[str, ...], tuple[str, ...]]
 
-SHARED = 4  # times a sample
+SHARED = 4  # times per sample
 
 
 def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
-    """Return target_from_source at each of many times; see Frames.lookup_many."""
+    """Return target_from_source at each of many times; see `Frames.lookup_many`."""
     if missing not in ("raise", "nan"):
         raise ValueInvalid(f"missing is 'raise' or 'nan', found {shown(missing)}")
     times = as_stamps(at_ns)
@@ -50,7 +50,7 @@ def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing
 
 
 def as_stamps(at_ns: Any) -> Stamps:
-    """Take times for int64 nanoseconds; floats are refused, because seconds of today in one have no nanoseconds."""
+    """Return times as int64 nanoseconds; floats are refused: seconds since 1970 in a float have no nanoseconds."""
     try:
         times = np.asarray(at_ns)
         if times.size and times.dtype.kind not in "iu":
@@ -69,10 +69,10 @@ def _put_back(out: Floats, order: NDArray[np.intp]) -> Floats:
 
 
 def _fill_sorted(out: Floats, frames: Frames, target: str, source: str, times: Stamps) -> None:
-    """Compute sorted times, in stretches on which no parent changes."""
+    """Compute sorted times, in intervals in which no parent changes."""
     frames.require(target, source)
     if times.size:
-        frames.way_at(target, source, int(times[0]))  # finds out whether newest parents form a circle
+        frames.way_at(target, source, int(times[0]))  # detects a cycle of newest parents
     changes = frames.changes()
     if not changes:
         _fill(out, frames.query(target, source, None), times)
@@ -89,7 +89,7 @@ def _fill_sorted(out: Floats, frames: Frames, target: str, source: str, times: S
 def _stretches(
     frames: Frames, target: str, source: str, times: Stamps, cuts: list[int]
 ) -> dict[Way | None, list[tuple[int, int]]]:
-    """Return the stretches between cuts that have any times, by the way that holds in each, or None."""
+    """Return the intervals between cuts that contain times, grouped by the path that is valid in each, or None."""
     stretches: dict[Way | None, list[tuple[int, int]]] = {}
     for begin, end in itertools.pairwise(cuts):
         if begin < end:
@@ -100,7 +100,7 @@ def _stretches(
 
 
 def _fill(out: Floats, query: Query, times: Stamps) -> None:
-    """Compute one stretch block by block; NaN where an edge has no data."""
+    """Compute one interval block by block; NaN where an edge has no data."""
     if query.span is None:
         out[:] = np.array(query.fixed)[:, None]
         return
@@ -114,7 +114,7 @@ def _fill(out: Floats, query: Query, times: Stamps) -> None:
 
 
 def _joined(query: Query, times: Stamps) -> Rigid:
-    """Return target_from_source at sorted times within every edge's samples."""
+    """Return target_from_source at sorted times covered by every edge's samples."""
     found = query.compose(lambda track: track.at_many(times))
     assert found is not None  # noqa: S101 - all times are covered
     return *found[:3], *quaternion.unit(*found[3:], arrays)
@@ -136,10 +136,10 @@ def carried_many(frames: Frames, target: str, source: str, at_ns: Any) -> Floats
 
 
 class TrackTable:
-    """The samples of a track as columns, each with the way to the next and the time it takes."""
+    """The samples of a track as columns, each with the prepared segment to the next and its duration."""
 
     def __init__(self, track: MovingTrack) -> None:
-        """Prepare every way; the last sample leads nowhere, and neither does one before a change of parent."""
+        """Prepare every segment; there is none after the last sample, nor before a change of parent."""
         stamps, parents, samples = zip(*track.walk(), strict=True)
         self.stamps = np.array(stamps, dtype=np.int64)
         here: Any = np.array(samples).T
@@ -152,15 +152,15 @@ class TrackTable:
         self.columns = np.array((*here, *ways, 1.0 / np.maximum(step, 1)))
 
     def at(self, times: Stamps) -> Rigid:
-        """Return the poses at sorted times, none of them outside of the samples."""
+        """Return the poses at sorted times, all within the samples."""
         stamps, columns = self._spread(times)
         arguments: tuple[Any, ...] = (*columns[:15], (times - stamps) * columns[15], arrays)
         return rigid.along(*arguments)
 
     def _spread(self, times: Stamps) -> tuple[Stamps, Floats]:
-        """Return for each time the newest sample that is not after it: its stamp and its columns.
+        """Return for each time the stamp and the columns of the newest sample that is not after it.
 
-        Repeating is several times faster than picking where many times share a sample.
+        Repeating is several times faster than indexing if many times share a sample.
         """
         low = int(np.searchsorted(self.stamps, times[0], "right")) - 1
         high = int(np.searchsorted(self.stamps, times[-1], "right"))

@@ -1,7 +1,7 @@
-"""What can be asked of frames: which there are, how they hang together, where one is seen from another, and when.
+"""Queries of frames: their names, how they are connected, the pose of one in another, and at which times.
 
-`Frames` answers for trees that stand still and for recordings alike; `FrameTree` holds what stands still.  A replay is
-the same lookup again and again while its time goes by.  Knows no files and no text.
+`Frames` has the queries of static trees and recordings alike; `FrameTree` holds static frames.  A replay repeats a
+lookup while time advances.  Knows no files and no text.
 """
 
 from __future__ import annotations
@@ -36,50 +36,50 @@ MOST_KEPT = 1 << 14  # queries
 
 
 class Frames:
-    """Answer where one frame is seen from another: what FrameTree and TransformBuffer have in common.
+    """Look up the pose of one frame in another: the common part of FrameTree and TransformBuffer.
 
-    Times are integer nanoseconds; None is the latest.  Frames that stand still answer all times alike.
+    Times are integer nanoseconds; None is the latest.  Static frames have the same pose at all times.
     """
 
-    at_ns: int | None = None  # the time that a tree was taken at, of one that moves
+    at_ns: int | None = None  # the time of a tree that was extracted from moving frames
 
-    cameras: Mapping[str, Camera] = MappingProxyType({})  # of frames, as a tree of ours says
-    read_cameras: Callable[[], dict[str, Callable[..., Camera]]] = staticmethod(dict)  # in files of other forms
+    cameras: Mapping[str, Camera] = MappingProxyType({})  # by frame, from `camera:` entries
+    read_cameras: Callable[[], dict[str, Callable[..., Camera]]] = staticmethod(dict)  # from files of other formats
 
     robots: Sequence[tuple[Any, Any]] = ()  # of files with joints, their values and the links that they move
 
     def __init__(self, name: str) -> None:
-        """Create an empty set of frames; `name` says in error messages where they come from."""
+        """Create an empty set of frames; `name` is that of their source, for error messages."""
         self.name = name
         self._tracks: dict[str, Track] = {}
         self._frames: dict[str, None] = {}
         self._queries: dict[tuple[str, str], Query] = {}
-        self.camera_axes: dict[str, str] = {}  # of frames that are cameras, where their file says it
-        self.covariances: dict[str, Components] = {}  # of edges, by their child; those that are not here are exact
-        self.drawn: dict[str, str] = {}  # edges without a pose, by their child: how often a drawing says they come
+        self.camera_axes: dict[str, str] = {}  # of camera frames, if their file states them
+        self.covariances: dict[str, Components] = {}  # of edges, by their child; missing ones are exact
+        self.drawn: dict[str, str] = {}  # edges without a pose, by their child: the rate in a drawing
         self._varies = False  # whether any frame has ever changed its parent
-        self._loops = False  # whether newest parents were found to form a circle
+        self._loops = False  # whether newest parents were found to form a cycle
 
     def add_root(self, frame: str) -> None:
-        """Make a frame known that has no parent (yet)."""
+        """Add a frame that has no parent (yet)."""
         self._frames[frame] = None
 
     def _put(self, track: Track) -> Track:
-        """Keep a track in the place of what was known of its frame."""
+        """Store a track and replace that of the same frame."""
         self._frames[track.child] = None
         self._tracks[track.child] = track
         self._queries.clear()
         return track
 
-    # --- what there is ---
+    # --- contents ---
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """Return every frame, in the order of first mention."""
+        """Return all frames, in the order of first mention."""
         return tuple(self._frames)
 
     def resolve_name(self, frame: str) -> str:
-        """Return what a frame is called here: the Earth's, `ecef` or `earth`, is one by either name."""
+        """Return the name of a frame in this tree: `ecef` and `earth` are the same frame."""
         return topology.resolve_name(frame, self._frames)
 
     @property
@@ -89,31 +89,31 @@ class Frames:
 
     @property
     def moves(self) -> bool:
-        """Return whether any frame moves."""
+        """Return True if any frame moves."""
         return any(not track.is_static for track in self._tracks.values())
 
     def parent(self, frame: str, at_ns: int | None = None) -> str | None:
-        """Return a frame's parent at a time, or the newest; None for a root or where it is not known."""
+        """Return a frame's parent at a time, or the newest; None for a root or if it is not known."""
         track = self.track(frame)
         if track is None:
             return None
         return track.parent if at_ns is None else track.parent_at(at_ns)
 
     def edges(self) -> Iterator[tuple[str, str, Transform]]:
-        """Walk the edges as (parent, child, parent_from_child), each as it was last, in the order of first mention."""
+        """Iterate over the edges as (parent, child, parent_from_child), newest poses, in the order of first mention."""
         for track in self._tracks.values():
             yield track.parent, track.child, Transform.of(*track.components)
 
     def track(self, frame: str) -> Track | None:
-        """Return what is known about a frame over time; None for a root."""
+        """Return the pose or samples of a frame; None for a root."""
         return self._tracks.get(frame) or self._tracks.get(self.resolve_name(frame))
 
     def tracks(self) -> Iterator[Track]:
-        """Walk what is known about each frame that has a parent, in the order of first mention."""
+        """Iterate over the tracks of all frames that have a parent, in the order of first mention."""
         return iter(self._tracks.values())
 
     def tree_at(self, at_ns: int) -> FrameTree:
-        """Return the tree as it stands at one time; edges without data then are left out, with a warning."""
+        """Return the tree at one time; edges without data at that time are omitted, with a warning."""
         tree = FrameTree(self.name)
         for frame in self._frames:
             tree.add_root(frame)
@@ -132,14 +132,14 @@ class Frames:
 
     @property
     def camera_names(self) -> list[str]:
-        """List the frames whose intrinsics are known."""
+        """Return the frames whose intrinsics are known."""
         return [*dict.fromkeys((*self.cameras, *self.read_cameras()))]
 
     def camera(self, frame: str, size: tuple[int, int] | None = None) -> Camera:
-        """Return the camera that a frame is: its intrinsics as the tree's files say, points seen in its own axes.
+        """Return the camera of a frame: intrinsics from the tree's files, points expressed in its own axes.
 
-        size: of the picture, where a file does not say it, or another
-        Raises UnknownFrame, ValueInvalid where there are none, FormatError where they cannot be read.
+        size: of the image, if a file does not state it, or to resize
+        Raises UnknownFrame, ValueInvalid if there are no intrinsics, FormatError if they cannot be read.
         """
         self.require(frame)
         frame = self.resolve_name(frame)
@@ -158,11 +158,11 @@ class Frames:
     def lookup(self, target: str, source: str, at_ns: int | None = None) -> Transform:
         """Return target_from_source: the pose of source in target, which maps points in source to points in target.
 
-        at_ns: the time; None is `latest`.
-        Raises UnknownFrame (also for a frame against itself), NotConnected, TooEarly, TooLate.
+        at_ns: the time; None is the latest.
+        Raises UnknownFrame (also for a frame relative to itself), NotConnected, TooEarly, TooLate.
         """
         kept = self._queries.get((target, source))
-        if kept is not None and kept.fixed is not None:  # the short way for frames that stand still
+        if kept is not None and kept.fixed is not None:  # shortcut for static frames
             return Transform.of(*kept.fixed)
         return Transform.of(*self.lookup_components(target, source, at_ns))
 
@@ -171,7 +171,7 @@ class Frames:
         query = self.query(target, source, at_ns)
         if query.fixed is not None:
             return query.fixed
-        if at_ns is None:  # the time comes first: at it the parents may be others than the newest
+        if at_ns is None:  # the time first: at that time parents may differ from the newest
             at_ns = query.latest() or 0
             query = self.query(target, source, at_ns)
         found = query.at(at_ns if type(at_ns) is int else whole_stamp(at_ns))
@@ -180,9 +180,9 @@ class Frames:
         return found
 
     def latest(self, target: str, source: str) -> int | None:
-        """Return the latest stamp that all moving edges have reached on the path by the newest parents, as tf2 does.
+        """Return the latest stamp that all moving edges on the path by the newest parents have reached, as tf2 does.
 
-        None if nothing moves there.  Of a frame against itself it is that frame's own newest stamp.
+        None if nothing moves there.  For a frame relative to itself it is that frame's own newest stamp.
         Raises UnknownFrame, NotConnected.
         """
         newest = self.query(target, source, None).latest()
@@ -192,9 +192,9 @@ class Frames:
     def lookup_across(
         self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str,
     ) -> Transform:  # fmt: skip
-        """Return the pose that source had at one time, seen from where target was at another.
+        """Return the pose of source at one time in target at another time.
 
-        fixed: a frame that counts as standing in between, e.g. the map.  A time of None is that half's latest.
+        fixed: a frame that is assumed static in between, such as the map.  A time of None is the latest of that half.
         Raises as `lookup`.
         """
         self.require(target, source, fixed)
@@ -203,10 +203,10 @@ class Frames:
         return Transform.of(*rigid.compose(*target_from_fixed, *fixed_from_source))
 
     def covariance(self, target: str, source: str, at_ns: int | None = None) -> list[float]:
-        """Return how uncertain target_from_source is: 36 numbers, row-major, to first order; edges are independent.
+        """Return the covariance of target_from_source: 36 numbers, row-major, to first order; edges are independent.
 
-        Over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of the target.
-        Raises ValueInvalid where no edge on the way has a covariance; otherwise as `lookup`.
+        Over (x, y, z, rotation about X, Y, Z), metres and radians, along the fixed axes of the target.
+        Raises ValueInvalid if no edge on the path has a covariance; otherwise as `lookup`.
         """
         from frametool.geometry.uncertainty import warn_if_wide
 
@@ -217,17 +217,17 @@ class Frames:
         return [*found]
 
     def carried(self, target: str, source: str, at_ns: int | None) -> Components:
-        """Return `covariance` at a time, None where nothing moves; it is for the caller to tell what is too wide."""
-        self.lookup_components(target, source, at_ns)  # raises where there are no data
+        """Return `covariance` at a time (None if nothing moves), without a warning about large rotations."""
+        self.lookup_components(target, source, at_ns)  # raises if there are no data
         time_ns = whole_stamp(at_ns or 0)
         return self.covariance_along(target, source, at_ns, lambda track: track.at(time_ns))
 
     def covariance_along(
         self, target: str, source: str, at_ns: int | None, sample: Callable[[Track], Rigid | None]
     ) -> Components:
-        """Return the entries of `covariance` of the poses that `sample` finds, floats or columns; zeros of no edge.
+        """Return the entries of `covariance` for the poses that `sample` finds, floats or columns; zeros for no edge.
 
-        at_ns: a time at which the way is that one
+        at_ns: a time at which this path is valid
         """
         down, up = self.between(target, source, at_ns)
         if (down or up) and self.covariances.keys().isdisjoint((*down, *up)):
@@ -246,8 +246,8 @@ class Frames:
     def lookup_many(self, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
         """Return target_from_source at many times: a batch of the times' shape.
 
-        at_ns: integer nanoseconds, an array or a sequence.  missing: "raise" at the first time without data, as
-        `lookup` does, or "nan" for rows of NaN there.
+        at_ns: integer nanoseconds, an array or a sequence.  missing: "raise" an error at the first time without data,
+        as `lookup` does, or "nan" for rows of NaN.
         """
         from frametool.frames.lookup_many import lookup_many
 
@@ -256,14 +256,14 @@ class Frames:
     def replay(
         self, target: str, source: str, *, rate_hz: float, start_ns: int | None = None, stop_ns: int | None = None
     ) -> Iterator[Replayed]:
-        """Yield (at_ns, found, steps) again and again while time goes by: found is target_from_source.
+        """Yield (at_ns, found, steps) while time advances: found is target_from_source.
 
-        Where there is no data found is the error; steps is 1, but all before or behind the `span` come as one.
+        Without data, found is the error; steps is 1, but all steps before or after the `span` are combined into one.
 
-        rate_hz: steps in a second.  start_ns, stop_ns: None for the `span`.  If nothing moves there is one step.
+        rate_hz: steps per second.  start_ns, stop_ns: None for the `span`.  If nothing moves there is one step.
         Raises ValueInvalid for a rate whose steps are not between a nanosecond and a century; otherwise as `lookup`.
         """
-        from fractions import Fraction  # 2 ms of every start
+        from fractions import Fraction  # saves 2 ms at start-up
 
         half, period = Fraction(1, 2), BILLION / Fraction(checked_rate(rate_hz))
         span = self.span(target, source)
@@ -273,7 +273,7 @@ class Frames:
         begin = span[0] if start_ns is None else whole_stamp(start_ns)
         end = span[1] if stop_ns is None else whole_stamp(stop_ns)
         if begin > end:
-            self.lookup(target, source, begin if stop_ns is None else end)  # raises: all the data lie on one side of it
+            self.lookup(target, source, begin if stop_ns is None else end)  # raises: all data are on one side of it
         steps = floor((end - begin + half) / period) + 1
         steps -= begin + round((steps - 1) * period) > end
         first = min(max(ceil((span[0] - begin - half) / period), 0), steps)
@@ -286,10 +286,10 @@ class Frames:
             except NoDataAt as error:
                 yield Replayed(at_ns, error, count)
 
-    # --- the way ---
+    # --- the path ---
 
     def path(self, target: str, source: str, at_ns: int | None = None) -> list[str]:
-        """List the frames on the way from target to source, both included, as `lookup` takes it.
+        """Return the frames on the path from target to source, both included, as `lookup` uses it.
 
         Raises as `lookup`.
         """
@@ -300,16 +300,16 @@ class Frames:
         return [*reversed(down), str(top), *reversed(up)]
 
     def way(self, target: str, source: str, at_ns: int | None = None) -> list[Track]:
-        """List the edges between two frames, from the target to the source, at a time or by the newest parents."""
+        """Return the edges between two frames, from the target to the source, at a time or by the newest parents."""
         return self._along(*self.between(target, source, at_ns))
 
     def _along(self, down: Sequence[str], up: Sequence[str]) -> list[Track]:
         return [self._tracks[child] for child in (*reversed(down), *reversed(up))]
 
     def span(self, target: str, source: str) -> tuple[int, int] | None:
-        """Return the first and last time at which a lookup has an answer; None if nothing moves on the way.
+        """Return the first and last time at which a lookup has a result; None if nothing on the path moves.
 
-        Where parents change there may be times without data in between.  Where there is no such time it is the first
+        If parents change there may be times without data in between.  If there is no such time at all, it is the first
         that all edges have reached and the last at which all still have data, by the newest parents: first > last.
         """
         newest = self.query(target, source, None).span
@@ -327,7 +327,7 @@ class Frames:
         return (found[0][0], found[-1][1]) if found else newest
 
     def changes(self) -> list[int]:
-        """List the stamps, sorted, at which a frame whose parent changes gets another one, or begins, or has ended."""
+        """Return the stamps, sorted, at which a frame with changing parents begins, ends, or gets another parent."""
         stamps: set[int] = set()
         for track in self._tracks.values() if self._varies else ():
             if not track.is_static and (track.varies or self._loops):
@@ -336,7 +336,7 @@ class Frames:
         return sorted(stamps)
 
     def query(self, target: str, source: str, at_ns: int | None) -> Query:
-        """Return the way between two frames at a time, or by the newest parents; keep it if no parent on it changes."""
+        """Return the path between two frames at a time, or by the newest parents; cached if no parent on it changes."""
         if kept := self._queries.get((target, source)):
             return kept
         query = self.query_of(*self.between(target, source, at_ns))
@@ -347,25 +347,25 @@ class Frames:
         return query
 
     def query_of(self, down: Sequence[str], up: Sequence[str]) -> Query:
-        """Prepare a way that `between` named."""
+        """Prepare a path returned by `between`."""
         tracks = self._tracks
         return Query([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
 
     def _changes_above(self, frame: str) -> bool:
-        """Return whether a frame or an ancestor of it ever changes its parent."""
+        """Return True if a frame or an ancestor of it ever changes its parent."""
         if self._loops:
             return True
         return any(frame in self._tracks and self._tracks[frame].varies for frame in to_root(frame, self.parent))
 
     def way_at(self, target: str, source: str, at_ns: int) -> tuple[list[str], list[str]] | None:
-        """Name the edges as `between` does; None where a changing parent leaves no way."""
+        """Return the edges as `between` does; None if a changing parent leaves no path."""
         try:
             return self.between(target, source, at_ns)
         except (NoDataAt, NotConnected):
             return None
 
     def between(self, target: str, source: str, at_ns: int | None) -> tuple[list[str], list[str]]:
-        """Name the edges between two frames that both exist, as `edges_between` does."""
+        """Return the edges between two existing frames, as `edges_between` does."""
         self.require(target, source)
         target, source = self.resolve_name(target), self.resolve_name(source)
         try:
@@ -385,13 +385,13 @@ class Frames:
         return track.parent_at(at_ns) if track is not None and track.covers(at_ns) else None
 
     def require(self, *frames: str) -> None:
-        """Raise UnknownFrame unless all frames are there."""
+        """Raise UnknownFrame unless all frames exist."""
         for frame in frames:
             if self.resolve_name(frame) not in self._frames:
                 raise UnknownFrame(frame, known=self.frames, where=self.name)
 
     def _unconnected(self, error: NotConnected, target: str, source: str, at_ns: int | None) -> LookupFailed:
-        """Make the error for two frames without a way: two trees, or a changing parent that is not known then."""
+        """Return the error for two frames without a path: two trees, or a changing parent not known at that time."""
 
         def parent_near(frame: str) -> str | None:
             track = self._tracks.get(frame)
@@ -408,28 +408,29 @@ class Frames:
 
 
 class FrameTree(Frames):
-    """Hold frames and the fixed transforms between them; answer where one is seen from another.
+    """Frames and the static transforms between them, with lookups of one in another.
 
-    Several roots are fine. Every frame has at most one parent, and no frame is its own ancestor.
+    Several roots are allowed. Every frame has at most one parent, and no frame is its own ancestor.
 
         tree = FrameTree()
         tree.add("base", "camera", base_from_camera)
         tree.lookup("camera", "base")               # camera_from_base
-        tree.add("ecef", "map", earth_pose(48.1, 11.5, 520.0))    # axes at a place on the Earth, `frametool.earth_pose`
+        tree.add("ecef", "map", earth_pose(48.1, 11.5, 520.0))    # axes at a position on the Earth,
+        `frametool.earth_pose`
     """
 
     def __init__(self, name: str = "") -> None:
-        """Create an empty tree; `name` says in error messages where the frames come from."""
+        """Create an empty tree; `name` is that of the source of the frames, for error messages."""
         super().__init__(name)
-        self.groups = Groups[str]()  # of frames that hang together
+        self.groups = Groups[str]()  # of connected frames
 
     def add(self, parent: str, child: str, transform: Transform, covariance: Any = None) -> None:
-        """Hang a frame under a parent; `transform` is parent_from_child, the pose of the child in its parent.
+        """Add a frame; `transform` is parent_from_child, the pose of the child in its parent.
 
-        covariance: how uncertain that is, as `covariance` returns it, or 6 rows of 6; None is exact.
+        covariance: of this pose, as `covariance` returns it, or 6 rows of 6; None is exact.
         Adding an edge again with the same numbers changes nothing.
         Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
-        ValueInvalid for numbers that are no covariance.
+        ValueInvalid for numbers that are not a covariance.
         """
         parent, child = self.resolve_name(parent), self.resolve_name(child)
         known, found = self._tracks.get(child), taken(covariance)
@@ -440,7 +441,7 @@ class FrameTree(Frames):
             self.covariances[child] = found
 
     def add_components(self, parent: str, child: str, components: Rigid) -> None:
-        """Add an edge given as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
+        """Add an edge as tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `add`."""
         known = self._tracks.get(child)
         if known is not None and known.is_static:
             topology.check_same(child, (known.parent, known.components), (parent, components))
@@ -454,7 +455,7 @@ class FrameTree(Frames):
         self.groups.join(child, parent)
 
     def reroot(self, frame: str) -> None:
-        """Turn the edges above a frame round, so that all of its tree hangs from it."""
+        """Invert the edges above a frame, so that it becomes the root of its tree."""
         way = []
         while (track := self._tracks.pop(frame, None)) is not None:
             way.append(track)
@@ -463,7 +464,7 @@ class FrameTree(Frames):
             self._put(StaticTransform(track.parent, track.child, rigid.inverse(*track.components)))
 
     def __repr__(self) -> str:
-        """Return how many frames there are and which roots."""
+        """Show the number of frames and the roots."""
         return f"FrameTree({len(self._frames)} frames, roots: {', '.join(self.roots) or 'none'})"
 
 
@@ -472,8 +473,8 @@ class Replayed(NamedTuple):
     """One lookup of a replay.
 
     at_ns: its time; None if nothing moves
-    found: target_from_source, or the error where there is no data
-    steps: how many it stands for; all that lie before the data, or after, are one
+    found: target_from_source, or the error if there are no data
+    steps: the number of steps combined here; more than 1 only before or after all data
     """
 
     at_ns: int | None
@@ -482,14 +483,14 @@ class Replayed(NamedTuple):
 
 
 def checked_rate(rate_hz: float) -> float:
-    """Return a rate of steps back; raise ValueInvalid unless they are between a nanosecond and a century apart."""
+    """Return a rate; raise ValueInvalid unless its steps are between a nanosecond and a century."""
     if not BILLION / FURTHEST_NS <= rate_hz <= BILLION:
         raise ValueInvalid(f"a rate of {rate_hz:g} Hz has no steps between 1 ns and {FURTHEST_NS // BILLION} s")
     return rate_hz
 
 
 def taken(covariance: Any) -> Components | None:
-    """Return the entries of a covariance, checked; None of None."""
+    """Return the checked entries of a covariance; None for None."""
     if covariance is None:
         return None
     from frametool.geometry import uncertainty

@@ -1,6 +1,6 @@
-"""The way between two frames of a tree: which edges, and their product, now or at a time.
+"""The path between two frames of a tree: its edges, and their product, static or at a time.
 
-Trees that stand still and trees that move both ask here; what stands still is composed once for all times.
+Static and moving trees both use it; static parts are composed only once.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ def compose_path(
 ) -> Rigid | None:
     """Return target_from_source, floats or columns; None if an edge has no pose.
 
-    to_target, to_source: the edges from the common ancestor down to either end.  A branch without edges leaves the
-    other's bits alone.
+    to_target, to_source: the edges from the common ancestor down to either end.  An empty branch does not change the
+    bits of the other.
     sample: returns parent_from_child of an edge, or None.
-    far: the common ancestor is far off: subtracted first and then turned, positions are rounded half as much.
+    far: the common ancestor is far away: subtracting before rotating halves the rounding of positions.
     """
     top_from_target, top_from_source = _product(to_target, sample), _product(to_source, sample)
     if top_from_target is None or top_from_source is None:
@@ -55,9 +55,9 @@ def _product(edges: Sequence[Edge], sample: Callable[[Edge], Rigid | None]) -> R
 
 
 class Query:
-    """The way between two frames, from their common ancestor down to the target and down to the source.
+    """The path between two frames, from their common ancestor down to the target and down to the source.
 
-    fixed: the answer, where nothing on the way moves; otherwise None
+    fixed: the result, if nothing on the path moves; otherwise None
     moving: the edges that move
     far: whether the common ancestor is the Earth
     """
@@ -65,7 +65,7 @@ class Query:
     __slots__ = ("far", "fixed", "moving", "to_source", "to_target")
 
     def __init__(self, to_target: Sequence[Track], to_source: Sequence[Track]) -> None:
-        """Compose what stands still; both branches come topmost edge first."""
+        """Compose the static edges; both branches begin with the topmost edge."""
         self.moving = [track for track in (*to_target, *to_source) if not track.is_static]
         self.far = bool(to_target) and to_target[0].parent in EARTH_FRAMES
         self.fixed: Rigid | None = None
@@ -77,7 +77,7 @@ class Query:
             self.fixed = compose_path(to_target, to_source, attrgetter("components"), far=self.far)
 
     def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:
-        """Return target_from_source of the poses that `sample` finds for the edges."""
+        """Return target_from_source for the poses that `sample` finds for the edges."""
         return compose_path(self.to_target, self.to_source, sample, far=self.far)
 
     def at(self, at_ns: int) -> Rigid | None:
@@ -89,14 +89,14 @@ class Query:
         return tx, ty, tz, *quaternion.unit(x, y, z, w, floats)
 
     def latest(self) -> int | None:
-        """Return the newest stamp that every moving edge has reached; None when all stand still."""
+        """Return the newest stamp that every moving edge has reached; None if all are static."""
         return min((track.last_ns for track in self.moving), default=None)
 
     @property
     def span(self) -> tuple[int, int] | None:
         """Return the first and last time at which every moving edge has data; None if none moves.
 
-        They never overlap where the first is after the last.
+        If the first is after the last, they never overlap.
         """
         if not self.moving:
             return None
@@ -104,7 +104,7 @@ class Query:
 
 
 def _folded(tracks: Sequence[Track]) -> list[Track]:
-    """Compose neighbours that stand still."""
+    """Compose adjacent static edges."""
     pieces: list[Track] = []
     for track in tracks:
         if pieces and track.is_static and pieces[-1].is_static:

@@ -1,4 +1,4 @@
-"""The error of a lookup at a time without data: which edge lacks them, how far off the time is, and what has data."""
+"""The error of a lookup at a time without data: which edge has none, the distance in time, and what has data."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from frametool.frames.track import MovingTrack, Track
 
 
-OTHER_CLOCK = 10**8 * BILLION  # three years: beyond, one clock counts from 1970 and the other from its start
+OTHER_CLOCK = 10**8 * BILLION  # three years: beyond it, only one of two clocks counts from 1970
 
 
 def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDataAt:
-    """Compose the error for a lookup at a time, blaming the edge that is furthest from it.
+    """Return the error for a lookup at a time; it names the edge whose data are furthest from it.
 
     path: the edges between the two frames, from the target to the source.
     """
@@ -46,7 +46,7 @@ def no_data(target: str, source: str, at_ns: int, path: Sequence[Track]) -> NoDa
 
 
 def left_out(track: MovingTrack, at_ns: int) -> str:
-    """Return the sentence that says why an edge is left out of the tree at a time."""
+    """Return the reason why an edge is omitted from the tree at a time."""
     return (
         f"{bare(track.parent)} -> {bare(track.child)} is left out: no data at {format_stamp(at_ns)}, "
         f"samples cover {format_stamp(track.first_ns)} .. {format_stamp(track.last_ns)} "
@@ -55,18 +55,18 @@ def left_out(track: MovingTrack, at_ns: int) -> str:
 
 
 def gap(track: MovingTrack, at_ns: int) -> int:
-    """Return how far a time lies outside of a track's samples, in nanoseconds."""
+    """Return the distance of a time from a track's samples, in nanoseconds."""
     first, last = track.span
     return max(first - at_ns, at_ns - last, 0)
 
 
 def seconds(duration_ns: int) -> str:
-    """Write a duration in seconds without idle zeros: `0.5`, `3`."""
+    """Format a duration in seconds without trailing zeros: `0.5`, `3`."""
     return format_stamp(duration_ns).rstrip("0").rstrip(".")
 
 
 def _way(target: str, source: str, path: Sequence[Track]) -> str:
-    """Write the way with arrows from source to target, cut in the middle when it is long."""
+    """Format the path with arrows from source to target, shortened in the middle if it is long."""
     frames = list(map(bare, frames_on(target, source, path)))
     if len(frames) > 13:
         frames = [*frames[:6], f"({len(frames) - 12} more)", *frames[-6:]]
@@ -74,7 +74,7 @@ def _way(target: str, source: str, path: Sequence[Track]) -> str:
 
 
 def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list[str]:
-    """List the frames on a path of edges from target to source, both included."""
+    """Return the frames on a path of edges from target to source, both included."""
     frames = [target]
     for track in path:
         frames.append(track.parent if track.child == frames[-1] else track.child)
@@ -82,7 +82,7 @@ def frames_on(target: str, source: str, path: Sequence[Track | EdgeLog]) -> list
 
 
 def _whole(moving: Sequence[MovingTrack], begin: int, end: int) -> str:
-    """Return the clause that says when all edges have data, or which two never do."""
+    """Return the clause that states when all edges have data, or which two never do."""
     if len(moving) == 1:
         return ""
     if begin <= end:

@@ -1,4 +1,4 @@
-"""Frames at one time: every edge then, which have no data then, and all poses seen from one frame at once."""
+"""Frames at one time: all edges at that time, those without data, and all poses in one frame."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 class SeenPose(NamedTuple):
-    """The pose of a frame as it is seen from another one.
+    """The pose of a frame in another one.
 
-    reach: the largest coordinate on the way, in metres; rounding is in proportion to it
+    reach: the largest coordinate on the path, in metres; rounding is proportional to it
     """
 
     components: Rigid
@@ -25,14 +25,14 @@ class SeenPose(NamedTuple):
 
 
 class Snapshot:
-    """The edges of a tree at one time, or each as it was last.
+    """The edges of a tree at one time, or each at its own latest time.
 
     edges: child -> its parent and its pose there, parent_from_child
-    without_data: the frames that move and have no data at that time
+    without_data: the moving frames that have no data at that time
     """
 
     def __init__(self, tree: Frames, at_ns: int | None = None) -> None:
-        """Take the edges of a tree; `at_ns` None is the latest of each."""
+        """Collect the edges of a tree; `at_ns` None is the latest of each."""
         self.tree = tree
         self.at_ns = at_ns
         self.edges: dict[str, tuple[str, Rigid]] = {}
@@ -46,12 +46,12 @@ class Snapshot:
                 self.edges[track.child] = parent, pose
 
     def parent(self, frame: str) -> str | None:
-        """Return a frame's parent; None for a root, and where there is no data."""
+        """Return a frame's parent; None for a root, and if there are no data."""
         return self.edges[frame][0] if frame in self.edges else None
 
     @cached_property
     def roots(self) -> dict[str, str]:
-        """Return the root above each frame, itself for a root; frames with one root hang together."""
+        """Return the root above each frame, itself for a root; frames with the same root are connected."""
         roots: dict[str, str] = {}
         for frame in self.tree.frames:
             line: dict[str, None] = {}
@@ -71,22 +71,22 @@ class Snapshot:
         return children
 
     def below(self, start: str) -> list[str]:
-        """List a frame and all below it, the nearest first."""
+        """Return a frame and all its descendants, the nearest first."""
         found = [start]
-        for frame in found:  # it grows as it is walked
+        for frame in found:  # it grows during the loop
             found += (child for child in self._children.get(frame, ()) if child != start)
         return found
 
     def seen_from(self, start: str) -> dict[str, SeenPose]:
-        """Return the pose in `start` of every frame that hangs together with it.
+        """Return the pose in `start` of every frame connected to it.
 
-        At the latest, what moves is looked up frame by frame: each at the time that the edges on its way share.
+        For the latest time, moving frames are looked up one by one: each at the time common to the edges of its path.
         """
         if self.at_ns is None and self.tree.moves:
             return self._looked_up(start)
         found = {start: SeenPose(IDENTITY, 0.0)}
         pending = [start]
-        for frame in pending:  # it grows as it is walked
+        for frame in pending:  # it grows during the loop
             if frame in self.edges and (parent := self.edges[frame][0]) not in found:
                 found[parent] = _further(found[frame], rigid.inverse(*self.edges[frame][1]))
                 pending.append(parent)
@@ -97,7 +97,7 @@ class Snapshot:
         return found
 
     def _looked_up(self, start: str) -> dict[str, SeenPose]:
-        """Look every frame up that is connected and has a time at which it is."""
+        """Look up every frame that is connected and has a common time."""
         found = {}
         for frame in self.tree.frames:
             try:
@@ -110,7 +110,7 @@ class Snapshot:
 
 
 def _further(seen: SeenPose, step: Rigid) -> SeenPose:
-    """Return the pose behind one more edge."""
+    """Return the pose after one more edge."""
     pose = rigid.compose(*seen.components, *step)
     return SeenPose(pose, max(seen.reach, _size(step), _size(pose)))
 

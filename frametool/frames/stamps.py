@@ -1,4 +1,4 @@
-"""Stamps: text of seconds to integer nanoseconds and back, by decimal arithmetic, never through a float."""
+"""Stamps: seconds as text to integer nanoseconds and back, by decimal arithmetic, never through a float."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BILLION = 1_000_000_000
 _SECONDS = r"(?a)([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,3}))? ?(s|ms|us)?"
 _BELOW = {None: 9, "s": 9, "ms": 6, "us": 3}  # decimals down to a nanosecond
 _NANOSECONDS = r"(?a)([-+]?\d{1,30})ns"
-# ISO 8601 with its zone, which datetime reads but for fractions of more than six digits
+# ISO 8601 with a zone; datetime does not parse fractions of more than six digits
 _DATE = r"(?a)(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d{1,9})0*)? ?(Z|[-+]\d\d:?\d\d)"
 SUFFIXES = {BILLION: "s", 10**6: "ms", 10**3: "us", 1: "ns"}
 _OLDEST_NS, _NEWEST_NS = 946_684_800 * BILLION, 4_102_444_800 * BILLION  # the years 2000 and 2100
@@ -27,7 +27,7 @@ FURTHEST_NS = 1 << 62  # differences of two such stamps fit into 64 bits; the ye
 
 
 class NotATime(ValueInvalid):
-    """Report a text that is written in no way that a time is."""
+    """A text that is not a time in any notation."""
 
 
 def whole_stamp(stamp_ns: Any) -> int:
@@ -73,12 +73,12 @@ def parse_stamp(text: str) -> int:
 
 
 def parse_time(text: str) -> int:
-    """Read a time as `parse_stamp` does, within the years that stamps may be of."""
+    """Read a time as `parse_stamp` does, within the range of valid stamps."""
     return whole_stamp(parse_stamp(text.strip()))
 
 
 def parse_times(text: str) -> Sequence[int]:
-    """Read START:STOP:STEP, where STOP counts if a step meets it, or T,T,..; raises ValueInvalid."""
+    """Read START:STOP:STEP, where STOP is included if a step meets it, or T,T,..; raises ValueInvalid."""
     is_range = text.count(":") == 2
     try:
         times = list(map(parse_time, text.split(":" if is_range else ",")))
@@ -102,16 +102,16 @@ def _date_ns(match: re.Match[str]) -> int:
 
     zone = "+00:00" if match[3] == "Z" else match[3]
     try:
-        seconds = datetime.fromisoformat(match[1] + zone).timestamp()  # whole: exact
+        seconds = datetime.fromisoformat(match[1] + zone).timestamp()  # an integer: exact
     except ValueError as error:
         raise NotATime(f"{shown(match[0])} is not a time: {error}") from None
     return int(seconds) * BILLION + int((match[2] or "").ljust(9, "0"))
 
 
 def nanoseconds_each(whole: Any) -> Any:
-    """Return how many nanoseconds a whole number, or each of an array, counts where nothing says its unit.
+    """Return the nanoseconds per unit of an integer, or of each element of an array, whose unit is not stated.
 
-    A billion, unless a smaller unit makes it a time between the years 2000 and 2100, which seconds then do not.
+    A billion (seconds), unless a smaller unit makes it a time between the years 2000 and 2100 and seconds do not.
     """
     sizes = (size for size in SUFFIXES if size != BILLION)
     return BILLION + sum(
@@ -120,7 +120,7 @@ def nanoseconds_each(whole: Any) -> Any:
 
 
 def tell_size(whole: int, each: int) -> None:
-    """Warn, once a command, that the unit of stamps is taken from their size."""
+    """Warn, once per command, that the unit of stamps is inferred from their size."""
     if each != BILLION:
         unit = SUFFIXES[each]
         message = f"stamps such as {whole} are taken for {unit}, by their size; a column stamp_{unit} says so"
@@ -128,16 +128,16 @@ def tell_size(whole: int, each: int) -> None:
 
 
 class FromFirst:
-    """Is added to stamps, nanoseconds or arrays of them, so that the first of all becomes 0."""
+    """An addend for stamps, nanoseconds or arrays of them, that shifts the first of all to 0."""
 
     __array_ufunc__ = None  # numpy leaves the sum to __radd__
 
     def __init__(self) -> None:
-        """Wait for the first."""
+        """Wait for the first stamp."""
         self._first: int | None = None
 
     def __radd__(self, stamps: Any) -> Any:
-        """Return stamps since the first."""
+        """Return stamps relative to the first."""
         if self._first is None:
             if getattr(stamps, "size", 1) == 0:
                 return stamps

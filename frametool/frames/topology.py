@@ -1,6 +1,6 @@
-"""What makes edges a tree: one parent a frame, one pose in it, no circle; and what is said of edges that do not fit.
+"""The rules of a tree: one parent per frame, one pose in it, no cycle; and the errors for edges that break them.
 
-Each mistake is a BadTopology without a place: a tree raises it, a loader adds where both edges stand, `check` lists it.
+Each error is a BadTopology without a place: a tree raises it, a loader adds where both edges are, `check` lists it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ Member = TypeVar("Member", bound=Hashable)
 
 
 class Groups(Generic[Member]):
-    """Frames, or bodies, in groups that grow together (union-find)."""
+    """Disjoint sets of connected frames or bodies (union-find)."""
 
     def __init__(self) -> None:
-        """Begin with every one alone."""
+        """Create an empty partition: every member is alone."""
         self._up: dict[Member, Member] = {}
 
     def of(self, member: Member) -> Member:
-        """Return the member that stands for a group; the way to it is halved for the next time."""
+        """Return the representative of a member's set; the path to it is halved (path halving)."""
         up = self._up
         while (above := up.get(member)) is not None:
             further = up.get(above)
@@ -43,7 +43,7 @@ class Groups(Generic[Member]):
         return member
 
     def join(self, one: Member, other: Member) -> bool:
-        """Put the group of one into that of the other; return False if they are one already."""
+        """Merge the sets of two members; return False if they are the same already."""
         one, other = self.of(one), self.of(other)
         if one != other:
             self._up[one] = other
@@ -51,16 +51,16 @@ class Groups(Generic[Member]):
 
 
 def resolve_name(frame: str, known: Container[str]) -> str:
-    """Return the name of a frame among those known: the Earth's has two, `ecef` and `earth`."""
+    """Return the name of a frame among known names: the Earth has two, `ecef` and `earth`."""
     if frame in EARTH_FRAMES and frame not in known:
         return next((other for other in EARTH_FRAMES if other in known), frame)
     return frame
 
 
 def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
-    """List a frame and its ancestors, root last.
+    """Return a frame and its ancestors, root last.
 
-    Raises BadTopology when the ancestors run in a circle.
+    Raises BadTopology if the ancestors form a cycle.
     """
     line = [frame]
     parent = parent_of(frame)
@@ -75,7 +75,7 @@ def to_root(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
 
 
 def edges_between(target: str, source: str, parent_of: Callable[[str], str | None]) -> tuple[list[str], list[str]]:
-    """Name the edges between two frames, each by its child.
+    """Return the edges between two frames, each by its child.
 
     Returns (down, up): `down` leads from the common ancestor to the target, `up` from the source to that ancestor;
     target_from_source = inverse(product of down) @ product of reversed up.
@@ -97,7 +97,7 @@ def edges_between(target: str, source: str, parent_of: Callable[[str], str | Non
 
 
 def check_edge(parent: str, child: str, components: Rigid) -> None:
-    """Refuse an edge that cannot be; raises ValueInvalid, BadTopology."""
+    """Refuse an invalid edge; raises ValueInvalid, BadTopology."""
     if not parent or not child:
         raise ValueInvalid(f"an edge needs two frames, found parent {shown(parent)} and child {shown(child)}")
     if parent == child:
@@ -108,7 +108,7 @@ def check_edge(parent: str, child: str, components: Rigid) -> None:
 
 
 def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -> None:
-    """Refuse a further parent or pose of a static frame; both are (parent, components)."""
+    """Refuse another parent or pose of a static frame; both are (parent, components)."""
     if found[0] != known[0]:
         raise two_parents(child, known[0], found[0])
     if found[1] != known[1]:
@@ -116,35 +116,35 @@ def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -
 
 
 def own_parent(child: str) -> BadTopology:
-    """Make the error for a frame in itself."""
+    """Return the error for a frame in itself."""
     return BadTopology(f"frame {shown(child)} is its own parent", rule="self")
 
 
 def two_parents(child: str, one: str, other: str, places: Sequence[str] = ()) -> BadTopology:
-    """Make the error for a static frame with two parents; `places` says where each is named, if that is known."""
+    """Return the error for a static frame with two parents; `places` states where each is named, if known."""
     parents = [f"{shown(parent)} ({at})" for parent, at in zip((one, other), places, strict=False)]
     named = " and ".join(parents or (shown(one), shown(other)))
     return BadTopology(f"frame {shown(child)} has two parents: {named}", rule="two-parents")
 
 
 def two_poses(child: str, parent: str) -> BadTopology:
-    """Make the error for a static frame with two poses in its parent."""
+    """Return the error for a static frame with two poses in its parent."""
     return BadTopology(f"frame {shown(child)} has two different poses in {shown(parent)}", rule="two-poses")
 
 
 def two_covariances(parent: str, child: str, one: Components | None, other: Components | None) -> BadTopology:
-    """Make the error for an edge that is said to be uncertain in two ways."""
+    """Return the error for an edge with two different covariances."""
     what = "two different covariances" if one and other else "a covariance in one place and none in another"
     return BadTopology(f"frame {shown(child)} in {shown(parent)} has {what}", rule="two-covariances")
 
 
-def static_and_moving(child: str, told: str = " both stands still and moves") -> BadTopology:
-    """Make the error for a frame that moves and does not; `told` says how."""
-    return BadTopology(f"frame {shown(child)}{told}", rule="static-and-moving")
+def static_and_moving(child: str, details: str = " is both static and moving") -> BadTopology:
+    """Return the error for a frame that is both static and moving; `details` states where."""
+    return BadTopology(f"frame {shown(child)}{details}", rule="static-and-moving")
 
 
 def cycle(frames: list[str]) -> BadTopology:
-    """Make the error for a cycle, parents to the left: `a <- b <- a`; of a long one both ends."""
+    """Return the error for a cycle, parents to the left: `a <- b <- a`; shortened in the middle if it is long."""
     if len(frames) > MOST_SHOWN + 1:
         left_out = f"({len(frames) - MOST_SHOWN} more)"
         frames = [*frames[: MOST_SHOWN // 2], left_out, *frames[-MOST_SHOWN // 2 :]]

@@ -1,7 +1,7 @@
-"""What one frame does over time: one pose in its parent for ever, or poses in its parents, oldest first.
+"""The pose of one frame over time: a static pose in its parent, or samples in its parents, oldest first.
 
-Samples stand on pages, short enough to be put in order again and again.  Knows stamps in integer nanoseconds and
-components; knows no other frames.
+Samples are stored on pages that are short enough to be sorted again and again.  Knows stamps in integer nanoseconds
+and components; knows no other frames.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
-    Track: TypeAlias = "StaticTransform | MovingTrack"  # what is known of one child frame; `is_static` tells which
+    Track: TypeAlias = "StaticTransform | MovingTrack"  # of one child frame; `is_static` distinguishes them
 
-MANY = 1 << 13  # samples that come in one piece: from so many on they are packed
-FEW = 64  # late samples: up to so many are sorted in one by one, a microsecond each; a whole page takes a hundred
+MANY = 1 << 13  # from this many samples per call on they are packed
+FEW = 64  # late samples: up to this many are inserted one by one, a microsecond each; sorting a page takes a hundred
 
 
 class Packed:
-    """Poses in one piece of memory, 56 bytes each where tuples of floats take 290; one that changes becomes a list."""
+    """Poses in one array, 56 bytes each instead of 290 as tuples of floats; converted to a list before a change."""
 
     __slots__ = ("numbers",)
 
@@ -39,11 +39,11 @@ class Packed:
         self.numbers = array("d", chain.from_iterable(poses))
 
     def __iter__(self) -> Iterator[Rigid]:
-        """Yield them as tuples."""
+        """Yield the poses as tuples."""
         return zip(*[iter(self.numbers)] * 7, strict=True)
 
     def __getitem__(self, at: int) -> tuple[float, ...]:
-        """Return one by its number, counted from either end."""
+        """Return one pose by its index, from either end."""
         return tuple(self.numbers[7 * at : 7 * at + 7 or None])
 
     def append(self, pose: Rigid) -> None:
@@ -56,29 +56,29 @@ class Packed:
 
 
 class Page:
-    """Samples as three parallel lists, and what was prepared to interpolate after each of them.
+    """Samples as three parallel lists, and the prepared interpolation after each of them.
 
-    `late` holds those that came out of order, as (stamp, parent, components): they wait until somebody asks, so that
-    one sort takes in many.  None of them is before the first of the page, unless the page is the first.
+    `late` holds samples that arrived out of order, as (stamp, parent, components), until the next query, so that
+    one sort inserts many.  None of them is before the first of the page, unless it is the first page.
     """
 
     __slots__ = ("late", "parents", "samples", "segments", "stamps")
 
     def __init__(self, stamps: list[int], parents: list[str], samples: list[Rigid]) -> None:
-        """Keep the lists."""
+        """Store the lists."""
         self.stamps = stamps
         self.parents = parents
-        self.samples = samples  # or Packed, which stands for such a list
+        self.samples = samples  # or Packed, which behaves like such a list
         self.segments: dict[int, Way] = {}
         self.late: list[tuple[int, str, Rigid]] = []
 
     def unpack(self) -> None:
-        """Make a list of the samples, which can be changed."""
+        """Convert the samples to a list, which can be changed."""
         if type(self.samples) is not list:
             self.samples = [*self.samples]
 
     def settle(self) -> None:
-        """Sort in what came late, each after those of its stamp."""
+        """Insert the late samples, each after those of the same stamp."""
         if self.late:
             self.unpack()
         if len(self.late) > FEW:
@@ -107,7 +107,7 @@ DEFAULT_AUTHORITY = "default_authority"
 
 
 class StaticTransform:
-    """One pose, which holds at all times."""
+    """One pose, valid at all times."""
 
     __slots__ = ("authority", "child", "components", "parent")
     is_static: Literal[True] = True
@@ -115,14 +115,14 @@ class StaticTransform:
     count = 1
 
     def __init__(self, child: str, parent: str, components: Rigid) -> None:
-        """Keep the pose: tx, ty, tz (metres), x, y, z, w."""
+        """Store the pose: tx, ty, tz (metres), x, y, z, w."""
         self.child = child
         self.parent = parent
         self.components = components
-        self.authority = DEFAULT_AUTHORITY  # who said so last
+        self.authority = DEFAULT_AUTHORITY  # of the last publisher
 
     def covers(self, at_ns: int) -> bool:  # noqa: ARG002 - any time
-        """Hold at every time."""
+        """Return True: a static pose is valid at every time."""
         return True
 
     def parent_at(self, at_ns: int) -> str:  # noqa: ARG002 - any time
@@ -130,21 +130,21 @@ class StaticTransform:
         return self.parent
 
     def at(self, times: Any) -> Rigid:  # noqa: ARG002 - any time
-        """Return the pose, once for any time or many."""
+        """Return the pose, the same for one time or many."""
         return self.components
 
     parent_near = parent_at
     at_many = at
 
     def walk(self) -> Iterator[tuple[None, str, Rigid]]:
-        """Yield the pose as the one sample, without a stamp."""
+        """Yield the pose as the only sample, without a stamp."""
         yield None, self.parent, self.components
 
 
 class MovingTrack:
-    """Samples in the order of time, on pages: what comes late is laid on its page, which is sorted when it is asked.
+    """Samples in order of time, on pages; a late sample is added to its page, which is sorted at the next query.
 
-    Appending goes to the last page, however long; a page is cut when a late sample falls into it.
+    Appending uses the last page, however long; a page is split when a late sample falls into it.
     """
 
     __slots__ = ("authority", "begins", "child", "known", "last_ns", "pages", "parent", "table", "tail", "varies")
@@ -160,7 +160,7 @@ class MovingTrack:
         self.begins = [stamp_ns]  # of each page
         self.last_ns = stamp_ns
         self.parent = parent  # the newest
-        self.known: set[int] | None = None  # every stamp, once one came late
+        self.known: set[int] | None = None  # all stamps, from the first late sample on
         self.table: Any = None  # the samples as arrays, for many lookups at once
 
     @property
@@ -190,13 +190,13 @@ class MovingTrack:
             yield from zip(page.stamps, page.parents, page.samples, strict=True)
 
     def changes(self) -> Iterator[int]:
-        """Yield the stamps from which another parent holds."""
+        """Yield the stamps at which the parent changes."""
         for (_, before, _), (stamp_ns, after, _) in pairwise(self.walk()):
             if before != after:
                 yield stamp_ns
 
     def extend(self, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
-        """Append samples under the newest parent, in the order of time and later than all others."""
+        """Append samples under the newest parent, in order of time and later than all others."""
         page = self.tail
         page.stamps.extend(stamps_ns)
         page.parents.extend([self.parent] * len(stamps_ns))
@@ -209,7 +209,7 @@ class MovingTrack:
             self.known.update(stamps_ns)
 
     def add(self, stamp_ns: int, parent: str, components: Rigid) -> None:
-        """Take a sample in, after those of the same stamp."""
+        """Add a sample, after those of the same stamp."""
         self.varies = self.varies or parent != self.parent
         if self.known is not None:
             self.known.add(stamp_ns)
@@ -223,9 +223,9 @@ class MovingTrack:
         self.table = None
 
     def add_if_new(self, stamp_ns: int, components: Rigid) -> bool:
-        """Take a late sample in under the newest parent, unless its stamp is there already; return whether it was not.
+        """Add a late sample under the newest parent, unless its stamp exists; return True if it was added.
 
-        The stamps are kept in a set too: looking for one on the pages costs more than all the rest.
+        The stamps are also kept in a set: searching the pages would cost more than everything else.
         """
         known = self.known
         if known is None:
@@ -237,7 +237,7 @@ class MovingTrack:
         return True
 
     def _lay(self, stamp_ns: int, parent: str, components: Rigid) -> None:
-        """Lay a late sample on its page; cut the page once it is long."""
+        """Add a late sample to its page; split a long page."""
         begins = self.begins
         number = bisect_right(begins, stamp_ns) - 1
         if number < 0:
@@ -249,7 +249,7 @@ class MovingTrack:
             self._cut(number)
 
     def _page(self, at_ns: int) -> Page:
-        """Return the page of the newest sample that is not after a time; the first page where there is none."""
+        """Return the page of the newest sample that is not after a time; the first page if there is none."""
         page = self.pages[self._number(at_ns)]
         if page.late:
             page.settle()
@@ -259,7 +259,7 @@ class MovingTrack:
         return max(bisect_right(self.begins, at_ns) - 1, 0)
 
     def _cut(self, number: int) -> None:
-        """Cut a page into short ones."""
+        """Split a page into short ones."""
         page = self.pages[number]
         page.settle()
         page.unpack()
@@ -274,7 +274,7 @@ class MovingTrack:
         self.tail = self.pages[-1]
 
     def samples_at(self, stamp_ns: int) -> list[tuple[str, Rigid]]:
-        """Return the (parent, components) of exactly a stamp, the first that came first."""
+        """Return the (parent, components) at exactly a stamp, in order of arrival."""
         begin, end = bisect_left(self.begins, stamp_ns), bisect_right(self.begins, stamp_ns)
         pages = self.pages[max(begin - 1, 0) : end]
         for page in pages:
@@ -286,7 +286,7 @@ class MovingTrack:
         ]
 
     def replace(self, stamp_ns: int, parent: str, components: Rigid) -> None:
-        """Put another sample in the place of the last one at a stamp."""
+        """Replace the last sample at a stamp."""
         page = self._page(stamp_ns)
         at = bisect_right(page.stamps, stamp_ns) - 1
         before = page.parents[at]
@@ -321,11 +321,11 @@ class MovingTrack:
             self.varies = any(True for _ in self.changes())
 
     def covers(self, at_ns: int) -> bool:
-        """Return whether a time lies within the samples."""
+        """Return True if a time is within the samples."""
         return self.begins[0] <= at_ns <= self.last_ns
 
     def parent_at(self, at_ns: int) -> str | None:
-        """Return the parent at a time; None where a changing parent is not known."""
+        """Return the parent at a time; None if a changing parent is not known."""
         if not self.varies:
             return self.parent
         return self.parent_near(at_ns) if self.covers(at_ns) else None
@@ -338,7 +338,7 @@ class MovingTrack:
     def at(self, at_ns: int) -> Rigid | None:
         """Return parent_from_child at a time, interpolated between two samples; None outside of them.
 
-        Between samples under different parents the older one holds, as in tf2.
+        Between samples under different parents the older one is valid, as in tf2.
         """
         page = self.tail if at_ns >= self.begins[-1] else self._page(at_ns)
         if page.late:
@@ -365,7 +365,7 @@ class MovingTrack:
         return self.pages[bisect_right(self.begins, page.stamps[-1])]
 
     def _prepare(self, page: Page, at: int) -> Way:
-        """Prepare the way from a sample to the next, and keep it."""
+        """Prepare the segment from a sample to the next, and cache it."""
         here = page.samples[at]
         following, next_at = (page, at + 1) if at + 1 < len(page.stamps) else (self._after(page), 0)
         there = following.samples[next_at] if page.parents[at] == following.parents[next_at] else here

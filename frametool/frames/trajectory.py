@@ -1,4 +1,4 @@
-"""Where one frame was over time: the type that trajectories are read into, compared as, and written from."""
+"""The poses of one frame over time: the type of trajectories that are read, compared and written."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array
 
-WORLD, BODY = "world", "body"  # where nobody says how they are called
+WORLD, BODY = "world", "body"  # default names
 
 
 class Trajectory(NamedTuple):
-    """Poses of `body` in `world`, or its positions alone.
+    """Poses of `body` in `world`, or only its positions.
 
-    stamps_ns: integers of shape (n,), or None where poses are counted; xyz: (n, 3), metres
-    xyzw: unit quaternions (n, 4), or None where there are positions alone
-    lines: of the file, from 1, that each stands on; None where that is not known
+    stamps_ns: integers of shape (n,), or None if poses are only numbered; xyz: (n, 3), metres
+    xyzw: unit quaternions (n, 4), or None if there are only positions
+    lines: line numbers in the file, from 1; None if unknown
     """
 
     stamps_ns: Any
@@ -36,7 +36,7 @@ class Trajectory(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many poses there are."""
+        """The number of poses."""
         return len(self.xyz)
 
     @property
@@ -46,27 +46,27 @@ class Trajectory(NamedTuple):
 
     @property
     def poses(self) -> Transform:
-        """The poses; raises ValueInvalid where there are positions alone."""
+        """The poses; raises ValueInvalid if there are only positions."""
         if self.xyzw is None:
             raise ValueInvalid("positions alone are no poses: rotations are needed here")
         return Transform.of(*columns(self.xyz), *columns(self.xyzw))
 
     def with_poses(self, poses: Transform) -> Trajectory:
-        """Return it at other poses."""
+        """Return the trajectory with other poses."""
         return self._replace(xyz=np.stack(poses.components[:3], -1), xyzw=np.stack(poses.components[3:], -1))
 
     def at(self, index: Any) -> Trajectory:
-        """Choose poses as numpy does."""
+        """Select poses as numpy does."""
         stamps = None if self.stamps_ns is None else self.stamps_ns[index]
         turns, lines = (None if each is None else each[index] for each in (self.xyzw, self.lines))
         return self._replace(stamps_ns=stamps, xyz=self.xyz[index], xyzw=turns, lines=lines)
 
     def numbered(self) -> Trajectory:
-        """Return it with the numbers of its poses as seconds."""
+        """Return the trajectory with the indices of its poses as seconds."""
         return self._replace(stamps_ns=np.arange(self.size, dtype=np.int64) * 1_000_000_000)
 
     def disorder(self, name: str) -> list[str]:
-        """Say what `in_order` changes of a trajectory with a name, a sentence each."""
+        """Return what `in_order` changes in a trajectory with a name, one sentence each."""
         stamps = np.array([], np.int64) if self.stamps_ns is None else self.stamps_ns
         doubled = len(stamps) - len(np.unique(stamps))
         said = [f"{name}: stamps are out of order; sorted"] * bool((np.diff(stamps) < 0).any())
@@ -74,7 +74,7 @@ class Trajectory(NamedTuple):
         return said + [f"{name}: {doubled} {have} the stamp of another; the last counts"] * bool(doubled)
 
     def in_order(self) -> Trajectory:
-        """Return it sorted by its stamps, of equal ones the last."""
+        """Return the trajectory sorted by its stamps; the last of equal stamps counts."""
         if self.stamps_ns is None or not np.any(np.diff(self.stamps_ns) <= 0):
             return self
         order = np.argsort(self.stamps_ns, kind="stable")
@@ -88,6 +88,6 @@ def columns(rows: Array) -> list[Array]:
 
 
 def way(xyz: Array) -> Array:
-    """Return the path in metres up to each position."""
+    """Return the path length in metres up to each position."""
     x, y, z = np.diff(xyz, axis=0).T
     return np.append(0.0, np.cumsum(quaternion.magnitude(x, y, z, arrays)))

@@ -195,7 +195,7 @@ def batch_shape(parts: Components) -> tuple[int, ...]:
     """Return the shape to which components broadcast.
 
     Raises:
-       ValueInvalid: they do not broadcast.
+        ValueInvalid: they do not broadcast.
     """
     shapes: dict[tuple[int, ...], None] = dict.fromkeys(getattr(part, "shape", ()) for part in parts)
     if len(shapes) == 1:

@@ -59,7 +59,7 @@ def require_rotations(
     into: output array (4, ...) of the shape of the columns, contiguous
 
     Raises:
-       ValueInvalid: rows are not rotations; names the first one and how many there are.
+        ValueInvalid: rows are not rotations; names the first one and how many there are.
     """
     shape = arrays.batch_shape(given)
     made = np.empty((4, *shape)) if into is None else into

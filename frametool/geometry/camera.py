@@ -298,9 +298,9 @@ CAMERA_MODELS = {
 class Camera:
     """One camera; immutable.
 
-       camera = Camera("plumb_bob", [500.0, 500.0, 319.5, 239.5], [-0.3, 0.1, 0.0, 0.0], (640, 480))
-       pixels, depth = camera.project(points)      # (.., 3) -> (.., 2), (..); NaN where there is no pixel
-       rays = camera.unproject(pixels)             # unit directions; with depth= or range= points
+        camera = Camera("plumb_bob", [500.0, 500.0, 319.5, 239.5], [-0.3, 0.1, 0.0, 0.0], (640, 480))
+        pixels, depth = camera.project(points)      # (.., 3) -> (.., 2), (..); NaN where there is no pixel
+        rays = camera.unproject(pixels)             # unit directions; with depth= or range= points
 
     end_angle: the largest angle from the optical axis, in radians; beyond it there are no pixels
     numbers: fx, fy, cx, cy, skew; fields: the arguments of the constructor

@@ -44,7 +44,7 @@ def axes_change(target: str, source: str) -> Rotation:
     """Return the rotation that takes coordinates in the source's axes to the target's: `axes_change("enu", "ned")`.
 
     Raises:
-       ValueInvalid: unknown name; lists the nearest name and all names.
+        ValueInvalid: unknown name; lists the nearest name and all names.
     """
     return named_rotation(f"{target}_from_{source}")
 
@@ -53,7 +53,7 @@ def named_rotation(text: str) -> Rotation:
     """Return the rotation named by a text: `optical` is flu_from_optical, `ned_from_enu` any two, or `x,-y,-z`.
 
     Raises:
-       ValueInvalid: unknown name (lists the nearest and all names), or a reflection.
+        ValueInvalid: unknown name (lists the nearest and all names), or a reflection.
     """
     change = named_change(text)
     if change.mirrors:
@@ -99,7 +99,7 @@ def named_change(text: str, *, of_world: bool = False) -> AxesChange:
     of_world: the names of systems, `ros` and `aircraft`, mean their world axes, not their body axes
 
     Raises:
-       ValueInvalid: unknown name; lists the nearest name and all names.
+        ValueInvalid: unknown name; lists the nearest name and all names.
     """
     if "," in text:
         return _own_axes(text)
@@ -139,7 +139,7 @@ def sides_of(text: str) -> tuple[str, str]:
     world and bodies alike, so that B is the inverse of W.
 
     Raises:
-       ValueInvalid: unknown name; not of the form `A_from_B`.
+        ValueInvalid: unknown name; not of the form `A_from_B`.
     """
     if "," in text:
         letters = _letters(text)
@@ -169,7 +169,7 @@ def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bo
     W and B are None for an unchanged side; mirror is True for a reflection across y.
 
     Raises:
-       ValueInvalid: unknown name; a reflection on one side only, whose result would not be a rotation.
+        ValueInvalid: unknown name; a reflection on one side only, whose result would not be a rotation.
     """
     identity = AxesChange(Rotation.identity())
     left = identity if world is None else named_change(world, of_world=True)
@@ -205,7 +205,7 @@ def find_euler(rotation: Rotation, angles: Sequence[float], *, tolerance: float 
     """Return the Euler conventions in which three angles are this rotation, within `tolerance`; all in radians.
 
     Raises:
-       ValueInvalid: there is none; names the nearest.
+        ValueInvalid: there is none; names the nearest.
     """
     first, second, third = angles
     off = {}

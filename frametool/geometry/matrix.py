@@ -169,7 +169,7 @@ def check(*values: float, normalize: bool = False) -> Nine[float]:
     Orthonormal to 1e-6 silently, to 1e-3 with a warning; with `normalize` any with singular values in 0.9 .. 1.1.
 
     Raises:
-       ValueInvalid: not finite, mirrored, singular, a scaled rotation, or not orthonormal.
+        ValueInvalid: not finite, mirrored, singular, a scaled rotation, or not orthonormal.
     """
     entries = nine(values)
     problem = complaint(*entries, normalize=normalize)
@@ -266,7 +266,7 @@ def check_six_d(*columns: float, normalize: bool = False) -> Components:  # noqa
     """Check one pair of columns and return it.
 
     Raises:
-       ValueInvalid: not finite, zero or parallel.
+        ValueInvalid: not finite, zero or parallel.
     """
     ax, ay, az, bx, by, bz = columns
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"

@@ -32,7 +32,7 @@ ROUNDING = 1e-6  # metres or degrees: numbers that differ by no more are the sam
 EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both are whole degrees
 GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
 UNSAID = (
-    "a pose at lat, lon does not say what its rotation is given in; "
+    "a pose at lat, lon does not state the axes of its rotation; "
     "axes: enu, ned, grid or ecef; for rows --local-axes"
 )
 

@@ -247,7 +247,7 @@ def check(x: float, y: float, z: float, w: float, *, normalize: bool = False) ->
     Silently within 1e-6 of norm 1, within 1e-3 with a warning; with `normalize` any non-zero finite one.
 
     Raises:
-       ValueInvalid: zero, not finite, or not of norm 1.
+        ValueInvalid: zero, not finite, or not of norm 1.
     """
     if abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT:
         return x, y, z, w

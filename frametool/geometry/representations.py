@@ -55,11 +55,11 @@ class BatchRule:
     what: what the rows are, in the plural
     deviation: kernel (components, xp) of the deviation of each row from a rotation; inf if it cannot be repaired
     furthest: function (components, xp) of the largest deviation, at least where none is above `exact`; otherwise
-       any value above it, or NaN
+        any value above it, or NaN
     repair: kernel (components, xp) that makes rotations of rows
     exact: the deviation up to which a row keeps its bits
     explained: function (components, halves, xp) that returns True if a row is a rotation up to half a unit of the last
-       printed digit of each number; None if there is nothing to explain
+        printed digit of each number; None if there is nothing to explain
     """
 
     __slots__ = ("deviation", "exact", "explained", "furthest", "repair", "what")
@@ -85,7 +85,7 @@ class Representation:
     names: short names of its numbers, for people and as keys of a map
     shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or a dict of
     the
-       keys of a map with the number of values of each
+        keys of a map with the number of values of each
     axes: Euler axes: "" none, NAMED_AXES if the user names them, else the fixed ones
     whole: how it holds the position too, if it can; searched: whether headers are searched for its columns
     alone: columns that suffice for the last number if the others are missing and 0
@@ -171,7 +171,7 @@ class Representation:
         """Check the floats of one rotation; return them, corrected to a rotation.
 
         Raises:
-           ValueInvalid: wrong count, not finite, or not a rotation.
+            ValueInvalid: wrong count, not finite, or not a rotation.
         """
         if len(components) != len(self.columns):
             expected = f"{len(self.columns)} numbers ({' '.join(self.columns)})"
@@ -419,7 +419,7 @@ class Notation:
         """Check the floats of one rotation and return its quaternion.
 
         Raises:
-           ValueInvalid: wrong count, not finite, or not a rotation.
+            ValueInvalid: wrong count, not finite, or not a rotation.
         """
         return self.to_quaternion(self.representation.checked(components, normalize=normalize), xp, degrees=degrees)
 
@@ -462,7 +462,7 @@ def notation(spec: str) -> Notation:
     """Read the name of a notation: `rpy`, `rpy_deg`, `euler:rzyx`, `euler_deg:rzyx`.
 
     Raises:
-       ValueInvalid: unknown name or axes, a unit without an angle; lists the nearest name and all names.
+        ValueInvalid: unknown name or axes, a unit without an angle; lists the nearest name and all names.
 
     """
     name, colon, axes = spec.partition(":")

@@ -149,7 +149,7 @@ class Rotation(Batched):
         Norms within 1e-6 of 1 are normalised silently, within 1e-3 with a warning; with `normalize` any non-zero one.
 
         Raises:
-           ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
+            ValueInvalid: wrong shape, not finite, zero, or not of norm 1; names the first such row.
         """
         return cls.from_columns("xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
 
@@ -160,7 +160,7 @@ class Rotation(Batched):
         With `normalize`, the nearest rotation (the polar factor) if all singular values are in 0.9 .. 1.1.
 
         Raises:
-           ValueInvalid: wrong shape, not finite, mirrored, scaled, not orthonormal; names the first such row.
+            ValueInvalid: wrong shape, not finite, mirrored, scaled, not orthonormal; names the first such row.
         """
         return cls.from_columns("matrix", validation.matrices(matrices, 3, "matrix"), "matrix", normalize=normalize)
 

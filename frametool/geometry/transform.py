@@ -73,7 +73,7 @@ class Transform(Batched):
 
         xyz: metres, shape (..., 3)
         rotation: at most one, with a name of `frametool help rotations`: rpy, rpy_deg, xyzw, wxyz, rotvec, matrix ..;
-           or `rotation=` a Rotation, such as `Rotation.from_euler(..)`.
+            or `rotation=` a Rotation, such as `Rotation.from_euler(..)`.
         Raises ValueInvalid for any other name, wrong shapes, values that are not finite, or not a rotation.
         """
         if isinstance(xyz, Rotation):
@@ -90,7 +90,7 @@ class Transform(Batched):
         """Create from translations of shape (..., 3) in metres and quaternions x, y, z, w of shape (..., 4).
 
         Raises:
-           ValueInvalid: wrong shapes, not finite, or not a rotation; names the first such row.
+            ValueInvalid: wrong shapes, not finite, or not a rotation; names the first such row.
         """
         shift = validation.columns(xyz, 3, "xyz")
         return cls._read(shift, "xyz", "xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
@@ -100,7 +100,7 @@ class Transform(Batched):
         """Create from homogeneous matrices of shape (..., 4, 4), the last row 0 0 0 1.
 
         Raises:
-           ValueInvalid: wrong shape, another last row, not finite, or not a rotation; names the first such row.
+            ValueInvalid: wrong shape, another last row, not finite, or not a rotation; names the first such row.
         """
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")

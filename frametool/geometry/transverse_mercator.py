@@ -100,7 +100,7 @@ def zone_number(name: object) -> float:
     """Return the number of a zone written as `32N` or `32S`, negative for the south.
 
     Raises:
-       ValueInvalid: not a zone, no hemisphere, or the letter of a band.
+        ValueInvalid: not a zone, no hemisphere, or the letter of a band.
     """
     text = "".join(name.split()).lstrip("0").upper() if isinstance(name, str) else str(name)
     if text in ZONES[1:]:

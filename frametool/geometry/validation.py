@@ -38,7 +38,7 @@ def columns(value: Any, width: int, name: str) -> Components:
     """Split `(..., width)` numbers into columns; those of one item become floats and are checked to be finite.
 
     Raises:
-       ValueInvalid: another shape, not numbers, or one item that is not finite.
+        ValueInvalid: another shape, not numbers, or one item that is not finite.
     """
     if isinstance(value, (list, tuple)) and len(value) == width and all(type(part) in (float, int) for part in value):
         return finite(tuple(map(float, value)), name)
@@ -59,7 +59,7 @@ def matrices(value: Numbers, size: int, name: str) -> Components:
     """Split `(..., size, size)` numbers into size * size columns, row-major.
 
     Raises:
-       ValueInvalid: another shape, not numbers, or one item that is not finite.
+        ValueInvalid: another shape, not numbers, or one item that is not finite.
     """
     array = as_numbers(value, name)
     if array.shape[-2:] != (size, size):
@@ -71,7 +71,7 @@ def scalars(value: Any, name: str) -> Any:
     """Return one number as a float, or an array of any shape unchanged.
 
     Raises:
-       ValueInvalid: not numbers, or not finite.
+        ValueInvalid: not numbers, or not finite.
     """
     if type(value) in (float, int):
         return finite((float(value),), name)[0]
@@ -83,7 +83,7 @@ def as_numbers(value: Numbers, name: str) -> Array:
     """Return an array of real numbers, without a copy if the argument is one.
 
     Raises:
-       ValueInvalid: ragged, or of another kind.
+        ValueInvalid: ragged, or of another kind.
     """
     import numpy as np
 
@@ -352,7 +352,7 @@ def masses(heavy: Numbers | None, shape: tuple[int, ...]) -> Array:
     """Return weights of a batch's shape, 1 each if none are passed.
 
     Raises:
-       ValueInvalid: the batch is empty, or the weights are invalid.
+        ValueInvalid: the batch is empty, or the weights are invalid.
     """
     import numpy as np
 

@@ -40,7 +40,7 @@ def check_rotvec(*vector: float, what: str = "rotation vector", normalize: bool 
     """Check one rotation vector and return it.
 
     Raises:
-       ValueInvalid: not finite, or so long that its square overflows.
+        ValueInvalid: not finite, or so long that its square overflows.
     """
     x, y, z = vector
     if not x * x + y * y + z * z < inf:
@@ -71,7 +71,7 @@ def check_axis_angle(*axis_and_angle: float, normalize: bool = False) -> Compone
     """Check one axis and angle and return them.
 
     Raises:
-       ValueInvalid: not finite, or the axis is zero.
+        ValueInvalid: not finite, or the axis is zero.
     """
     ax, ay, az, angle = axis_and_angle
     if not all(map(isfinite, axis_and_angle)):

@@ -1,1 +1,1 @@
-"""Plain values to poses, points and trees, and results back to plain values."""
+"""Parse plain values into poses, points and trees, and convert results back into plain values."""

@@ -1,9 +1,9 @@
-"""How sure a pose is: `covariance`, 36 numbers or 6 rows of 6, and `sigma`, the roots of its diagonal.
+"""The uncertainty of a pose: `covariance`, 36 numbers or 6 rows of 6, and `sigma`, the roots of its diagonal.
 
-    {xyz: [1, 2, 3], sigma: {xyz_mm: 2, rpy_deg: [0.1, 0.1, 0.3]}}       a part that is left out is 0: exact
+    {xyz: [1, 2, 3], sigma: {xyz_mm: 2, rpy_deg: [0.1, 0.1, 0.3]}}       a missing part is 0: exact
     x, y, z, qx, qy, qz, qw, sigma_x, .. sigma_yaw                       or c11 .. c66, as columns
 
-Over (x, y, z, turns about X, Y, Z), metres and radians, along the fixed axes of the parent, as in ROS.
+Over (x, y, z, rotation about X, Y, Z), metres and radians, along the fixed axes of the parent, as in ROS.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
 
 COVARIANCE, SIGMA = "covariance", "sigma"
-LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and how many make a metre
-ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are degrees
+LENGTHS = {"xyz": 1.0, "xyz_mm": 1000.0, "xyz_cm": 100.0}  # keys of sigma, and their units per metre
+ANGLES: dict[str, bool | None] = {"rpy": None, "rpy_deg": True, "rpy_rad": False}  # and whether they are in degrees
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 RADIANS = 3.141592653589793 / 180.0
 
 
 class Unrounded(float):
-    """A number that --precision leaves whole: some digits after the point make nothing of a small square."""
+    """A number that --precision does not round: a few decimals would turn a small variance into 0."""
 
     __slots__ = ()
 
@@ -46,15 +46,15 @@ OF = {"xyz": AXES[:3], "rpy": AXES[3:]}
 
 
 def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tuple[tuple[int, str], ...]]:
-    """Return the places of the columns of a covariance, and for sigmas what each of the six axes is read from.
+    """Return the indices of the columns of a covariance, and for sigmas the sources of each of the six axes.
 
-    size: 36 of a pose, 9 of a point.  None where there are none.  Raises NotARotation for what is half of one or both.
+    size: 36 of a pose, 9 of a point.  None if there are none.  Raises NotARotation for an incomplete or duplicate one.
     """
     entries = columns(size)
     whole = tuple(names.index(name) for name in entries) if {*entries} <= {*names} else ()
     if not whole and size == 36 and {*columns(9)} <= {*names}:
         given = sum(name in names for name in entries)
-        raise NotARotation(f"covariance has {given} columns; 36 are needed, c11 .. c66 (x y z, turns about X Y Z)")
+        raise NotARotation(f"covariance has {given} columns; 36 are needed, c11 .. c66 (x y z, rotation about X Y Z)")
     places: list[int] = []
     found: dict[str, tuple[int, str]] = {}
     for place, name in enumerate(names):
@@ -65,7 +65,7 @@ def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tupl
         unit = bracket[1] if bracket else match[2] or ""
         for axis in OF.get(match[1], (match[1],)):
             if axis in found:
-                raise NotARotation(f"column {shown(name)}: the sigma of {axis} is said already; keep one")
+                raise NotARotation(f"column {shown(name)}: the sigma of {axis} is there already; keep one")
             if unit not in (UNITS_OF_LENGTH if axis in OF["xyz"] else ("", *UNITS_OF_ANGLE)):
                 raise NotARotation(f"column {shown(name)}: unknown unit {shown(unit)} of a sigma")
             found[axis] = len(places), unit
@@ -73,12 +73,12 @@ def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tupl
     if whole and found:
         raise NotARotation("sigma and covariance in one row; keep the columns of one")
     if size == 9 and {*found} & {*OF["rpy"]}:
-        raise NotARotation("a point does not turn; its sigmas are sigma_x, sigma_y, sigma_z")
+        raise NotARotation("a point has no rotation; its sigmas are sigma_x, sigma_y, sigma_z")
     return whole or tuple(places), tuple(found.get(axis, (-1, "")) for axis in AXES) if found else ()
 
 
 def is_sigma(name: str) -> bool:
-    """Return True if a column is called as a sigma is: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
+    """Return True if a column has the name of a sigma: `sigma_x`, `sigma_yaw_deg`, `sigma_z [mm]`."""
     return name.startswith("sigma_") and re.match(_SIGMA_COLUMN + r"\s*(?:[\[(]|$)", name) is not None
 
 
@@ -90,18 +90,18 @@ def in_unit(number: Any, unit: str) -> Any:
 
 
 def columns(size: int = 36) -> tuple[str, ...]:
-    """Name the entries as columns: c11 .. c66 of a pose, c11 .. c33 of a point."""
+    """Return the entries' column names: c11 .. c66 of a pose, c11 .. c33 of a point."""
     axes = range(1, 7 if size == 36 else 4)
     return tuple(f"c{i}{j}" for i in axes for j in axes)
 
 
 def read_covariance(mapping: dict[str, Any], reading: Reading) -> Components | None:
-    """Read the covariance that an entry says, either way; None where it says none: the pose is exact.
+    """Read the covariance of an entry, from either key; None if there is none: the pose is exact.
 
-    Raises Misfit with the path, NotARotation where numbers that were read make none.
+    Raises Misfit with the path, NotARotation if the numbers are not a covariance.
     """
     if COVARIANCE in mapping and SIGMA in mapping:
-        raise NotARotation("sigma and covariance in one entry; give one", (SIGMA,), key=True)
+        raise NotARotation("sigma and covariance in one entry; keep one", (SIGMA,), key=True)
     if SIGMA in mapping:
         return within((SIGMA,), of_sigmas, within((SIGMA,), read_sigmas, mapping[SIGMA], reading))  # type: ignore[no-any-return]
     if COVARIANCE not in mapping:
@@ -112,7 +112,7 @@ def read_covariance(mapping: dict[str, Any], reading: Reading) -> Components | N
 
 
 def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
-    """Read the numbers of a covariance, each with its place: a list of them, or a list of rows."""
+    """Read the numbers of a covariance, each with its path: a list of them, or a list of rows."""
     if type(value) is not list:
         raise Misfit(f"covariance must be a list of numbers, found {kind(value)}")
     rows: list[tuple[Path, Any]] = [((at,), row) for at, row in enumerate(value)]
@@ -151,7 +151,7 @@ def read_sigmas(value: Any, reading: Reading) -> list[float]:
 
 
 def _three(key: str, value: Any, axes: Sequence[str], reading: Reading) -> list[float]:
-    """Read the three numbers of a part of sigma in metres or radians; one number stands for all three."""
+    """Read the three numbers of a part of sigma in metres or radians; a single number applies to all three."""
     from math import radians
 
     if type(value) is dict:

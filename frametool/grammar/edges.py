@@ -1,4 +1,4 @@
-"""What a file of frames comes down to: edges, and what is worth telling of how they were written."""
+"""The content of a file of frames: edges, and diagnostics about the file."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 
 class Edge(NamedTuple):
-    """The pose of `child` in `parent`: parent_from_child, for good or at one time.
+    """The pose of `child` in `parent`: parent_from_child, static or at one time.
 
     parent: None for a root
     components: tx, ty, tz (metres), x, y, z, w (unit)
-    stamp_ns: None where it stands still
-    line: on which it was written, 0 if that says nothing
-    received_ns: when the recorder got it, if that is known
-    path: in a document, the way to it from the top of the text
-    topic: by which it came, if that is known
-    covariance: 36 entries as `geometry.uncertainty` has them, the same for all samples of a frame; None: exact
+    stamp_ns: None if static
+    line: line number in the file, 0 if unknown
+    received_ns: the time at which the recorder received it, if known
+    path: in a document, the keys that lead to it from the top
+    topic: the topic that it came by, if known
+    covariance: 36 entries as in `geometry.uncertainty`, the same for all samples of a frame; None: exact
     """
 
     parent: str | None
@@ -45,9 +45,9 @@ class Edge(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Many poses of one frame that moves, in one piece: what as many edges would say.
+    """Many poses of one moving frame, in one piece, equivalent to as many edges.
 
-    stamps_ns, components, lines: of each pose, in the order they were written
+    stamps_ns, components, lines: of each pose, in the order of the file
     """
 
     parent: str
@@ -66,7 +66,7 @@ class Samples(NamedTuple):
 
 
 class EdgeColumns(NamedTuple):
-    """Edges of several frames that move, column by column, in the order they were written."""
+    """Edges of several moving frames, column by column, in the order of the file."""
 
     parents: Sequence[str]
     children: Sequence[str]
@@ -76,7 +76,7 @@ class EdgeColumns(NamedTuple):
     topics: Iterable[str] = ()
 
     def edges(self) -> Iterator[Edge]:
-        """Yield them as edges."""
+        """Yield the rows as edges."""
         parents, children, stamps_ns, components, lines, topics = self
         return map(
             Edge, parents, children, components, stamps_ns, lines, repeat(None), repeat(()), topics or repeat("")
@@ -84,19 +84,19 @@ class EdgeColumns(NamedTuple):
 
 
 def at_other_times(piece: Edge | Samples | EdgeColumns, offset_ns: int) -> Edge | Samples | EdgeColumns:
-    """Return what was read of a file with so much added to its stamps."""
+    """Return a piece of a file with an offset added to its stamps."""
     if isinstance(piece, Edge):
         return piece if piece.stamp_ns is None else piece._replace(stamp_ns=piece.stamp_ns + offset_ns)
     return piece._replace(stamps_ns=[stamp + offset_ns for stamp in piece.stamps_ns])
 
 
 def stop(error: FormatError) -> None:
-    """Raise an error: what a reader does with one unless it is told otherwise."""
+    """Raise an error: the default reaction of a reader."""
     raise error
 
 
 class Names(dict[str, str]):
-    """Frame names by the text they stand in: quotes off, one leading `/` off; each is worked out once."""
+    """Frame names by their text: without quotes and one leading `/`; each is parsed once."""
 
     def __init__(self) -> None:
         """Create an empty table; `slashed` collects the names that began with `/`."""
@@ -104,13 +104,13 @@ class Names(dict[str, str]):
         self.slashed: list[str] = []
 
     def __missing__(self, text: str) -> str:
-        """Work a name out; "" for a text that YAML takes for nothing, which is no name."""
+        """Parse a name; "" for a text that YAML takes for null, which is not a name."""
         name = text[1:-1].replace("''", "'") if text[0] in "\"'" else text
         self[text] = "" if text in {"null", "Null", "NULL"} else self.bare(name)
         return self[text]
 
     def bare(self, name: str) -> str:
-        """Take one leading `/` off, as tf2 does, and remember it."""
+        """Remove one leading `/`, as tf2 does, and record it."""
         if not is_slashed(name):
             return name
         if name not in self.slashed:
@@ -119,7 +119,7 @@ class Names(dict[str, str]):
 
 
 class Tally:
-    """What is worth telling about a recording once it is read: counted here, told at the end."""
+    """Diagnostics about a file: collected while it is read, emitted at the end."""
 
     __slots__ = (
         "assumed", "axes", "drawn", "names", "noise", "notes", "others", "projected", "robot", "rough",
@@ -127,14 +127,14 @@ class Tally:
     )  # fmt: skip
 
     def __init__(self) -> None:
-        """Create an empty tally; `rough` and `noise` hold line numbers, `others` counts by topic.
+        """Create empty diagnostics; `rough` and `noise` hold line numbers, `others` counts by topic.
 
-        assumed: what the file does not say and was taken for granted, with the option that says it, or was left out
-        axes: frame -> the axes of the camera it is, `optical` or `opengl`
-        drawn: of a file without poses, child -> how often its edge comes
-        projected: how far the worst matrix was from a rotation, in forms that round them
-        robot: of a file that values of joints are about, the values of those that stand still and the links they move
-        unknown_joints: those told of that it does not have, each with the error that says so, for another file may
+        assumed: what the file does not state and was assumed, with the option that sets it, or was omitted
+        axes: frame -> the axes of a camera frame, `optical` or `opengl`
+        drawn: of a file without poses, child -> the rate of its edge
+        projected: the largest deviation of a matrix from a rotation, in formats that round them
+        robot: of a file with joints, the values of the fixed ones and the links that they move
+        unknown_joints: the passed ones that it does not have, each with its error, because another file may have them
         """
         self.assumed = ""
         self.axes: dict[str, str] = {}
@@ -149,23 +149,23 @@ class Tally:
         self.notes: dict[str, Finding] = {}
 
     def note(self, message: str, line: int, rule: str = "odd") -> None:
-        """Keep a sentence, once; of rotations that had to be normalised only the lines."""
+        """Record a message, once; for rotations that had to be normalised only the lines."""
         if rule == "rounded":
             self.rough.append(line)
         else:
             self.notes.setdefault(message, Finding(rule, message, line=line))
 
     def note_all(self, notes: Iterable[Finding], line: int) -> None:
-        """Keep what was noted while one line was read."""
+        """Record the warnings raised while one line was read."""
         for note in notes:
             self.note(note.message, line, note.rule)
 
     def note_each(self, message: str, line: int, rule: str = "odd") -> None:
-        """Keep a sentence about one line, also where it was said of other lines."""
+        """Record a message about one line, even if the same was recorded for other lines."""
         self.notes.setdefault(f"{line}: {message}", Finding(rule, message, line=line))
 
     def told(self) -> Iterator[Finding]:
-        """Yield one sentence for each kind of oddity."""
+        """Yield one finding for each kind of problem."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
             yield Finding("rounded", f"{count} off norm 1 by up to 1e-3 and normalised", line=self.rough[0])
@@ -183,36 +183,36 @@ class Tally:
         yield from self.notes.values()
 
 
-PROJECTED_IN_SILENCE = 1e-9  # what seventeen digits and some products leave of orthonormal rows
+PROJECTED_IN_SILENCE = 1e-9  # the deviation from orthonormal that seventeen digits and a few products explain
 
 
 def projection(off: float) -> str:
-    """Say that matrices were replaced by rotations."""
+    """Return the message that matrices were replaced by rotations."""
     return f"the matrices are orthonormal only to {off:.2g}; the nearest rotation of each was taken"
 
 
 class Topics:
-    """The topics of a recording: how many transforms came by each, which are read, and which frames come by two."""
+    """The topics of a recording: transforms by topic, which ones are read, and frames that two topics publish."""
 
     def __init__(self, chosen: Iterable[str] = ()) -> None:
-        """Read the topics chosen, with or without a leading `/`; all of them if none is."""
+        """Read the chosen topics, with or without a leading `/`; all of them if none is chosen."""
         self.chosen = frozenset(topic.strip("/") for topic in chosen)
         self.counts: dict[str, int] = {}
         self.seen: set[str] = set()  # topics, also those without transforms
-        self._first: dict[str, str] = {}  # child -> the topic it came by first
+        self._first: dict[str, str] = {}  # child -> the first topic that published it
         self._told: set[tuple[str, str]] = set()
 
     def takes(self, topic: str) -> bool:
-        """Count a transform; return whether its topic is read."""
+        """Count a transform; return True if its topic is read."""
         self.counts[topic] = self.counts.get(topic, 0) + 1
         return not self.chosen or topic.strip("/") in self.chosen
 
     def chooses(self, topic: str) -> bool:
-        """Return True if a topic was named; only then are messages read that are poses and no transforms."""
+        """Return True if a topic was named; only then are messages read that are poses and not transforms."""
         return topic.strip("/") in self.chosen
 
     def conflict(self, topic: str, child: str) -> str:
-        """Return what is wrong if a frame comes from two namespaces, as of two robots; told once of each frame."""
+        """Return an error if a frame comes from two namespaces, as with two robots; once for each frame."""
         first = self._first.setdefault(child, topic)
         if first == topic or _source_of(first) == _source_of(topic) or (child, topic) in self._told:
             return ""
@@ -220,7 +220,7 @@ class Topics:
         return f"frame {child!r} comes by {first} and by {topic}; choose with --topic {first} or --topic {topic}"
 
     def missing(self) -> str:
-        """Return what is wrong if none of the topics chosen is there; what names no topics is read in any case."""
+        """Return an error if none of the chosen topics exists; files without topics are always read."""
         known = {*self.counts, *self.seen} - {""}
         if not self.chosen or not known or any(map(self.chooses, self.counts)):
             return ""
@@ -228,23 +228,23 @@ class Topics:
 
 
 def _source_of(topic: str) -> str:
-    """Return what publishes on a topic: `tf` and `tf_static` of one namespace belong together."""
+    """Return the namespace of a topic: `tf` and `tf_static` of one namespace belong together."""
     return topic.removesuffix("_static") if topic.endswith("/tf_static") or topic == "tf_static" else topic
 
 
 class Answers(NamedTuple):
-    """What options say about files whose form leaves it open.
+    """Options for what the format of a file does not specify.
 
-    frames: names of the frames that a form does not name, in its order: the world, then what is seen from it
-    direction: of matrices whose key does not say it, `parent-from-child` or `child-from-parent`
+    frames: names of the frames that the format does not name, in its order: the world, then the body
+    direction: of matrices whose key does not state it, `parent-from-child` or `child-from-parent`
     camera_axes: of cameras, `optical` (x right, y down, z forward) or `opengl` (x right, y up, z back)
     dh: `standard` or `modified` Denavit-Hartenberg parameters
-    stamps: a file with a time for each pose, one a line
-    edges: of a graph of poses the edges are wanted, not the vertices
-    joints: values of joints as they were written: NAME -> 30deg, 0.5, 2cm or a pose
-    joint_files: files with values of joints, over time or for good
+    stamps: a file with a timestamp for each pose, one per line
+    edges: read the edges of a pose graph instead of its vertices
+    joints: values of joints as text: NAME -> 30deg, 0.5, 2cm or a pose
+    joint_files: files with values of joints, with or without timestamps
     order: of quaternions in lists, `xyzw` or `wxyz`
-    time_offset: nanoseconds that are added to all stamps, or `FromFirst`
+    time_offset: nanoseconds added to all stamps, or `FromFirst`
     """
 
     frames: tuple[str, ...] = ()
@@ -259,7 +259,7 @@ class Answers(NamedTuple):
     time_offset: int = 0
 
     def names(self, *defaults: str) -> tuple[str, ...]:
-        """Return the names of a form's frames: as told, then its own."""
+        """Return the names of a format's frames: those of the option, then the format's defaults."""
         told = (name[is_slashed(name) :] for name in self.frames[: len(defaults)])
         return (*told, *defaults[len(self.frames) :])
 
@@ -267,11 +267,11 @@ class Answers(NamedTuple):
 class Options(NamedTuple):
     """How a file of frames is read.
 
-    tally: takes what is worth telling at the end
-    topics: which are read
-    report: takes the errors, and reading goes on behind them
-    normalize: any non-zero quaternion and any matrix near a rotation is taken
-    answers: what the form leaves open
+    tally: collects the diagnostics
+    topics: those that are read
+    report: receives errors, and reading continues after them
+    normalize: accept any non-zero quaternion and any matrix near a rotation
+    answers: options for what the format does not specify
     """
 
     tally: Tally

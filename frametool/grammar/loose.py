@@ -1,4 +1,4 @@
-"""Poses as people write them by hand: numbers one by one, lists under any word; into the keys of the grammar.
+"""Poses as people write them by hand: single numbers, lists under various names; converted to the keys of the grammar.
 
 {x: 0.9, y: 0.0, z: 2.0, roll: 0.0, pitch: 0.0, yaw: 1.57}          {x: 1, y: 2, theta: 90deg}
 {trans_x: 0.1, trans_y: 0.0, trans_z: 0.0, rot_x: 0.0, rot_y: 0.0, rot_z: 0.0, rot_w: 1.0}
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 _POSITIONS = (*POSITION_WORDS, "translation", "position", "location")
 _TURNS = (*(word for word, meant in ROTATION_WORDS.items() if not meant), "q", "quaternion")
-_SPELLED = {"t": "xyz", "q": "quaternion", "r": "rotvec_rad"}  # by the first letter of a column's own name
+_SPELLED = {"t": "xyz", "q": "quaternion", "r": "rotvec_rad"}  # by the first letter of a single number's name
 _WHOLE = ("value", "pose")  # seven numbers
-# the names of single numbers -> the key of the grammar under which they stand together
+# the names of single numbers -> the key of the grammar for them
 _FLAT = {
     **{f"{word}{axis}": ("xyz", axis) for axis in "xyz" for word in ("", "p", "t")},
     **{f"q{axis}": ("quaternion", axis) for axis in "xyzw"},
@@ -38,12 +38,12 @@ WORDS = frozenset((*POSE_KEYS, *_FLAT, *_POSITIONS, *_TURNS, *_WHOLE))
 
 
 def read_loose_pose(fields: dict[str, Any], reading: Reading, also: Collection[str] = (), *, order: str = "") -> Pose:
-    """Read a pose whose numbers may stand each under a name of its own: x, y, z, yaw; raises Misfit."""
+    """Read a pose whose numbers may each have a name: x, y, z, yaw; raises Misfit."""
     places: dict[Path, str] = {}
     mapping = _in_grammar(fields, order, places)
     try:
         return read_pose(mapping, reading, also)
-    except Misfit as misfit:  # at the key as it is written
+    except Misfit as misfit:  # at the key as written
         known = next((end for end in (2, 1) if misfit.path[:end] in places), 0)
         misfit.path = (places[misfit.path[:known]], *misfit.path[known:]) if known else misfit.path
         raise
@@ -52,7 +52,7 @@ def read_loose_pose(fields: dict[str, Any], reading: Reading, also: Collection[s
 def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> dict[str, Any]:
     """Return an entry with the keys of the grammar of poses; raises Misfit.
 
-    places: is filled with the keys under which these stand in the text
+    places: is filled with the original keys of these
     """
     found: dict[str, Any] = {}
     for key, value in fields.items():
@@ -94,14 +94,14 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
 
 
 def _put(found: dict[str, Any], key: str, value: Any, given: str) -> None:
-    """Keep a value; raises Misfit for the second position, or for what stands there twice."""
+    """Store a value; raises Misfit for a second position, or for a duplicate."""
     if key in found:
         raise Misfit(f"{bare(given)} says again what stands beside it; keep one", (given,), key=True)
     found[key] = value
 
 
 def _turn(value: Any, order: str, key: str) -> tuple[str, Any]:
-    """Return the key of the grammar for a rotation, by its shape, and its value; raises Misfit."""
+    """Return the key of the grammar for a rotation, by the shape of its value, and the value; raises Misfit."""
     if type(value) is list and len(value) == 4 and not any(type(each) is list for each in value):
         return _ordered(value, order, key), value
     if type(value) is list and (len(value) == 9 or any(type(each) is list for each in value)):

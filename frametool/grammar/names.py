@@ -1,6 +1,6 @@
-"""What keys and columns are called: the frames that rows and records name, their stamps, and the unit of these.
+"""Names of keys and columns: of frames in rows and records, of stamps, and the units of these.
 
-One table for mappings, messages and headers of tables: a name means the same wherever it stands.
+One table for mappings, messages and headers of tables: a name means the same everywhere.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 HEADER_FRAME = "header.frame_id"
-PARENT_KEYS = (*PARENT_NAMES, "frame")  # what something is given in
-PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # what a message's header says is said best
-# the words of others in columns, and in keys that hold one number each
+PARENT_KEYS = (*PARENT_NAMES, "frame")  # the frame in which something is expressed
+PARENT_COLUMNS = (HEADER_FRAME, *PARENT_KEYS)  # the header of a message has priority
+# names of other tools for columns, and for keys with a single number
 COLUMN_WORDS = {
     **{f"rvec_{axis}": f"rotvec_{axis}" for axis in "xyz"},
     **{f"{word}_{axis}": f"t{axis}" for word in ("tvec", "trans", "pos", "translation") for axis in "xyz"},
     **{f"{word}_{axis}": f"q{axis}" for word in ("qvec", "quat", "rot", "q") for axis in "xyzw"},
 }
 NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
-RATES = r"(?i)[vw][xyz](?:[ _\[(].*)?"  # what is called velocity_x, omega_x looks like a second position and is refused
+RATES = r"(?i)[vw][xyz](?:[ _\[(].*)?"  # names such as velocity_x, omega_x resemble a second position and are refused
 NORMAL_NAMES = frozenset(sum(NORMALS, ()))
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
-NANOSECONDS = ("%time", "field.header.stamp")  # as `rostopic echo -p` names them
-# compiled when first needed, not at start-up
+NANOSECONDS = ("%time", "field.header.stamp")  # names that `rostopic echo -p` writes
+# compiled at first use, not at start-up
 _STAMP = r"(?i)[#% ]*+(?:.*[._])?(?:stamp|timestamp|time|t)(?:_[nmuµ]?s)?\s*(?:[\[(].*)?"
 _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
@@ -40,15 +40,15 @@ PLACE_KEYS = frozenset((
     "lat", "latitude", "lon", "longitude", "lng", "alt", "altitude", "ecef", "utm", "easting", "northing", "east",
     "north", "up", "down",
 ))  # fmt: skip
-FIX = "position_covariance"  # of a NavSatFix: of its place, along east, north, up there
+FIX = "position_covariance"  # of a NavSatFix, along local east, north, up
 EARTH_FRAMES = representations.EARTH_FRAMES
-# the positions whose keys and columns are just their names and numbers: ours have readers of their own
+# positions whose keys and columns are simply their names and numbers; the others have readers of their own
 FLAT = {key: row.names for key, row in representations.POSITIONS.items() if not row.kernels.startswith("frametool")}
 FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 
 
 def in_nanoseconds(name: str) -> int:
-    """Return how many nanoseconds a whole number is by its name: 1 in `stamp_ns`, `t [ns]`; 0 where it is seconds.
+    """Return the nanoseconds per unit of an integer, by its name: 1 for `stamp_ns`, `t [ns]`; 0 for seconds.
 
     Raises ValueInvalid for an unknown unit.
     """
@@ -62,12 +62,12 @@ def in_nanoseconds(name: str) -> int:
 
 
 def stamp_column(names: Iterable[str] | None) -> int | None:
-    """Return the place of the first column that is called as stamps are, in a unit that is known."""
+    """Return the index of the first column that has the name of a stamp, in a known unit."""
     return next((at for at, name in enumerate(names or ()) if re.fullmatch(_STAMP, name) and _is_known(name)), None)
 
 
 def stamp_places(names: Iterable[str] | None) -> tuple[int | None, int | None]:
-    """Return the place of the stamps as `stamp_column` does, or of whole seconds and the nanoseconds beside them."""
+    """Return the index of the stamps as `stamp_column` does, or of whole seconds and of the nanoseconds."""
     known = tuple(names or ())
     if (found := stamp_column(known)) is not None:
         return found, None
@@ -76,7 +76,7 @@ def stamp_places(names: Iterable[str] | None) -> tuple[int | None, int | None]:
 
 
 def nanoseconds_beside(names: Sequence[str], place: int) -> int | None:
-    """Return the place of the nanoseconds that go with a column of whole seconds: `header.stamp.sec`, `..nanosec`."""
+    """Return the index of the nanoseconds for a column of whole seconds: `header.stamp.sec`, `..nanosec`."""
     found = re.fullmatch(_WHOLE_SECONDS, names[place].lower())
     folded = [name.lower() for name in names] if found else []
     wanted = [f"{found[1]}{part}" for part in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds")] if found else []
@@ -92,7 +92,7 @@ def _is_known(name: str) -> bool:
 
 
 def may_be_on_earth(name: str) -> bool:
-    """Return True if a key or column may say a position on the Earth: a latitude, ECEF, UTM, north of somewhere."""
+    """Return True if a key or column may be a position on the Earth: a latitude, ECEF, UTM, north."""
     return re.search(_EARTH, name) is not None or name in FLAT_NAMES
 
 
@@ -102,5 +102,5 @@ def may_be_uncertain(name: str) -> bool:
 
 
 def without_mark(name: str) -> str:
-    """Return a column's name without the mark of a comment: `#timestamp [ns]` is the first of EuRoC's."""
+    """Return a column's name without a comment mark: `#timestamp [ns]` is the first column of EuRoC's files."""
     return name.lstrip("#% ") or name

@@ -1,13 +1,13 @@
-"""Numbers as people paste them from other tools, turned into the mappings that `read_pose` takes.
+"""Numbers pasted from other tools, converted to the mappings that `read_pose` accepts.
 
     array([[ 0., -1.], ..                  numpy, PyTorch, JAX; [0 -1; 1 0] is MATLAB
-    0.7071 + 0.7071k                       the algebra of tutorials: x, y, z of i, j, k, then w
+    0.7071 + 0.7071k                       algebra in tutorials: x, y, z of i, j, k, then w
     0.7071 << 0, 0, 0.7071 >>              spatialmath: w, then x, y, z; (x,y,z,w) = .. is Pinocchio's
     Quaternion(x=0.0, ..)                  a repr with names; <Euler (x=0, ..), order='XYZ'> of Blender
     R = .. p = ..                          a rotation and a position; t = 1, 2, 3; rpy/zyx = 0, 0, 90 deg
 
-Prints of 3x3, 3x4 and 4x4 are matrices, other rows what the caller says.  Each number stays the text it was.  None
-stands for a text that is nothing of the kind; a meaning left open comes out as the bare list that the grammar refuses.
+Printed 3x3, 3x4 and 4x4 arrays are matrices, other rows what the caller states.  Each number remains its text.  None
+means that a text is nothing of the kind; an ambiguous meaning returns the bare list that the grammar refuses.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _SCALE = rf"\s*({NUMBER})\s*\*\s*\n"  # MATLAB's `1.0e+03 *` above a matrix
 _SCALAR = r"(?:np|numpy)\.\w+\(([^()]*)\)"  # numpy 2 in lists: np.float64(0.5)
 _OPEN, _CLOSE = "[({", "])}"
 _BY_COLUMNS = r"(?:[dft]|high|med|low)?p?_?mat[34](?:x[34])?\("
-_UNSUPPORTED: Sequence[tuple[str, str]] = (  # how prints begin that are recognised and not read, and what printed them
+_UNSUPPORTED: Sequence[tuple[str, str]] = (  # prints that are recognised but not read, and the tools that print them
     (r"Out\[\d+\](?://\w+)?\s*=|\{\{?[^{}]*?\d(?:`|\*\^)", "Mathematica"),
     (r"\d+\xd7\d+ [A-Za-z]", "Julia"),
     (r"\[,\d+\]|(?:structure\(|matrix\()?\bc\((?:[^,()]*,){8}", "R"),
@@ -57,17 +57,17 @@ _DECORATIONS: Sequence[tuple[str, str]] = (
     (rf"\A({LABEL})\s*\d+[\xd7x]\d+\b[^\n]*\n", ""),  # heading of MATLAB's live scripts
     (rf"\A({LABEL})\s*(?:se3|so3)[ \t]*\n", ""),  # MATLAB's classes
     (r"(?s)\A([^<]*)<Matrix \d+x\d+\s*(.*)>", r"\1[\2]"),  # Blender
-    (r"[│┌┐└┘]", " "),  # brackets that nalgebra draws
+    (r"[│┌┐└┘]", " "),  # brackets printed by nalgebra
     (_SCALAR, r"\1"),
 )
 _DECORATED = r"""[\x1b\\⎡⎛│┌`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
 
 
 def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
-    """Take a print of numbers apart into its rows; None for what is none.
+    """Split a print of numbers into rows; None if the text is not one.
 
-    any_text: words beside numbers are kept as they are, for a reader who knows what to say about them.
-    Raises ValueInvalid for a print that was cut, for one by columns, and for commas that may be decimal ones.
+    any_text: keep words between the numbers, for a reader that reports them.
+    Raises ValueInvalid for a truncated print, for one by columns, and for commas that may be decimal commas.
     """
     body = _undecorated(text).strip().rstrip(";")
     body = re.sub(LABEL, "", body, count=1) if re.match(LABEL, body) else body
@@ -87,9 +87,9 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
 
 
 def _undecorated(text: str) -> str:
-    """Take away the names, headings and brackets that tools put around numbers.
+    """Remove the names, headings and brackets that tools print around numbers.
 
-    Raises ValueInvalid for what holds a matrix column by column, and for tools whose prints are not read.
+    Raises ValueInvalid for a matrix printed column by column, and for tools whose prints are not read.
     """
     if not re.search(_DECORATED, text):
         return text
@@ -105,13 +105,13 @@ def _undecorated(text: str) -> str:
 
 
 def unsupported_tool(text: str) -> str:
-    """Name the tool that printed a text, where its prints are recognised and not read; else return ""."""
+    """Return the tool that printed a text, if its prints are recognised but not read, else ""."""
     found = (tool for begin, tool in _UNSUPPORTED if re.match(rf"\s*+(?:{LABEL})?(?:{begin})", text))
     return next(found, "")
 
 
 def _side_by_side(body: str) -> str:
-    """Put the blocks of columns into which a wide matrix was parted beside each other again."""
+    """Join the blocks of columns into which a wide matrix was split."""
     before, *blocks = re.split(_COLUMNS, body)
     if not blocks:
         return body
@@ -122,7 +122,7 @@ def _side_by_side(body: str) -> str:
 
 
 def _without_indices(rows: Rows) -> Rows:
-    """Take away the counting row above and the counting column that pandas prints."""
+    """Remove the row and the column of indices that pandas prints."""
     if len(rows) < 2 or rows[0] != [str(at) for at in range(len(rows[0]))]:
         return rows
     if any(row[0] != str(at) or len(row) != len(rows[0]) + 1 for at, row in enumerate(rows[1:])):
@@ -131,7 +131,7 @@ def _without_indices(rows: Rows) -> Rows:
 
 
 def _bracketed(body: str) -> list[str] | None:
-    """Return what stands in the innermost brackets; None if there is more than brackets around them."""
+    """Return the contents of the innermost brackets; None if there is other text around them."""
     plain = body.translate(str.maketrans("({)}", "[[]]"))
     inner = re.findall(r"\[([^\[\]]*)\]", plain)
     around = re.sub(r"\[[^\[\]]*\]", "", plain)
@@ -141,12 +141,12 @@ def _bracketed(body: str) -> list[str] | None:
 
 
 def _cells(row: str) -> list[str]:
-    """Part a row at its blanks or at its commas; raise ValueInvalid where both part it."""
+    """Split a row at its blanks or at its commas; raise ValueInvalid if both separate numbers."""
     row = row.strip().removesuffix(",").strip()
     gaps = re.findall(r"\s*,\s*|\s+", row)
     commas = sum("," in gap for gap in gaps)
     if 0 < commas < len(gaps):
-        raise ValueInvalid(f"{shown(row)} is parted by blanks and by commas; are these decimal commas? write points")
+        raise ValueInvalid(f"{shown(row)} is separated by blanks and by commas; are these decimal commas? write points")
     return re.split(r"\s*,\s*|\s+", row)
 
 
@@ -155,7 +155,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _times(cell: str, scale: str) -> str:
-    """Multiply a text by the power of ten that stands above a matrix, exactly."""
+    """Multiply a number, as text, by the power of ten above a matrix, exactly."""
     power = re.fullmatch(r"1(?:\.0*)?[eE]([-+]?\d+)", scale)
     if not power or "e" in cell.lower():
         raise ValueInvalid(f"a factor {shown(scale)} above numbers is not a power of ten; use format long")
@@ -177,9 +177,9 @@ _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|
 
 
 def named_values(text: str, given: Notation | None = None) -> list[Any] | None:
-    """Return what a print of objects stands for, as documents give it; None for no such text.
+    """Return the values of a print of objects, as documents have them; None for any other text.
 
-    Raises ValueInvalid for a print that is known and cannot be taken.
+    Raises ValueInvalid for a known print that cannot be read.
     """
     robots = [_robot(line, given) for line in text.strip().splitlines() if line.strip()]
     if robots and None not in robots:
@@ -197,9 +197,9 @@ _DECLARED = r"(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(?:robtarget|pose)\s+\w
 def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
     """Read `p[x, y, z, rx, ry, rz]` of Universal Robots, and ABB's [[x, y, z], [q1, q2, q3, q4], ..].
 
-    The one has metres and a rotation vector in radians, the other millimetres and w first; a robtarget has the
-    robot's configuration and external axes behind it, which are no part of the pose.  given: what numbers are
-    Raises ValueInvalid for p[..] with another count of numbers, and for ABB's two lists alone.
+    The first has metres and a rotation vector in radians, the second millimetres and w first; a robtarget also has the
+    robot's configuration and external axes, which are not part of the pose.  given: the notation of the numbers
+    Raises ValueInvalid for p[..] with another number of values, and for ABB's two lists alone.
     """
     bare = re.sub(rf"\A(?:{LABEL})?(?={_UR}\[)|\A{_DECLARED}", "", text.strip().rstrip(";").strip())
     if found := re.fullmatch(rf"{_UR}\[([^\[\]]*)\]", bare):
@@ -214,7 +214,7 @@ def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
         return None
     if not found[3] and ":=" not in text:
         told = "{xyz: [..], wxyz: [..]}, of ABB {xyz_mm: [..], wxyz: [..]}, or give --from xyzw or wxyz"
-        raise ValueInvalid(f"two lists say neither unit nor order; write {told}")
+        raise ValueInvalid(f"two lists state neither unit nor order; write {told}")
     return {"xyz_mm": xyz, "wxyz": turn}
 
 
@@ -222,7 +222,7 @@ _UR = "[pP]"
 
 
 def _algebra(text: str) -> dict[str, Any] | None:
-    """Read `0.7071 + 0.7071k`, `-j`, `0.5i + -0.5j + 0.5*k + 0.5`: each unit and the real part once at most."""
+    """Read `0.7071 + 0.7071k`, `-j`, `0.5i + -0.5j + 0.5*k + 0.5`: each unit and the real part at most once."""
     plain = re.sub(LABEL, "", text, count=1).removeprefix("quaternion") if len(text) < 200 else ""
     tight = re.sub(r"\s+", "", plain)
     if not tight or tight[-1] not in "ijk0123456789." or not any(each in "ijk" for each in tight):
@@ -240,7 +240,7 @@ def _algebra(text: str) -> dict[str, Any] | None:
 
 
 def _scalar_first(text: str) -> dict[str, Any] | None:
-    """Read `w << x, y, z >>`, and the four numbers that say `(x,y,z,w) =`."""
+    """Read `w << x, y, z >>`, and four numbers after `(x,y,z,w) =`."""
     if told := re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text):
         rows = number_rows(text[told.end() :])
         return {"xyzw": rows[0]} if rows and len(rows) == 1 and len(rows[0]) == 4 else None
@@ -302,7 +302,7 @@ def _euler(text: str) -> dict[str, Any] | None:
 
 
 def _one_line(text: str) -> dict[str, Any] | None:
-    """Read `t = 0.5, -1.25, 2; rpy/zyx = 68.8°, -22.9°, 17.2°`; without a unit the angles are radians."""
+    """Read `t = 0.5, -1.25, 2; rpy/zyx = 68.8°, -22.9°, 17.2°`; angles without a unit are in radians."""
     found = re.fullmatch(_ONE_LINE, text.strip())
     if found is None:
         return None
@@ -315,7 +315,7 @@ def _one_line(text: str) -> dict[str, Any] | None:
 
 
 def _parts(text: str) -> dict[str, Any] | None:
-    """Read a rotation matrix and a position under names of their own, one of each."""
+    """Read a rotation matrix and a position with names, one of each."""
     text = re.sub(r"\A\s*RigidTransform\(\n?(.*)\)\s*\Z", r"\1", text, flags=re.DOTALL)
     labels = list(_PART.finditer(text))
     if not labels or text[: labels[0].start()].strip() or len(labels) > 2:
@@ -333,7 +333,7 @@ def _parts(text: str) -> dict[str, Any] | None:
 
 
 def _origins(text: str) -> list[Any] | None:
-    """Read the origins of joints: metres, rpy in radians; the links of one joint are its frames."""
+    """Read the origins of joints: metres, rpy in radians; the links of a single joint are its frames."""
     plain = re.sub(r"(?s)<!--.*?(?:-->|\Z)", "", text)
     found = re.findall(r"<origin\b([^<>]*?)/?>", plain)
     if not found or re.match(r"\s*<(?!origin\b|joint\b)", plain):
@@ -357,10 +357,10 @@ def _origin(attributes: str) -> dict[str, Any]:
 
 
 def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
-    """Return the values that a pasted text stands for, as documents give them; None for no such text.
+    """Return the values of a pasted text, as documents have them; None for any other text.
 
-    given: the notation of numbers that do not say theirs.
-    Raises ValueInvalid for what is known and cannot be taken.
+    given: the notation of numbers that do not state theirs.
+    Raises ValueInvalid for a known print that cannot be read.
     """
     if (found := named_values(text, given)) is not None:
         return found
@@ -369,7 +369,7 @@ def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
 
 
 def _meant(rows: Rows, given: Notation | None) -> list[Any]:
-    """Turn rows into the values they stand for; bare lists where nothing says what they are."""
+    """Convert rows to values; bare lists if nothing states their notation."""
     form = given or notation("matrix")
     if form.representation.whole:
         if (value := matrix_pose(rows, form, told=given is not None)) is not None:
@@ -386,7 +386,7 @@ def _meant(rows: Rows, given: Notation | None) -> list[Any]:
 def matrix_pose(rows: Rows, form: Notation, *, told: bool = False) -> dict[str, Any] | None:
     """Return a 3x3, a 3x4 or a 4x4 matrix, or its numbers row by row, as a mapping; None for another size.
 
-    told: somebody said `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
+    told: the user stated `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
     """
     key = form.spec
     sizes = {len(row) for row in rows}
@@ -409,7 +409,7 @@ def matrix_pose(rows: Rows, form: Notation, *, told: bool = False) -> dict[str, 
 
 
 def is_rotation(rows: Rows) -> bool:
-    """Return True if the texts of 3x3 numbers make a rotation to 1e-3."""
+    """Return True if the texts of 3x3 numbers are a rotation to 1e-3."""
     try:
         m = [[parse_number(cell) for cell in row] for row in rows]
     except ValueInvalid:
@@ -419,7 +419,7 @@ def is_rotation(rows: Rows) -> bool:
 
 
 def _spelled_rows(rows: Rows, form: Notation) -> list[Any] | None:
-    """Return the poses of rows in a notation: one a row, or one column, or a position and a rotation."""
+    """Return the poses of rows in a notation: one per row, or one column, or a position and a rotation."""
     size = len(form.columns)
     lengths = [len(row) for row in rows]
     if len(rows) > 1 and set(lengths) == {1}:
@@ -436,7 +436,7 @@ def _spelled_rows(rows: Rows, form: Notation) -> list[Any] | None:
 
 
 def _entry(cells: Sequence[str], form: Notation) -> dict[str, Any]:
-    """Return the mapping of a rotation, behind x y z if there are so many numbers."""
+    """Return the mapping of a rotation, after x y z if there are enough numbers."""
     row = form.representation
     size = len(row.columns)
     for index, cell in enumerate(cells[-size:]):
@@ -448,10 +448,10 @@ def _entry(cells: Sequence[str], form: Notation) -> dict[str, Any]:
 
 
 def begins_freely(head: str, given: Notation | None, *, moves: bool, alone: bool) -> bool | None:
-    """Return True if a beginning is none of a stream of rows or records that has a result, None if it may be either.
+    """Return True if a text begins with a pasted print, False for a stream of rows or records, None if undecided.
 
-    moves: points are meant
-    alone: three numbers a row would have no result
+    moves: the rows are points
+    alone: three numbers per row would have no result
     """
     lines = [line.strip() for line in head.splitlines() if line.strip()]
     first = lines[0]
@@ -468,18 +468,18 @@ def begins_freely(head: str, given: Notation | None, *, moves: bool, alone: bool
     if (len(cells), len(lines)) == (3, 3) and matrix:
         return given is not None or alone or (None if is_rotation([line.split() for line in lines]) else False)
     if matrix:
-        return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file of one pose
+        return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file with one pose
     return len(cells) == 1 and len(lines) > 1
 
 
 def _is_counted(rows: list[list[str]]) -> bool:
-    """Return True for a heading of pandas, which counts its columns, before a row that begins with its own count."""
+    """Return True for the heading of a pandas print: column numbers, before a row that begins with its own number."""
     counts = [str(at) for at in range(len(rows[0]))]
     return len(rows) > 1 and rows[0] == counts and rows[1][0] == "0" and len(rows[1]) == len(counts) + 1
 
 
 def _is_long(head: str) -> bool:
-    """Return True for a list of 9, 12 or 16 numbers, three rows of four, and rows one below the other."""
+    """Return True for a list of 9, 12 or 16 numbers, three rows of four, and rows on separate lines."""
     found = re.match(r"\s*\[([^\[\]]*)\]", head)
     is_long = found is not None and found[1].count(",") in (8, 11, 15)
     return is_long or re.match(rf"{_LISTED_ROWS}|\s*{ABB}", head) is not None

@@ -1,10 +1,10 @@
-"""Places on the Earth in the grammar of poses: keys that say a position, and what a rotation there is given in.
+"""Positions on the Earth in the grammar of poses: their keys, and the axes of rotations there.
 
     {lat: 48.1, lon: 11.5, alt: 520}                             a point of `ecef`, WGS84; degrees, metres
-    {lat: 48.1, lon: 11.5, axes: enu, rpy_deg: [0, 0, 90]}       a pose in `ecef`, its rotation seen from these axes
-    {at: {lat: 48.1, lon: 11.5}, axes: enu, xyz: [1, 2, 3]}      ecef_from_axes there, then what stands beside it
+    {lat: 48.1, lon: 11.5, axes: enu, rpy_deg: [0, 0, 90]}       a pose in `ecef`, its rotation relative to these axes
+    {at: {lat: 48.1, lon: 11.5}, axes: enu, xyz: [1, 2, 3]}      ecef_from_axes there, then the other keys
 
-Loaded where a mapping has such keys.
+Imported only if a mapping has such keys.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Quaternion
 
 AT = "at"
-# what others call them; those behind the first two count only beside these
+# names of other tools; those after the first two count only together with these
 SAME = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng": "lon", "long": "lon"}
 SAME |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt"}
 SEA_LEVEL = ("msl", "ele", "elevation", "orthometric")
@@ -49,8 +49,8 @@ NOT_READ = {  # key or column -> what to write instead
 BESIDE = frozenset(("convergence_deg", "grid_scale"))
 EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | BESIDE | {ECEF, AT, *HEADINGS} | FLAT_NAMES
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
-LEVEL = 1e-9  # of 1: what is less level points nowhere
-NEAR = 0.01  # metres: how far two positions of one entry may lie apart
+LEVEL = 1e-9  # below this length the horizontal part has no direction
+NEAR = 0.01  # metres: the largest distance between two positions of one entry
 MINUTE, SECOND = "['\u2032\u2019]", "(?:[\"\u2033\u201d]|'')"
 DMS = re.compile(
     r"\s*([-+]?)(\d+(?:\.\d*)?)\s*[°d]\s*"
@@ -60,19 +60,19 @@ COMPASS = re.compile(r"\s*(\d+(?:\.\d*)?)\s*([NSEWnsew])\s*")
 
 
 def not_on_ellipsoid(name: str) -> str:
-    """Say that a height is not above the ellipsoid."""
+    """Return the message that a height is not above the ellipsoid."""
     return f"{shown(name)} is above sea level, alt above the ellipsoid; give undulation (the geoid there) too, or alt"
 
 
 def without_place(mapping: dict[str, Any]) -> dict[str, Any]:
-    """Return what stands beside a place: the pose that begins there."""
+    """Return the other keys of a mapping with a position on the Earth: the pose that begins there."""
     return {key: value for key, value in mapping.items() if key not in EARTH_KEYS and key != AXES_KEY}
 
 
 def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
-    """Return the pose or point in `ecef` of a mapping with a place, and of the pose that stands beside it.
+    """Return the pose or point in `ecef` of a mapping with a position on the Earth and of the pose in its other keys.
 
-    Raises Misfit with the path of what is wrong below this mapping.
+    Raises Misfit with the path of what is wrong in this mapping.
     """
     own = {key: value for key, value in mapping.items() if key in EARTH_KEYS}
     spots = _spots(own, reading)
@@ -91,11 +91,11 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
         _agree(position, _position(other))
     if AT not in own and inner.position is not None:
         _agree(position, inner.position)
-        if not said:  # the same said in ecef: of that the rotation is
+        if not said:  # also stated in ecef: then the rotation is relative to it
             return inner._replace(parent=inner.parent or ECEF)
         inner = inner._replace(position=None)
     rotation = turn or inner.rotation
-    stands = AT in own or reading.framed  # a frame has axes, a position none
+    stands = AT in own or reading.framed  # a frame has axes, a position does not
     needs_axes = stands or rotation is not None or inner.covariance is not None
     if needs_axes and not axes:
         raise Misfit(UNSAID)
@@ -113,7 +113,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
 
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
-    """Read every position that the keys of a mapping say."""
+    """Read all positions in the keys of a mapping."""
     _refuse_not_read(own)
     found = []
     if AT in own:
@@ -142,12 +142,12 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
 
 
 def read_at(value: Any, reading: Reading) -> Spot:
-    """Read the one place of a mapping."""
+    """Read the only position of a mapping."""
     return _placed_at(value, reading)[0]
 
 
 def _placed_at(value: Any, reading: Reading) -> list[Spot]:
-    """Read what `at:` holds: lat lon alt, utm or ecef, and nothing else."""
+    """Read the value of `at:`: lat lon alt, utm or ecef, and nothing else."""
     if type(value) is not dict:
         raise Misfit(f"expected a place like {{lat: 48.1, lon: 11.5, alt: 520}}, found {kind(value)}")
     if unknown := [key for key in value if key not in EARTH_KEYS or key in (AT, *HEADINGS, *LOCAL_KEYS)]:
@@ -188,7 +188,7 @@ def _lla(own: dict[str, Any], reading: Reading) -> Spot:
 
 
 def coordinate(value: Any, field: str) -> float:
-    """Read a number, of latitude and longitude also with marks: 48°08'14.5"N, 48.1N."""
+    """Read a number, for latitude and longitude also with marks: 48°08'14.5"N, 48.1N."""
     if type(value) is not str:
         raise Misfit(f"expected a number, found {kind(value)}")
     if field not in ("lat", "lon"):
@@ -199,7 +199,7 @@ def coordinate(value: Any, field: str) -> float:
         sign, degrees, minutes, seconds, letter = match.groups()
         parts = [float(part or 0.0) for part in (degrees, minutes, seconds)]
         if max(parts[1:]) >= 60.0 or (sign and letter):
-            raise Misfit(f"{shown(value)}: minutes and seconds are below 60, and a sign or a letter says the side")
+            raise Misfit(f"{shown(value)}: minutes and seconds are below 60, and a sign or a letter states the side")
         size = (parts[0] * 3600.0 + parts[1] * 60.0 + parts[2]) / 3600.0
         return _signed(-size if sign == "-" else size, letter, value, field)
     try:
@@ -211,10 +211,10 @@ def coordinate(value: Any, field: str) -> float:
 
 
 def _signed(size: float, letter: str, text: str, field: str) -> float:
-    """Return an angle with the sign that its letter says."""
+    """Return an angle with the sign of its letter."""
     letter = letter.upper()
     if letter and letter not in ("NS" if field == "lat" else "EW"):
-        raise Misfit(f"{shown(text)} is no {field}: {letter} belongs to {'lon' if field == 'lat' else 'lat'}")
+        raise Misfit(f"{shown(text)} is not a {field}: {letter} belongs to {'lon' if field == 'lat' else 'lat'}")
     return -size if letter in ("S", "W") else size
 
 
@@ -254,7 +254,7 @@ def _utm(value: Any, reading: Reading) -> Spot:
 
 
 def band_s(zone: float, northing: float) -> str:
-    """Wonder whether a zone's S is the band that lies north."""
+    """Return a warning that a zone's S may be the latitude band, which is in the north."""
     name = f"zone {ZONES[int(zone)]} with northing {northing:g}"
     return f"{name}: S is south of the equator; the band S lies north, write N"
 
@@ -267,7 +267,7 @@ def _zone(value: Any) -> float:
 
 
 def _member(key: str, read: Callable[..., float], *arguments: Any) -> float:
-    """Read the value of a key; what is wrong with it names the key."""
+    """Read the value of a key; an error names the key."""
     try:
         return read(*arguments)
     except ValueInvalid as error:
@@ -296,14 +296,14 @@ def _position(spot: Spot) -> tuple[float, float, float]:
 
 
 def _agree(first: Any, second: Any) -> None:
-    """Raise Misfit unless two positions are the same."""
+    """Raise Misfit unless two positions are equal."""
     apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
     if not apart <= NEAR:
         raise Misfit(f"two positions in one entry disagree by {apart:.6g} m; keep one")
 
 
 def take_axes(mapping: dict[str, Any], reading: Reading, name: str = "") -> str:
-    """Return what rotations are given in, as a mapping says, else as holds for all."""
+    """Return the axes of rotations, as stated in a mapping, else the default for all."""
     default = reading.earth.axes if reading.earth else ""
     default = name if name in LOCAL else default
     if AXES_KEY not in mapping:
@@ -316,7 +316,7 @@ def take_axes(mapping: dict[str, Any], reading: Reading, name: str = "") -> str:
 
 
 def check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
-    """Refuse a place on the Earth under another frame."""
+    """Refuse a position on the Earth in another frame."""
     for key in ("parent", "frame"):
         value = mapping.get(key)
         if value == UTM:
@@ -327,7 +327,7 @@ def check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
 
 
 def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
-    """Read a heading as the rotation that it is in some axes."""
+    """Read a heading as a rotation in the axes."""
     key = next((key for key in HEADINGS if key in own), "")
     if not key:
         return None
@@ -352,7 +352,7 @@ def _refuse_not_read(own: dict[str, Any]) -> None:
 
 
 def _incomplete(own: dict[str, Any]) -> str:
-    """Say what is missing of a place."""
+    """Return an error that lists what is missing of a position."""
     names = ", ".join(own)
     whole = "lat, lon, alt, or ecef: [x, y, z], or utm: {zone, easting, northing}"
     return f"{names}: half a place on the Earth; write {whole}"
@@ -364,7 +364,7 @@ NOT_IN_ECEF = "--to {} wants poses in ecef: {}"
 
 
 def check_in_ecef(parent: str | None, place: Place) -> None:
-    """Raise ValueInvalid unless a result is in the Earth's frame, or its position could be anywhere."""
+    """Raise ValueInvalid unless a result is in the Earth's frame, or its frame is not known and could be."""
     if parent in EARTH_FRAMES:
         return
     names = ",".join(each.name for each in (place, *place.more))
@@ -376,9 +376,9 @@ def check_in_ecef(parent: str | None, place: Place) -> None:
 def _numbers_of(
     frame: str | None, position: Sequence[float], place: Place, read: Spot | None = None
 ) -> list[float]:
-    """Return the numbers of a position in ecef; raises ValueInvalid of another frame, or one that cannot be written.
+    """Return the numbers of a position in ecef; raises ValueInvalid for another frame, or if it cannot be written.
 
-    read: the place that it was read as, which counts if it still is there
+    read: the position as it was read, which is used if it is unchanged
     """
     check_in_ecef(frame, place)
     x, y, z = position
@@ -389,7 +389,7 @@ def _numbers_of(
 
 
 def _seen_there(pose: Pose, place: Place) -> Pose:
-    """Return a pose of ecef without its position, its rotation in the axes of a place."""
+    """Return a pose of ecef without its position, its rotation in the axes of a position."""
     if pose.rotation is None:
         return pose._replace(position=None)
     x, y, z, w = place.local(*pose.components[:3], pose.rotation)
@@ -397,9 +397,9 @@ def _seen_there(pose: Pose, place: Place) -> Pose:
 
 
 def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
-    """Return the position of a pose in ecef as a mapping has it, with the axes of its rotation; and the pose in these.
+    """Return the position of a pose in ecef as a mapping, with the axes of its rotation; and the pose in these.
 
-    Raises ValueInvalid for a pose in another frame, and for a position that cannot be written so.
+    Raises ValueInvalid for a pose in another frame, and for a position that cannot be written in this notation.
     """
     entry = place.entry(_numbers_of(pose.parent, pose.components[:3], place, pose.read))
     if place.name == ECEF:
@@ -409,7 +409,7 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
 
 def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
-    """Return the position of a pose in ecef as the cells of a table, with the axes of its rotation; and the pose there.
+    """Return the position of a pose in ecef as cells of a table, with the axes of its rotation; and the pose there.
 
     Raises as `placed_entry`.
     """
@@ -423,7 +423,7 @@ def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
 
 def overview(pose: Pose) -> list[tuple[str, str]]:
-    """Say for a person where a pose or point of ecef is: lat lon alt, UTM, and the heading of its x; [] of no place."""
+    """Return lines for people on a pose or point in ecef: lat lon alt, UTM, heading of its x; [] if it has none."""
     x, y, z = pose.position or (0.0, 0.0, 0.0)
     lat, lon, alt = wgs84.lla(x, y, z, floats)
     if not isfinite(alt):
@@ -444,12 +444,12 @@ def overview(pose: Pose) -> list[tuple[str, str]]:
 
 
 def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
-    """Return where a frame of ecef stands as a tree has it, `at` and `axes`, and its pose and covariance in these.
+    """Return a frame of ecef as a tree has it, `at` and `axes`, and its pose and covariance in these axes.
 
-    Raises as `placed_entry` does, and for axes of a zone that is not said.
+    Raises as `placed_entry` does, and for grid axes whose zone is not stated.
     """
     if place.axes == GRID and place.zone is not None and UTM not in (place.name, *(each.name for each in place.more)):
-        raise ValueInvalid(f"--to {place.name} does not say the zone of axes grid; --to utm does")
+        raise ValueInvalid(f"--to {place.name} does not state the zone of axes grid; --to utm does")
     turned = pose.components[3:]
     try:
         at, local = placed_entry(pose._replace(parent=ECEF), place)
@@ -465,9 +465,9 @@ def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
 
 def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
-    """Return where a frame of ecef stands, in one way, and the axes that the pose left is given in.
+    """Return a frame of ecef in one notation, and the axes of the remaining pose.
 
-    Nothing of a frame that is no place, and the pose as it is.
+    A frame that is not on the Earth has none, and its pose is unchanged.
     """
     place = Place(LLA, POSITIONS[LLA].names, ENU) if place is None else place
     try:
@@ -480,9 +480,9 @@ def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
 def point_entry(
     frame: str | None, point: Sequence[float], place: Place, read: Spot | None = None
 ) -> dict[str, Any]:
-    """Return a point of ecef as a mapping has it: at a place, which says what it is given in, or with its frame.
+    """Return a point of ecef as a mapping: as a position on the Earth, or with its frame.
 
-    Raises ValueInvalid for a point of another frame, and for one that cannot be written so.
+    Raises ValueInvalid for a point of another frame, and for one that cannot be written in this notation.
     """
     entry = place.entry(_numbers_of(frame, point, place, read))
     in_metres = entry.pop(ECEF, None)

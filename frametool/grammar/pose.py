@@ -3,8 +3,8 @@
     {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}          metres; fixed axes x, y, z
     {name: camera, parent: base, xyz: [0, 0, 1], quaternion: {x: 0, y: 0, z: 0, w: 1}}
 
-The mapping is the pose of `name` in `parent`: parent_from_name. Reading takes dicts, lists and text as documents
-give them, and checks everything at this door.
+The mapping is the pose of `name` in `parent`: parent_from_name. Values are dicts, lists and text as documents
+have them; everything is checked here.
 """
 
 from __future__ import annotations
@@ -59,22 +59,22 @@ VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angul
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset((*NAME_KEYS, *PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
-MOST_NAMED = 5  # unknown keys in one message, if they fit into
-MOST_CHOICES = 10  # representations that an error names; `help rotations` has all
+MOST_NAMED = 5  # unknown keys in one message, if they fit
+MOST_CHOICES = 10  # representations listed in an error; `help rotations` has all
 MOST_CHARACTERS = 80
 SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
-LEFT_OUT = "covariances left out: {} has none"  # of what a command does
+LEFT_OUT = "covariances left out: {} has none"  # completed with the name of a command
 POSE_KEYS = frozenset(
     (*POSITION_KEYS, *ROTATION_KEYS, *DESCRIPTIVE, *NAMES, *COVARIANCE_KEYS, "inverse", "angles", SCALE, AXES_KEY)
 )
 
 
 class Pose(NamedTuple):
-    """One record: the pose of `name` in `parent`, and its time; what was not given is None.
+    """One record: the pose of `name` in `parent`, and its time; missing parts are None.
 
-    covariance: its 36 entries, None where it is exact; scale: of a similarity p' = scale R p + t
-    read: the place on the Earth that its position was read as
+    covariance: its 36 entries, None if exact; scale: of a similarity p' = scale R p + t
+    read: the position on the Earth as it was read
     """
 
     position: Vector | None = None
@@ -88,14 +88,14 @@ class Pose(NamedTuple):
 
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:
-        """Make a pose of tx, ty, tz, x, y, z, w, and of its covariance or scale as `placed` has them."""
+        """Return a pose of tx, ty, tz, x, y, z, w, and of its covariance or scale as in `placed`."""
         tx, ty, tz, x, y, z, w, *beside = components
         covariance = tuple(beside) if len(beside) > 1 else None
         return cls((tx, ty, tz), (x, y, z, w), name, parent, None, covariance, beside[0] if len(beside) == 1 else 1.0)
 
     @property
     def components(self) -> Rigid:
-        """Return tx, ty, tz, x, y, z, w; what is missing is 0 and the identity."""
+        """Return tx, ty, tz, x, y, z, w; missing parts are 0 and the identity."""
         return (*(self.position or (0.0, 0.0, 0.0)), *(self.rotation or (0.0, 0.0, 0.0, 1.0)))
 
     @property
@@ -105,9 +105,9 @@ class Pose(NamedTuple):
 
     @property
     def placed(self) -> Components:
-        """Return the components, with the covariance or the scale behind them: as `geometry.placed` has them.
+        """Return the components, followed by the covariance or the scale: as in `geometry.placed`.
 
-        Raises ValueInvalid for what has both.
+        Raises ValueInvalid if it has both.
         """
         if self.covariance is not None and self.scale != 1.0:
             from frametool.geometry.placed import NOT_BOTH
@@ -124,9 +124,9 @@ class Pose(NamedTuple):
 
 
 def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] = ()) -> Pose:
-    """Read one pose; `also` names further keys, which the caller deals with.
+    """Read one pose; `also` lists further keys, which the caller reads.
 
-    Raises Misfit with the path of what is wrong below this mapping.
+    Raises Misfit with the path of what is wrong in this mapping.
     """
     if not POSE_KEYS.issuperset(mapping):
         from frametool.grammar.names import may_be_on_earth
@@ -174,7 +174,7 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
 
 
 def inverted(pose: Pose) -> Pose:
-    """Return the inverse numbers under the same names: what `inverse: true` means."""
+    """Return the inverse numbers under the same names: the meaning of `inverse: true`."""
     from frametool.geometry import placed
 
     back = Pose.of(placed.inverse(pose.placed))
@@ -187,7 +187,7 @@ def inverted(pose: Pose) -> Pose:
 
 
 def read_name(mapping: dict[str, Any], key: str) -> str | None:
-    """Read a frame's name, verbatim; None where the key is missing."""
+    """Read a frame's name, verbatim; None if the key is missing."""
     if key not in mapping:
         return None
     value = mapping[key]
@@ -198,11 +198,11 @@ def read_name(mapping: dict[str, Any], key: str) -> str | None:
 
 
 def _agreeing_name(mapping: dict[str, Any], keys: Sequence[str]) -> str | None:
-    """Read a frame's name under any of its keys; raises Misfit where two of them differ."""
+    """Read a frame's name under any of its keys; raises Misfit if two of them differ."""
     found = [(key, name) for key in keys if (name := read_name(mapping, key)) is not None]
     for key, name in found[1:]:
         if name != found[0][1]:
-            raise Misfit(f"{key} says {shown(name)} and {found[0][0]} says {shown(found[0][1])}; keep one", (key,))
+            raise Misfit(f"{key} is {shown(name)} and {found[0][0]} is {shown(found[0][1])}; keep one", (key,))
     return found[0][1] if found else None
 
 
@@ -235,7 +235,7 @@ def read_scale(value: Any) -> float:
 
 
 def refuse_scale(value: Any) -> None:
-    """Stop at the scale of a pose unless it is 1, or three of them: what is scaled is no pose."""
+    """Refuse a scale unless it is 1, or three of them: a scaled transform is not a pose."""
     parts = value if type(value) is list else [*value.values()] if type(value) is dict else [value]
     try:
         is_one = {parse_number(part) for part in parts} == {1.0}
@@ -248,14 +248,14 @@ def refuse_scale(value: Any) -> None:
 
 
 def read_position(value: Any, unit: float) -> Vector:
-    """Read [x, y, z] or {x, y, z}, in metres or in `unit` = 0.001 of them."""
+    """Read [x, y, z] or {x, y, z}, in metres or in the unit, such as 0.001."""
     parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
     x, y, z = read_numbers(value, XYZ, partial=True, each=length_reader(parts))
     return (x, y, z) if parts == 1 else (x / parts, y / parts, z / parts)
 
 
 def length_reader(parts: float) -> Callable[[Any], float]:
-    """Return what reads a number of a position in so many parts of a metre; metres may say another unit, 10cm."""
+    """Return a reader of lengths in a unit (parts per metre); lengths in metres may carry another unit, 10cm."""
 
     def read(text: Any) -> float:
         return parse_length(text) if type(text) is str and parts == 1.0 else read_number(text)
@@ -265,12 +265,12 @@ def length_reader(parts: float) -> Callable[[Any], float]:
 
 def _only_position(given: Vector | None, moved: Vector) -> Vector:
     if given is not None:
-        raise Misfit("a 4x4 matrix is the whole pose; leave xyz out, or write the 3x3 rotation")
+        raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation")
     return moved
 
 
 def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
-    """Accept a second spelling of the position if it says the same."""
+    """Accept a second notation of the position if both agree."""
     if first is None:
         return second
     apart = max(abs(a - b) for a, b in zip(first, second, strict=True))
@@ -280,7 +280,7 @@ def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
 
 
 def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
-    """Name unknown keys, each with its hint, as long as they fit; and count those beyond."""
+    """Return unknown keys, each with its hint, as long as they fit; and the number of the others."""
     named: list[str] = []
     for key, hint in hints:
         text = f"unknown key {shown(key)}{hint.replace('; ', ', ')}"
@@ -293,7 +293,7 @@ def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
 
 
 def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:
-    """Name every unknown key of an entry, each with its nearest known one."""
+    """Report all unknown keys of an entry, each with its nearest known one."""
     known = POSE_KEYS.union(also)
     unknown = [key for key in mapping if key not in known]
     known -= LISTED_WORDS
@@ -312,7 +312,7 @@ _ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 def pose_of_numbers(texts: Sequence[str], given: Notation | None, reading: Reading) -> Pose:
     """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
 
-    Raises NotARotation for what is no rotation, ValueInvalid for what is no such list of numbers.
+    Raises NotARotation for an invalid rotation, ValueInvalid for a list that is not such numbers.
     """
     form = _form_of(texts, given)
     whole, size = form.representation.whole, len(form.representation.columns)
@@ -330,7 +330,7 @@ def pose_of_numbers(texts: Sequence[str], given: Notation | None, reading: Readi
 
 
 def mapping_of_numbers(texts: Sequence[str], given: Notation | None) -> str:
-    """Write bare numbers, read by `pose_of_numbers` before, as the mapping that says the same."""
+    """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
     from frametool.documents.json import dump
     from frametool.documents.source import Verbatim
 
@@ -338,14 +338,14 @@ def mapping_of_numbers(texts: Sequence[str], given: Notation | None) -> str:
     whole = form.representation.whole
     size = len(texts) if whole and len(texts) == len(whole.columns) else len(form.representation.columns)
     unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
-    numbers: Any = list(map(Verbatim, texts))  # the texts stand in the places of numbers, and are read as such
+    numbers: Any = list(map(Verbatim, texts))  # texts in place of numbers, read as such
     mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
     mapping[form.representation.name + unit] = spelled(form, numbers[-size:])
     return dump(mapping)
 
 
 def _form_of(texts: Sequence[str], given: Notation | None) -> Notation:
-    """Settle what bare numbers are; only a matrix is known by their count."""
+    """Return the notation of bare numbers; only a matrix is known by their number."""
     if given is not None:
         return given
     if len(texts) in (9, _ROWS_OF_A_POSE, 16):

@@ -139,7 +139,7 @@ def more_like_it(count: int) -> str:
 
 
 def is_slashed(name: str) -> bool:
-    """Return True if a name begins with the one `/` that tf2 has given up; of `/` and `//a`, which stay, it is a part."""
+    """Return True if a name begins with one `/`, which tf2 removes; in `/` and `//a` it is part of the name."""
     return name[:1] == "/" and name[1:2] not in ("", "/")
 
 

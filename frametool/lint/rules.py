@@ -276,7 +276,7 @@ def _child(child: Child) -> Iterator[Finding]:
     moves = len(child.stamps) > 1
     if child.stands is not None and moves:
         moving = next(each for each in (first, child.newest) if each.stamp_ns is not None)
-        told = f" moves, but stands still in {_at(child.stands)}"
+        told = f" moves, but is static in {_at(child.stands)}"
         yield moving.broken(topology.static_and_moving(first.child, told))
     elif moves:
         yield from _moving(child, frame)

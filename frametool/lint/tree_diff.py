@@ -31,7 +31,7 @@ KINDS = {
     "only-in-a": "a frame that B does not have",
     "only-in-b": "a frame that A does not have",
     "parent": "a frame that hangs under another parent, or under none",
-    "motion": "a frame that stands still in one and moves in the other",
+    "motion": "a frame that is static in one and moves in the other",
     "no-data": "a frame without data at that time",
     "samples": "a frame that moves in both, but otherwise",
     "moved": "a frame that has another pose, in its parent or seen from elsewhere",
@@ -300,7 +300,7 @@ class _Pair:
             found = found._replace(note=f"not connected to {shown(self.start)} in both")
         one, other = self.a.tree.track(frame), self.b.tree.track(frame)
         if one is not None and other is not None and one.is_static != other.is_static:
-            note = "stands still in A, moves in B" if one.is_static else "moves in A, stands still in B"
+            note = "static in A, moves in B" if one.is_static else "moves in A, static in B"
             yield Difference("motion", frame, parent_a, parent_b, note=note)
         if blind:
             yield found._replace(kind="no-data", note=f"no data in {blind} at {format_stamp(self.a.at_ns or 0)}")

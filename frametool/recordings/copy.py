@@ -140,7 +140,7 @@ class RecordedEdges:
         for track in tree.tracks():
             child, parent = (resolve_name(frame, self._topic_of) for frame in (track.child, track.parent))
             if not track.is_static:
-                raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds what stands still")
+                raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds static frames")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
             if known is None:
                 found.added.append(edge)
@@ -164,7 +164,7 @@ class RecordedEdges:
         if others := [parent for parent in known.parents if parent != edge.parent]:
             raise two_parents(edge.child, others[0], edge.parent, (here, bare(tree)))
         if known.moves:
-            both = f"it moves in {shown(edge.parent)} ({here}) and stands still in it ({bare(tree)})"
+            both = f"it moves in {shown(edge.parent)} ({here}) and is static in it ({bare(tree)})"
             raise static_and_moving(edge.child, f": {both}")
 
     def _others(self, edges: list[AddedEdge], tree: str) -> str:

@@ -769,7 +769,7 @@ def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: R
     joined = form.representation.whole
     whole = joined is not None and len(texts) == len(joined.columns)
     if whole and record.shape.unit is not None:
-        raise Misfit("a 4x4 matrix is the whole pose; leave xyz out, or write the 3x3 rotation", below)
+        raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation", below)
     if request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
     values, degrees = read_components(form, texts, places, Reading(reading.source, degrees=reading.degrees))

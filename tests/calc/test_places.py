@@ -38,7 +38,7 @@ def test_with_a_rotation_and_axes_it_is_a_pose() -> None:
     ("expression", "message"),
     [
         (f"(mast<-map) * {ABOVE}", "mast<-map takes points in 'map', found one in 'ecef'"),
-        ("{lat: 48.1, lon: 11.5, alt: 0, rpy: [0, 0, 1]}", "a pose at lat, lon does not say what its rotation is"),
+        ("{lat: 48.1, lon: 11.5, alt: 0, rpy: [0, 0, 1]}", "a pose at lat, lon does not state the axes of its rotation"),
         ("{frame: map, lat: 48.1, lon: 11.5, alt: 0}", "lat places a frame in ecef; frame is 'map'"),
         ("{lat: 95, lon: 11.5, alt: 0}", "lat 95.0 is beyond 90 degrees; are lat and lon swapped?"),
     ],

@@ -249,7 +249,7 @@ BAD: tuple[tuple[str, dict[str, str], int, str], ...] = (
     ("m.yaml", {"m.yaml": MOVES}, 1, "m.yaml:2:38: a frame that moves is not solved for"),
     ("m.yaml --root lida", {"m.yaml": LOOP}, 1, "unknown root 'lida'; did you mean 'lidar'?"),
     ("m.yaml --without m.yaml:99", {"m.yaml": LOOP}, 1, "no measurement stands at 'm.yaml:99'"),
-    ("m.yaml --fix f.yaml", {"m.yaml": LOOP, "f.yaml": MOVES}, 1, "f.yaml: 'lidar' moves; what is fixed stands still"),
+    ("m.yaml --fix f.yaml", {"m.yaml": LOOP, "f.yaml": MOVES}, 1, "f.yaml: 'lidar' moves; fixed frames must be static"),
     ("m.yaml --fix f.yaml", {"m.yaml": LOOP, "f.yaml": "{name: x, parent: base_lnk, xyz: [1, 0, 0]}\n"}, 1,
      "f.yaml: no frame of it is measured: 'base_lnk'; did you mean 'base_link'?"),
     ("missing.yaml", {}, 5, "missing.yaml: no such file or directory"),

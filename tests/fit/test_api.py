@@ -73,7 +73,7 @@ def test_what_is_fixed_keeps_its_entries(tmp_path: Path) -> None:
     assert "lens" not in found.tree.covariances
     moving = "[{name: a, parent: f2, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [1, 0, 0]}]}]"
     path.write_text(moving)
-    with pytest.raises(ValueInvalid, match=r"hand\.yaml moves; what is fixed stands still"):
+    with pytest.raises(ValueInvalid, match=r"hand\.yaml moves; fixed frames must be static"):
         frametool.solve(TUPLES, fix=[path])
 
 

@@ -97,7 +97,7 @@ def test_axes_beside_samples_are_those_of_all_that_say_none(tmp_path: Path) -> N
     assert turn.rotation.as_rpy() == pytest.approx((0.0, 0.0, math.pi / 2), abs=1e-15)
 
 
-UNSAID = "a pose at lat, lon does not say what its rotation is given in; axes: enu, ned, grid or ecef"
+UNSAID = "a pose at lat, lon does not state the axes of its rotation; axes: enu, ned, grid or ecef"
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ def test_two_files_that_disagree_are_both_named(tmp_path: Path) -> None:
     [
         (message(1, EPOCH) + message(2, EPOCH), "frame 'base' has two different poses in 'map': line 2 and line 7"),
         (message(1, EPOCH) + message(1, EPOCH, "odom"), r"two parents: 'map' \(line 2\) and 'odom' \(line 7\)"),
-        (MOVING + "  - {name: base, parent: map, xyz: [9, 0, 0]}\n", "both stands still and moves: line 5 and line 8"),
+        (MOVING + "  - {name: base, parent: map, xyz: [9, 0, 0]}\n", "is both static and moving: line 5 and line 8"),
         ("- {name: b, parent: a, samples: [{xyz: [0, 0, 0]}]}", "missing stamp; a sample is"),
         ("- {name: b, parent: a, samples: [{stamp: x}]}", "'x' is not a time"),
         ("- {name: b, parent: a, samples: [{stamp: 0.1234567891}]}", "finer than a nanosecond"),

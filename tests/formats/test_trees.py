@@ -137,7 +137,7 @@ REFUSED = {
     "{name: b, parent: a, xyz: [10deg, 0, 0]}":
         "0.yaml:1:28: '10deg' is not a length; write metres, or a unit: 2cm, 20mm, 0.02m",
     "{name: b, parent: a, t: 0.5}": "0.yaml:1:25: expected the numbers of a position",
-    "{name: b, child: c, parent: a}": "0.yaml:1:8: name says 'b' and child says 'c'; keep one",
+    "{name: b, child: c, parent: a}": "0.yaml:1:8: name is 'b' and child is 'c'; keep one",
     "{name: b, parent: a, xyz: {x: 1, q: 2}}": "0.yaml:1:34: unknown key 'q'; expected x, y, z",
     "{name: b, parent: a, rpy: [1:30, 0, 0]}": "0.yaml:1:28: '1:30' is not a decimal number; base 60 is not read",
     "{name: b, parent: a, rpy_deg: [pi, 0, 0]}": "0.yaml:1:32: 'pi' is in radians, but rpy_deg says degrees",

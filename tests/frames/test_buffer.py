@@ -174,8 +174,8 @@ def test_the_same_stamp_again_takes_the_last_word_with_a_warning() -> None:
     [
         (("base", "lidar", shifted(11)), "two different poses in 'base'"),
         (("map", "lidar", shifted(10)), "two parents: 'base' and 'map'"),
-        (("base", "lidar", shifted(10), EPOCH), "both stands still and moves"),
-        (("map", "base", shifted(10)), "both stands still and moves"),
+        (("base", "lidar", shifted(10), EPOCH), "is both static and moving"),
+        (("map", "base", shifted(10)), "is both static and moving"),
         (("base", "base", shifted(1)), "its own parent"),
         (("lidar", "map", shifted(1)), "cycle"),
         (("lidar", "map", shifted(1), EPOCH), "cycle"),
@@ -184,7 +184,7 @@ def test_the_same_stamp_again_takes_the_last_word_with_a_warning() -> None:
 def test_what_makes_no_tree_is_refused(edge: tuple[str, str, Transform], reason: str) -> None:
     buffer = TransformBuffer()
     for parent, child in (("map", "base"), ("base", "lidar")):
-        buffer.insert(parent, child, shifted(10), None if "stands" not in reason or child == "lidar" else EPOCH)
+        buffer.insert(parent, child, shifted(10), None if "static" not in reason or child == "lidar" else EPOCH)
     with pytest.raises(BadTopology, match=reason):
         buffer.insert(*edge)
 

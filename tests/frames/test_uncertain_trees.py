@@ -188,7 +188,7 @@ def test_samples_of_two_files_have_to_agree(tmp_path: Path) -> None:
 
 
 BAD = {  # what stands in an entry, what is said of it, and what the place points to
-    "both": (f"{SIGMA}, covariance: {ENTRIES}", "sigma and covariance in one entry; give one", "sigma"),
+    "both": (f"{SIGMA}, covariance: {ENTRIES}", "sigma and covariance in one entry; keep one", "sigma"),
     "count": (
         f"covariance: {[0] * 21}",
         "covariance has 21 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)", "[0, 0, 0,",

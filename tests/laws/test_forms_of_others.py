@@ -135,7 +135,7 @@ def test_a_rotation_at_a_place_says_its_axes_and_no_position_is_0(name: str, com
     words = ["{xyz: [1, 0, 0], rpy: [0, 0, 0]}" if word == "P" else word for word in command.split()]
     done = run(*words, files={"file": EARTH[name]})
     assert (done.status, done.out) == (1, "")
-    assert "a pose at lat, lon does not say what its rotation is given in; axes: enu, ned, grid or ecef" in done.err
+    assert "a pose at lat, lon does not state the axes of its rotation; axes: enu, ned, grid or ecef" in done.err
     told = run(*words, "--local-axes", "enu", files={"file": EARTH[name]})
     assert told.status == 0
     assert told.out

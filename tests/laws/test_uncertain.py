@@ -163,7 +163,7 @@ def test_a_similarity_moves_points_vectors_and_poses(run: Run) -> None:
 
 
 BAD: dict[str, Any] = {
-    "sigma and covariance in one entry; give one": {"sigma": {"xyz": 1}, "covariance": WHOLE},
+    "sigma and covariance in one entry; keep one": {"sigma": {"xyz": 1}, "covariance": WHOLE},
     "covariance has 21 numbers; 36 are needed (6x6, row-major: x y z, turns about X Y Z)": {"covariance": WHOLE[:21]},
     "covariance[0] is -1: 'unknown' in ROS; leave the covariance out": {"covariance": [-1.0, *WHOLE[1:]]},
     "covariance is not symmetric: [0][4] is 1e-5, [4][0] is 2e-5": {

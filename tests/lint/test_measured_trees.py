@@ -98,7 +98,7 @@ def test_frames_that_cannot_be_compared_are_told_once(run: Run) -> None:
     assert found.err.startswith("frametool: warning: frames that the tree does not have, or that move; not compared: robot, tag\n")
     apart = "- {parent: base, child: base_link, xyz: [1, 2, 3]}\n"
     found = checked(run, GOOD + apart, tree=TREE + "  map:\n    base_link: {xyz: [1, 2, 3]}\n")
-    assert "1 of 2 measurements not compared: their frames are not connected by what stands still" in found.err
+    assert "1 of 2 measurements not compared: their frames are not connected by static frames" in found.err
 
 
 def test_what_moves_is_not_compared_and_what_is_wrong_in_the_tree_is_said_too(run: Run) -> None:

@@ -246,8 +246,8 @@ def test_other_stamps_are_told(other: TransformBuffer, note: str) -> None:
 def test_a_frame_that_stands_in_one_and_moves_in_the_other_is_told() -> None:
     standing = tree_of(("odom", "base", turned(0, "z", (2, 0, 0))), ("base", "lidar", turned(90)))
     (only,) = diff(standing, drive(1.0)).differences
-    assert (only.kind, only.frame, only.note) == ("motion", "base", "stands still in A, moves in B")
-    assert diff(drive(1.0), standing).differences[0].note == "moves in A, stands still in B"
+    assert (only.kind, only.frame, only.note) == ("motion", "base", "static in A, moves in B")
+    assert diff(drive(1.0), standing).differences[0].note == "moves in A, static in B"
     assert diff(drive(1.0), standing).notes == ["what moves is compared at its latest (A 2.000000000); --at TIME compares at one time"]
 
 

@@ -149,9 +149,9 @@ REFUSED = {
     NEW_LIDAR: "run: other values than in argument: base_link -> lidar on /tf_static (0.5 m and 0 deg off); --replace puts those of argument in",
     BOTH: "run: other values than in argument: base_link -> lidar on /tf_static (0.5 m and 0 deg off), base_link -> imu on /tf_static (0 m and 2 deg off); --replace puts those of argument in",
     "{name: lidar, parent: odom, xyz: [1, 0, 0]}": "frame 'lidar' has two parents: 'base_link' (run, /tf_static) and 'odom' (argument)",
-    "{name: base_link, parent: odom, xyz: [1, 0, 0]}": "frame 'base_link': it moves in 'odom' (run, /tf) and stands still in it (argument)",
+    "{name: base_link, parent: odom, xyz: [1, 0, 0]}": "frame 'base_link': it moves in 'odom' (run, /tf) and is static in it (argument)",
     "{name: odom, parent: lidar, xyz: [1, 0, 0]}": "frames form a cycle: odom <- base_link <- lidar <- odom",
-    "{frames: [{name: box, parent: map, samples: [{stamp: 1, xyz: [1, 2, 3]}, {stamp: 2, xyz: [1, 2, 4]}]}]}": "frame 'box' moves in argument; --with adds what stands still",
+    "{frames: [{name: box, parent: map, samples: [{stamp: 1, xyz: [1, 2, 3]}, {stamp: 2, xyz: [1, 2, 4]}]}]}": "frame 'box' moves in argument; --with adds static frames",
 }
 
 

@@ -149,7 +149,7 @@ REFUSED = {
     "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {rpy: 0.1}}]": f"m.yaml:1: sigma of one half only, none of xyz: {ONE_HALF}",
     "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: [1, 0, 1], rpy: 1}}]": "m.yaml:1: sigma of y is 0; what is exact goes into --fix",
     "[{parent: b, child: a, xyz: [1, 2, 3], sigma: {xyz: 0, rpy: 0}}]": "m.yaml:1: sigma of x is 0; what is exact goes into --fix",
-    f"[{{parent: b, child: a, {SIGMA}, {COVARIANCE}, xyz: [1, 2, 3]}}]": "m.yaml:1:24: sigma and covariance in one entry; give one",
+    f"[{{parent: b, child: a, {SIGMA}, {COVARIANCE}, xyz: [1, 2, 3]}}]": "m.yaml:1:24: sigma and covariance in one entry; keep one",
     "[{parent: b, child: a, xyz: [1, 2, 3], scale: 2}]": "m.yaml:1:47: scale: a similarity, not a pose; apply --transform, compose and invert take it",
     "[{parent: b, child: a, xyz: [1, 2, 3], sigmas: {xyz: 1}}]": "m.yaml:1:40: unknown key 'sigmas'; did you mean 'sigma'?",
     "[{parent: b, child: a, samples: [{stamp: 1, xyz: [1, 2, 3]}]}]": "m.yaml:1:24: a frame that moves is not solved for; measure what stands still",
@@ -196,7 +196,7 @@ def test_rows_of_tables_are_refused_with_their_line(read: Read, rows: str) -> No
     [
         ("sigma_xyz", "0.1", f"m.csv:2: sigma of one half only, none of rpy: {ONE_HALF}"),
         ("sigma_xyz,sigma_rpy", "-0.1,0.1", "m.csv:2: sigma_xyz: sigma is negative: -0.1"),
-        ("sigma_xyz,sigma_x", "0.1,0.1", "m.csv:1: column 'sigma_x': the sigma of x is said already; keep one"),
+        ("sigma_xyz,sigma_x", "0.1,0.1", "m.csv:1: column 'sigma_x': the sigma of x is there already; keep one"),
         ("name", "d", "m.csv:2: child says 'b' and name says 'd'; keep one"),
         ("inverse", "maybe", "m.csv:2: inverse must be true or false, found 'maybe'"),
     ],

@@ -386,7 +386,7 @@ def test_the_sigmas_of_a_row_need_axes_and_are_turned(run: Callable[..., Any]) -
     rows = table("lat,lon,alt,sigma_x,sigma_y,sigma_z", [(48.1, 11.5, 520, 1, 2, 3)])
     done = run("apply", "site.yaml", "map", stdin=rows, files=files)
     assert (done.status, done.out) == (1, "")
-    wanted = "a row at lat, lon does not say what its covariance is given in; axes: enu, ned, grid or ecef; for rows --local-axes"
+    wanted = "a row at lat, lon does not state the axes of its covariance; axes: enu, ned, grid or ecef; for rows --local-axes"
     assert done.err == f"frametool: stdin:1: {wanted}\n"
     for axes, wanted_ in (("enu", [1, 4, 9]), ("ned", [4, 1, 9])):
         done = run("apply", "site.yaml", "map", "--local-axes", axes, stdin=rows, files=files)
@@ -397,7 +397,7 @@ def test_the_sigmas_of_a_row_need_axes_and_are_turned(run: Callable[..., Any]) -
 # --- refusals ---
 
 SEA = "'msl' is above sea level, alt above the ellipsoid; give undulation (the geoid there) too, or alt"
-UNSAID = "a pose at lat, lon does not say what its rotation is given in; axes: enu, ned, grid or ecef; for rows --local-axes"
+UNSAID = "a pose at lat, lon does not state the axes of its rotation; axes: enu, ned, grid or ecef; for rows --local-axes"
 DATUM = "datum is not read, all is WGS84; leave it out, or convert from another one first (cs2cs, pyproj)"
 EPSG = "codes of EPSG are not read; write utm_zone: 32N or lat, lon; convert from others first (cs2cs, pyproj)"
 MGRS = "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)"

@@ -124,5 +124,5 @@ def _with_loops(
     if lacking:
         warn(f"frames that the tree does not have, or that move; not compared: {listing(lacking)}")
     if apart:
-        warn(f"{apart} of {len(rows)} measurements not compared: their frames are not connected by what stands still")
+        warn(f"{apart} of {len(rows)} measurements not compared: their frames are not connected by static frames")
     return [*findings, *found]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import bare, listing, shown, warn
 from frametool.formats.trees.tree_reader import XYZ, document_edges, read_flat_pose
-from frametool.formats.trees.written_poses import Precision, angles_of, standing_edges, tell_lonely_roots
+from frametool.formats.trees.written_poses import Precision, angles_of, static_edges, warn_lonely_roots
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Misfit, Reading, as_mapping, within
@@ -63,7 +63,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     """Return a map a parent; raises ValueInvalid for frames that move."""
     precision = Precision(NAME, "x y z roll pitch yaw")
     texts: dict[str, list[str]] = {}
-    for parent, child, pose in standing_edges(tree, NAME):
+    for parent, child, pose in static_edges(tree, NAME):
         angles, back = angles_of(pose[3:])
         precision.add(pose, (*pose[:3], *back))
         numbers = zip(KEYS, (*pose[:3], *angles), strict=True)
@@ -71,6 +71,6 @@ def write_tree(tree: Frames, style: Style) -> str:
         texts.setdefault(parent, []).append(f"  {quoted(child)}:\n{lines}")
     if len(texts) > 1:
         warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
-    tell_lonely_roots(tree, NAME)
+    warn_lonely_roots(tree, NAME)
     precision.tell(style)
     return "".join(f"{quoted(parent)}:\n{''.join(children)}" for parent, children in texts.items())

@@ -22,7 +22,7 @@ from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.trees.matrices import TAGS, FrameNames, Matrices, made_ordinary
 from frametool.formats.trees.tree_reader import document_edges
-from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges
+from frametool.formats.trees.written_poses import Precision, rows_of, static_edges
 from frametool.geometry import rigid
 from frametool.grammar.readers import Reading, as_mapping
 
@@ -72,7 +72,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
     cam0, cam1 .., gets T_cn_cnm1.
     """
-    edges = standing_edges(tree, NAME)
+    edges = static_edges(tree, NAME)
     if len(tree.roots) != 1:
         raise ValueInvalid(f"{NAME} holds one tree of cameras; the roots here: {listing(tree.roots)}")
     precision = Precision(NAME, "matrices")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import ValueInvalid, listing, shown, warn
 from frametool.formats.trees.tree_reader import XYZ, document_edges, named, read_flat_pose
-from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
+from frametool.formats.trees.written_poses import static_edges, warn_lonely_roots
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
@@ -89,13 +89,13 @@ def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
 
 def write_tree(tree: Frames, style: Style) -> str:
     """Return the one edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
-    edges = standing_edges(tree, NAME)
+    edges = static_edges(tree, NAME)
     if len(edges) != 1:
         children = listing(child for _, child, _ in edges)
         raise ValueInvalid(f"{NAME} holds one pose, and here are {len(edges)}: {children}")
     ((parent, child, pose),) = edges
     warn(f"{NAME}: {shown(parent)} is written as the hand; beside the base write eye_on_hand: false and {BASE}")
-    tell_lonely_roots(tree, NAME)
+    warn_lonely_roots(tree, NAME)
     return write_mount(parent, child, pose, style, on_hand=True)
 
 

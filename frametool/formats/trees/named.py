@@ -20,7 +20,7 @@ from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import bare
 from frametool.formats.trees.matrices import FRAME_KEYS, Ambiguous, Meaning, directed, meaning_of
 from frametool.formats.trees.tree_reader import document_edges, named
-from frametool.formats.trees.written_poses import standing_edges, tell_lonely_roots
+from frametool.formats.trees.written_poses import static_edges, warn_lonely_roots
 from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
@@ -135,9 +135,9 @@ def _is_remark(key: str, value: Any) -> bool:
 def write_tree(tree: Frames, style: Style) -> str:
     """Return a map of names; raises ValueInvalid for frames that move."""
     texts = []
-    for parent, child, pose in standing_edges(tree, NAME):
+    for parent, child, pose in static_edges(tree, NAME):
         x, y, z, w = quaternion.from_quaternion(*pose[3:], floats)
         entry = {"parent": parent, "xyz": [*pose[:3]], "quaternion": {"x": x, "y": y, "z": z, "w": w}}
         texts.append(f"{quoted(child)}: {flow(entry, style.number)}\n")
-    tell_lonely_roots(tree, NAME)
+    warn_lonely_roots(tree, NAME)
     return "".join(texts)

@@ -22,7 +22,7 @@ from frametool.documents.yaml_writer import flow
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.formats.trees.matrices import HEAD, TAGS, FrameNames, Matrices, Meaning, made_ordinary, meaning_of
 from frametool.formats.trees.tree_reader import document_edges, remember
-from frametool.formats.trees.written_poses import Precision, rows_of, standing_edges, tell_lonely_roots
+from frametool.formats.trees.written_poses import Precision, rows_of, static_edges, warn_lonely_roots
 from frametool.grammar.readers import Misfit, Reading, Unclear, answerable, as_mapping
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     """Return a matrix an edge, called `parent_T_child`; raises ValueInvalid for names that OpenCV does not take."""
     precision = Precision(NAME, "matrices")
     text = f"{HEAD}\n---\n"
-    for parent, child, pose in standing_edges(tree, NAME):
+    for parent, child, pose in static_edges(tree, NAME):
         key = f"{parent}_T_{child}"
         if not re.fullmatch(_KEY, key) or meaning_of(key, _NO_NAMES) != Meaning(parent, child, child):
             raise ValueInvalid(
@@ -132,6 +132,6 @@ def write_tree(tree: Frames, style: Style) -> str:
         precision.add(pose, back)
         lines = ",\n       ".join(flow(row, style.number)[1:-1] for row in rows)
         text += f"{key}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: [ {lines} ]\n"
-    tell_lonely_roots(tree, NAME)
+    warn_lonely_roots(tree, NAME)
     precision.tell(style)
     return text

@@ -54,7 +54,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 MOST_DECIMALS = 17
 
 
-def standing_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
+def static_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
     """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
     tracks = list(tree.tracks())
     if moving := next((track.child for track in tracks if not track.is_static), None):
@@ -64,7 +64,7 @@ def standing_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
     return [(track.parent, track.child, track.components) for track in tracks]
 
 
-def tell_lonely_roots(tree: Frames, form: str) -> None:
+def warn_lonely_roots(tree: Frames, form: str) -> None:
     """Warn of frames that a form cannot name because nothing is connected with them."""
     parents = {track.parent for track in tree.tracks()}
     if lonely := [frame for frame in tree.roots if frame not in parents]:
