@@ -13,6 +13,7 @@ Source: Khronos glTF 2.0, sections 3.6 (buffers), 3.11 (animation), 4.4 (binary)
 from __future__ import annotations
 
 import json
+import math
 import struct
 import sys
 from array import array
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.formats.robots.model import Mimic
+    from frametool.formats.robots.solids import Solid
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
     from frametool.sim.simulate import SimulationStep
@@ -163,8 +165,8 @@ def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence
     return seconds, places, rotations
 
 
-SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands", "main")
-WITH_JOINTS = (*SCRIPTS[:-1], "joints", "main")
+SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands")
+EXTRAS = ("joints", "solids")  # where the page has some
 EACH = 8  # bytes of a number
 BLOCK = 1 << 13  # samples
 PACKED = 48_000  # bytes of numbers, from where on they are compressed
@@ -173,26 +175,28 @@ NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 def write_page(
     scene: FrameScene, *, title: str, file: str = "", eye: tuple[float, float] | None = None,
-    other: FrameScene | None = None, other_title: str = "", sliders: bool = False,
+    other: FrameScene | None = None, other_title: str = "", sliders: bool = False, solids: Sequence[Solid] = (),
 ) -> str:  # fmt: skip
     """Return the page.
 
     title: its heading.  file: the tree's name in the command that the page offers to copy.
     eye: azimuth and elevation of the first view, radians.
     other: another tree seen in the same frame, laid over this one; other_title: what it is called.
-    sliders: whether the joints of robots have one each.
+    sliders: whether the joints of robots have one each.  solids: what is drawn of them; a mesh as a box.
     """
     head = _head(scene) | {"title": title, "file": file or title, "made": f"frametool {__version__}"}
     head["show"] = _shown(scene, eye)
     joints = joint_sliders(scene) if sliders else {}
     if joints.get("joints"):
         head |= joints
+    if solids:
+        head |= _drawn_solids(scene, solids)
     if other is not None:
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
         head["overlay"] = {"title": other_title, "poses": poses}
     blob = b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode()
-    scripts = " ".join(f"{name}.js" for name in (WITH_JOINTS if "joints" in head else SCRIPTS))
+    scripts = " ".join(f"{name}.js" for name in (*SCRIPTS, *(each for each in EXTRAS if each in head), "main"))
     held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(blob)}
     return write_html(title, page_file("page.html"), style="page.css", script=scripts, data=held)
 
@@ -275,6 +279,30 @@ def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
 
 
 SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
+
+
+MESH_PART = 0.35  # of the usual distance between frames is the least edge of a box
+
+
+def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
+    """Return the solids of frames that are there, meshes as boxes around the frames that hang from theirs."""
+    index = {name: number for number, name in enumerate(scene.names)}
+    places: dict[str, list[Sequence[float]]] = {name: [NO_POSE] for name in scene.names}
+    for track in scene.tree.tracks():
+        places[track.parent].append(track.components)
+    lengths = sorted(filter(None, (math.dist(NO_POSE[:3], each[:3]) for held in places.values() for each in held)))
+    least = MESH_PART * (lengths[len(lengths) // 2] if lengths else 1.0)
+    found = []
+    for each in solids:
+        drawn = each
+        if each.kind == "mesh" and each.frame in index:
+            ends = [(min(column), max(column)) for column in zip(*(at[:3] for at in places[each.frame]), strict=True)]
+            x, y, z = ((low + high) / 2.0 for low, high in ends)
+            size = tuple(max(high - low, least) for low, high in ends)
+            drawn = each._replace(kind="box", size=size, pose=(x, y, z, *NO_POSE[3:]))
+        if each.frame in index:
+            found.append(drawn._asdict() | {"frame": index[each.frame]})
+    return {"solids": found, "meshes": sum(each.kind == "mesh" for each in solids)}
 
 
 class RunPage:

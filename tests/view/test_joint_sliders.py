@@ -1,4 +1,4 @@
-"""Joints with a slider on the page: the numbers of the page are those of `lookup --joint`."""
+"""Robots on the page: joints with a slider, whose numbers are those of `lookup --joint`, and solids."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import browsers
@@ -14,7 +15,9 @@ from chromium import NEEDS_CHROMIUM
 from console import ROOT
 
 import frametool
-from frametool.view.exports import SCRIPTS, WITH_JOINTS
+from frametool.documents.source import InputFile
+from frametool.formats.robots.solids import Solid, read_solids
+from frametool.view.exports import EXTRAS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -58,7 +61,7 @@ def test_a_page_without_joints_has_no_script_for_them(tmp_path: Path) -> None:
     (tmp_path / "tree.yaml").write_text("{frames: {map: {a: {xyz: [1, 0, 0]}}}}")
     text = browsers.make_page(tmp_path, "robot.yaml").read_text()
     assert "window.joints" not in text
-    assert set(WITH_JOINTS) - set(SCRIPTS) == {"joints"}
+    assert EXTRAS == ("joints", "solids")
 
 
 @pytest.mark.parametrize("arguments", [("robot.yaml",), ("arm.urdf", "--no-sliders")])
@@ -124,3 +127,69 @@ def test_moving_a_slider_moves_what_follows_and_home_is_where_the_page_began(tab
     tab.click("#home")
     assert tab.evaluate("() => window.joints.values") == [0, 0, 0.5, 0, 0, 0]
     assert "joints=" not in tab.url
+
+
+# --- solids -----------------------------------------------------------------------------------------------------------
+
+SHAPES = """<robot name="bot"><link name="base"><visual><origin xyz="0 0 0.1"/><geometry><box size="0.5 0.35 0.2"/></geometry></visual></link>
+<link name="mast"><visual><geometry><mesh filename="package://bot/mast.stl"/></geometry></visual>
+<collision><origin xyz="0 0 0.2"/><geometry><capsule radius="0.03" length="0.4"/></geometry></collision></link>
+<link name="tool"><visual><geometry><mesh filename="package://bot/tool.stl"/></geometry></visual></link>
+<joint name="lean" type="continuous"><origin xyz="-0.1 0 0.2"/><parent link="base"/><child link="mast"/></joint>
+<joint name="mount" type="fixed"><origin xyz="0 0 0.5"/><parent link="mast"/><child link="tool"/></joint></robot>"""
+MODEL = """<sdf version="1.9"><model name="m"><pose>1 0 0 0 0 0</pose><link name="a"><visual name="v"><pose degrees="true">0 0 1 0 90 0</pose>
+<geometry><cylinder><radius>0.1</radius><length>2</length></cylinder></geometry></visual></link></model></sdf>"""
+GEOMS = """<mujoco><default><geom type="capsule" size="0.02"/></default><worldbody><geom type="plane" size="1 1 1"/><body name="b">
+<geom fromto="0 0 1 0 0 0"/><geom type="box" size="1 2 3" pos="0 0 1"/><geom type="sphere" size="0.5" group="3"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("form", "text", "expected"), [
+    ("urdf", SHAPES, [Solid("base", "box", (0.5, 0.35, 0.2), (0, 0, 0.1, 0, 0, 0, 1)), Solid("mast", "capsule", (0.03, 0.4), (0, 0, 0.2, 0, 0, 0, 1)), Solid("tool", "mesh", ())]),
+    ("sdf", MODEL, [Solid("m::a", "cylinder", (0.1, 2.0), (0, 0, 1, 0, 0.5**0.5, 0, 0.5**0.5))]),
+    ("mjcf", GEOMS, [Solid("b", "capsule", (0.02, 1.0), (0, 0, 0.5, 0, 0, 0, 1)), Solid("b", "box", (2, 4, 6), (0, 0, 1, 0, 0, 0, 1))]),
+])  # fmt: skip
+def test_solids_are_read_with_their_sizes_and_poses(tmp_path: Path, form: str, text: str, expected: list[Solid]) -> None:
+    (tmp_path / "robot").write_text(text)
+    with closing(InputFile(str(tmp_path / "robot"))) as file:
+        found = read_solids(file, form)
+    assert [(each.frame, each.kind) for each in found] == [(each.frame, each.kind) for each in expected]
+    for each, wanted in zip(found, expected, strict=True):
+        assert [*each.size, *each.pose] == pytest.approx([*wanted.size, *wanted.pose])
+
+
+def test_a_mesh_is_a_box_as_far_as_the_frames_on_it_and_that_is_said(run: Callable[..., Any], tmp_path: Path) -> None:
+    done = run("view", "bot.urdf", "-o", "bot.html", files={"bot.urdf": SHAPES.replace("collision>", "other>")})
+    assert "note: meshes are not read, boxes stand for 2 of them" in done.err
+    head = json.loads(re.search('id="head-data">(.*?)</script>', (tmp_path / "bot.html").read_text())[1])  # type: ignore[index]
+    mast = head["solids"][1]
+    assert (mast["kind"], mast["size"][2], mast["pose"][:3]) == ("box", 0.5, [0, 0, 0.25])
+    assert head["meshes"] == 2
+
+
+def test_a_solid_that_cannot_be_read_keeps_no_page_back(run: Callable[..., Any]) -> None:
+    done = run("view", "bot.urdf", "-o", "bot.html", files={"bot.urdf": SHAPES.replace("0.5 0.35 0.2", "0.5 0.35")})
+    assert done.status == 0
+    assert "note: no solids are drawn: bot.urdf:1:89: size: expected 3 numbers, found 2 in '0.5 0.35'" in done.err
+
+
+PAINTED = """() => {
+  window.frameview.draw();
+  const canvas = document.querySelector("#view"), {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return data.filter((value, at) => at % 4 === 0 && value < 245).length / (data.length / 4);
+}"""
+
+
+@pytest.mark.parametrize("count", [8, 12])
+def test_solids_are_drawn_under_the_frames_and_many_faces_only_if_asked_for(run: Callable[..., Any], tmp_path: Path, browser: Any, count: int) -> None:
+    ball = '<visual><geometry><sphere radius="0.3"/></geometry></visual>'
+    assert run("view", "ball.urdf", "-o", "ball.html", files={"ball.urdf": f'<robot name="r"><link name="a">{ball * count}</link></robot>'}).status == 0
+    tab = browser.new_page(color_scheme="light")
+    tab.goto(f"file://{tmp_path / 'ball.html'}")
+    tab.wait_for_selector("html[data-ready]", state="attached")
+    is_little = tab.evaluate("window.solids.FACES.length") <= 2000
+    painted = []
+    for _ in range(2):
+        painted.append(tab.evaluate(PAINTED) > 0.2)
+        tab.click("#tools button:text-is('solids')")
+    assert (is_little, painted) == ((True, [True, False]) if count == 8 else (False, [False, True]))
+    tab.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import closing
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,13 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option,
 from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import FRAME, frame_name, load_tree
-from frametool.errors import listing, shown
+from frametool.cli.trees import FRAME, frame_name, load_tree, opened
+from frametool.errors import FormatError, listing, shown
 from frametool.frames.stamps import format_stamp
 
 if TYPE_CHECKING:
 
+    from frametool.formats.robots.solids import Solid
     from frametool.view.scene import FrameScene
 
     Eye = tuple[float, float]
@@ -133,8 +135,9 @@ def _content(
         from frametool.view.exports import write_page
 
         return write_page(
-            scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, sliders=sliders
-        )
+            scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, sliders=sliders,
+            solids=_solids(tree) if scene.tree.robots and not before else (),
+        )  # fmt: skip
     if form == "glb":
         from frametool.view.exports import write_glb
 
@@ -151,6 +154,24 @@ def _content(
     if still.hidden:
         say(f"note: {still.hidden} names found no place")
     return write_picture(still.picture, f".{form}")
+
+
+def _solids(tree: str) -> list[Solid]:
+    """Return the solids of a robot's file, and say which are not drawn as they are; its frames were read before."""
+    from frametool.formats.robots.solids import read_solids
+
+    if not os.path.isfile(tree):
+        return []
+    (file,) = opened([tree])
+    with closing(file):
+        try:
+            solids = read_solids(file, file.form)
+        except FormatError as error:
+            say(f"note: no solids are drawn: {str(error).partition(chr(10))[0]}")
+            return []
+    if meshes := sum(each.kind == "mesh" for each in solids):
+        say(f"note: meshes are not read, boxes stand for {meshes} of them")
+    return solids
 
 
 def _page_file(tree: str) -> str:

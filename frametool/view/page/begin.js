@@ -8,4 +8,4 @@ async function unpack(text, packed) {
   if (!packed) return bytes.buffer;
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 }
-const extras = {begin: [], shell: [], fragment: []};
+const extras = {begin: [], shell: [], fragment: [], under: [], points: []};

@@ -54,6 +54,7 @@ function fit(most = false) {
     high[k] = Math.max(high[k], value);
   });
   for (const frame of frames) take(origin(frame));
+  for (const points of extras.points) points().forEach(take);
   if (frames.length === all.length) for (const {points} of trails) for (const point of points) if (point) take(point);
   if (low[0] > high[0]) {
     low.fill(-1);

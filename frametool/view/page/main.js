@@ -9,9 +9,10 @@ listen();
 for (const begin of extras.begin) begin();
 
 const roots = ALL.filter((frame) => first_parent(frame) < 0).length;
+const boxes = head.meshes ? ` · meshes drawn as boxes: ${head.meshes}` : "";
 const moving = TRACKS.size ? `, ${TRACKS.size} moving` : "", several = roots > 1 ? `, ${roots} roots` : "";
 $("head").textContent = head.title;
-$("foot").textContent = `${COUNT} frames${moving}${several} · ${head.made}`;
+$("foot").textContent = `${COUNT} frames${moving}${several}${boxes} · ${head.made}`;
 if (COUNT <= 2000) $("names").append(...NAMES.map((value) => make("option", {value})));
 $("bar").hidden = !TRACKS.size;
 $("source").value = NAMES[state.source];

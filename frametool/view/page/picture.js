@@ -27,6 +27,7 @@ function draw() {
   pen.fillStyle = tint.paper;
   pen.fillRect(0, 0, width, height);
   if (state.grid) draw_ground();
+  for (const each of extras.under) each();
   const frames = shown();
   for (const frame of frames) AT.set(project(origin(frame)), 3 * frame);
   const inside = frames.filter((frame) => is_inside(frame, EDGE));

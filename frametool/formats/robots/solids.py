@@ -1,0 +1,134 @@
+"""Solids of robots as their files draw them: boxes, cylinders, spheres and capsules of `visual` and of MJCF's geoms.
+
+    <visual><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.05" length="0.4"/></geometry></visual>
+
+A mesh is known by its name only; where a link has nothing else to show, the simple shapes of its `collision` stand for
+it.  Axes of cylinders and capsules are z, their middle is the origin.
+"""
+
+from __future__ import annotations
+
+from math import dist
+from typing import TYPE_CHECKING, NamedTuple
+
+from frametool.documents.xml import XmlFile, read_nodes
+from frametool.formats.robots import mjcf, sdf
+from frametool.geometry import euler, floats, rigid
+from frametool.geometry.rigid import IDENTITY
+from frametool.grammar.edges import Options, Tally, Topics
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from frametool.documents.source import InputFile
+    from frametool.documents.xml import XmlNode
+    from frametool.formats.robots.mjcf import _Inside
+    from frametool.geometry.types import Rigid
+
+SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}
+SHAPES = (*SIZES, "mesh")
+DRAWN = ("visual", "collision")
+SHOWN_GROUPS = 3  # of MJCF's geoms; its viewer draws those below
+PARTS = {"size": 3, "radius": 1, "length": 1}  # what says how large a shape is, and with how many numbers
+URDF_HELD = {
+    "robot": ("link",), "link": DRAWN, **dict.fromkeys(DRAWN, ("origin", "geometry")), "geometry": SHAPES,
+}  # fmt: skip
+SDF_HELD = sdf.HELD | {
+    "link": sdf.HELD["link"] | {*DRAWN}, **dict.fromkeys(DRAWN, ("pose", "geometry")), "geometry": SHAPES,
+    **dict.fromkeys(SHAPES, tuple(PARTS)),
+}  # fmt: skip
+MJCF_HELD = {tag: (*inner, "geom") if tag in ("default", "worldbody", "body", "frame") else inner
+             for tag, inner in mjcf.HELD.items()}  # fmt: skip
+
+
+class Solid(NamedTuple):
+    """A solid in a frame: a kind of SHAPES, its pose, and its size in metres.
+
+    size: lengths of the edges of a box; radius and length, a capsule's without its caps; radius; of a mesh nothing
+    """
+
+    frame: str
+    kind: str
+    size: tuple[float, ...]
+    pose: Rigid = IDENTITY
+
+
+def read_solids(file: InputFile, form: str) -> list[Solid]:
+    """Return the solids of a file whose frames were read; none of a form without any.  Raises FormatError."""
+    readers: dict[str, Callable[[InputFile], Iterator[Solid]]] = {"urdf": _of_urdf, "sdf": _of_sdf, "mjcf": _of_mjcf}
+    return [*readers[form](file)] if form in readers else []
+
+
+def _seen(
+    name: str, link: XmlNode, pose_of: Callable[[XmlNode], Rigid], numbers_of: Callable[[XmlNode], Iterable[float]]
+) -> list[Solid]:
+    """Return what a link shows; of one that shows meshes alone the simple shapes it collides with, if there are any."""
+    visual, collision = (
+        [Solid(name, shape.tag, tuple(numbers_of(shape)), pose_of(node))
+         for node in link.all(tag) for geometry in node.all("geometry") for shape in geometry.children]
+        for tag in DRAWN
+    )  # fmt: skip
+    simple = [each for each in collision if each.kind != "mesh"]
+    return simple if visual and simple and all(each.kind == "mesh" for each in visual) else visual
+
+
+def _of_urdf(file: InputFile) -> Iterator[Solid]:
+    xml = XmlFile(file)
+
+    def pose(node: XmlNode) -> Rigid:
+        origin = node.first("origin")
+        if origin is None:
+            return IDENTITY
+        x, y, z = xml.numbers(origin.element, "xyz", 3, "0 0 0")
+        roll, pitch, yaw = xml.numbers(origin.element, "rpy", 3, "0 0 0")
+        return x, y, z, *euler.to_quaternion(roll, pitch, yaw, "sxyz", floats)
+
+    def numbers(shape: XmlNode) -> Iterator[float]:
+        for part, count in PARTS.items():
+            if part in shape.element.attributes:
+                yield from xml.numbers(shape.element, part, count)
+
+    for link in read_nodes(xml, URDF_HELD, texts=False).children:
+        yield from _seen(link.attribute("name").lstrip("/"), link, pose, numbers)
+
+
+def _of_sdf(file: InputFile) -> Iterator[Solid]:
+    frames = sdf.SdfFrames(read_nodes(XmlFile(file), SDF_HELD), Options(Tally(), Topics()))
+
+    def numbers(shape: XmlNode) -> Iterator[float]:
+        for part in shape.children:
+            yield from part.numbers(PARTS[part.tag])
+
+    for frame in frames.all.values():
+        if frame.kind == "link":
+            yield from _seen(frame.name, frame.holder, lambda node: sdf.read_pose(node, frames.options)[0], numbers)
+
+
+class _Geoms(mjcf.MjcfModel):
+    """A model of MuJoCo, read for its geoms."""
+
+    def __init__(self, root: XmlNode) -> None:
+        self.solids: list[Solid] = []
+        super().__init__(root, Options(Tally(), Topics()))
+
+    def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
+        if node.tag != "geom":
+            return super()._take(node, inside)
+        attributes = self.classes.attributes(node, inside.around)
+        kind = attributes["type"].text.strip() if "type" in attributes else "mesh" if "mesh" in attributes else "sphere"
+        hidden = "group" in attributes and self.poses.numbers(attributes, "group", 1, ())[0] >= SHOWN_GROUPS
+        if hidden or kind not in SHAPES:
+            return None
+        count = len(attributes["size"].text.split()) if "size" in attributes else 0
+        size = self.poses.numbers(attributes, "size", count, ())
+        if "fromto" in attributes:
+            ends = self.poses.numbers(attributes, "fromto", 6, ())
+            size = (*size[:1], 0.5 * dist(ends[:3], ends[3:]))
+        size = tuple(2.0 * number if kind == "box" or at == 1 else number for at, number in enumerate(size))
+        pose = rigid.compose(*inside.frame, *self.poses.pose_of_site(attributes))
+        self.solids.append(Solid(inside.body, kind, size[: SIZES.get(kind, 0)], pose))
+        return None
+
+
+def _of_mjcf(file: InputFile) -> Iterator[Solid]:
+    yield from _Geoms(read_nodes(XmlFile(file), MJCF_HELD)).solids
