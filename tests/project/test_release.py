@@ -14,6 +14,7 @@ from typing import Any
 from zipfile import ZipFile
 
 import pytest
+from make_calculator import own_files
 
 from frametool import __version__
 
@@ -151,4 +152,5 @@ def test_the_wheel_has_the_package_and_what_shells_and_man_look_for(first: tuple
     pages = {path.name: path.read_bytes() for path in (ROOT / "frametool" / "data" / "share" / "man" / "man1").iterdir()}
     assert {name.rpartition("/")[2]: text for name, text in texts.items() if name.startswith(f"{share}/man/man1/")} == pages
     assert {name.partition("/")[0] for name in texts} == {"frametool", f"frametool-{__version__}.data", f"frametool-{__version__}.dist-info"}
+    assert dict(own_files()) == {name: text for name, text in texts.items() if name.startswith("frametool/")}  # the calculator page has them too
     assert texts["frametool/examples/robot.yaml"] == (ROOT / "examples" / "robot.yaml").read_bytes()
