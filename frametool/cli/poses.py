@@ -333,7 +333,7 @@ def _tell_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | Non
         if each and any(pose.covariance is not None for pose in each.poses)
     ]  # fmt: skip
     if twice := [each for each in dict.fromkeys(uncertain) if uncertain.count(each) > 1]:
-        warn(f"{shown(twice[0])} stands twice: the two count as independent, as all poses do")
+        warn(f"{shown(twice[0])} appears twice: the two count as independent, as all poses do")
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:

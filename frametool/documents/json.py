@@ -41,7 +41,7 @@ _BRACKETS = {"{": MAP, "[": LIST, "]": END, "}": END}
 
 
 class _RepeatedKey(Exception):
-    """Report that a key stands twice in one object, or is empty."""
+    """Report that a key appears twice in one object, or is empty."""
 
 
 class _NoJson(FormatError):

@@ -504,10 +504,10 @@ def repeated_key(source: Source, events: Iterable[Event]) -> FormatError:
         elif key_next and keys is not None:
             if not text or text in keys:
                 places = places_of(source.text, [keys.get(text, 0)])
-                said = "key {!r} stands twice; first at {}:{}".format(text, *places[0]) if text else "an empty key"
+                said = "key {!r} appears twice; first at {}:{}".format(text, *places[0]) if text else "an empty key"
                 return error_at(source, start, said)
             keys[text] = start
         elif kind != LEAF:
             opened.append({} if kind == MAP else None)
         key_next = opened[-1] is not None and not (kind == LEAF and key_next)
-    return error_at(source, 0, "a key stands twice")
+    return error_at(source, 0, "a key appears twice")

@@ -123,7 +123,7 @@ def split_brackets(text: str) -> tuple[str, list[Any]] | None:
 
 
 def _items(run: str, indent: str) -> list[Any] | None:
-    """Read a value in brackets a line as JSON; None where a key stands twice or there are too many."""
+    """Read a value in brackets a line as JSON; None where a key appears twice or there are too many."""
     from json import JSONDecoder
 
     if run.count("{") + run.count("[") > MOST_CONTAINERS:

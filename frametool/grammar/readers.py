@@ -1,4 +1,4 @@
-"""Small readers of a document's values: what every grammar here is made of."""
+"""Small readers for the values of documents, shared by all grammars."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     Quaternion = tuple[float, float, float, float]
 
 
-NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # what a pose is the pose of
-PARENT_NAMES = ("parent", "parent_frame_id", "parent_frame", "frame_id")  # what it is given in
+NAME_KEYS = ("child_frame_id", "child_frame", "child", "name")  # the frame whose pose it is
+PARENT_NAMES = ("parent", "parent_frame_id", "parent_frame", "frame_id")  # the frame that it is expressed in
 INDICES: tuple[Path, ...] = tuple((index,) for index in range(16))
 
 
@@ -28,17 +28,17 @@ class Misfit(ValueInvalid):
     """A value that does not fit, with the keys and indices that lead to it from where reading began."""
 
     def __init__(self, message: str, path: Path = (), *, key: bool = False, rule: str = "") -> None:
-        """Keep the path; `key` says that the last key itself is wrong rather than its value."""
+        """Store the path; `key` marks the last key itself as wrong, not its value."""
         super().__init__(message, rule=rule)
         self.path = path
         self.key = key
 
     def below(self, *outer: str | int) -> Misfit:
-        """Return the same misfit as seen from further up."""
+        """Return the same error with the path as seen from a higher level."""
         return type(self)(str(self), (*outer, *self.path), key=self.key, rule=self.rule)
 
     def placed(self, source: Source, document: int) -> FormatError:
-        """Make the error that names the line and column; the path begins at the top of a document of `source`."""
+        """Return the error with line and column; the path begins at the top of a document of `source`."""
         from frametool.documents.document import format_error
 
         error = format_error(source, (document, *self.path), str(self), key=self.key)
@@ -47,25 +47,25 @@ class Misfit(ValueInvalid):
 
 
 class NotARotation(Misfit):
-    """Numbers that were read well but make no rotation, no covariance, or no pose."""
+    """Numbers that could be read but are not a rotation, a covariance, or a pose."""
 
 
 class Unclear(Misfit):
-    """Report a value whose meaning an option has to tell."""
+    """A value whose meaning has to be set by an option."""
 
     def placed(self, source: Source, document: int) -> FormatError:
-        """Make the error that names the line and column."""
+        """Return the error with line and column."""
         return answerable(super().placed(source, document))
 
 
 def answerable(error: FormatError) -> Unanswered:
-    """Make of an error one that an option answers."""
+    """Convert an error into one that an option can resolve."""
     place = {"source": error.source, "line": error.line, "column": error.column, "snippet": error.snippet}
     return Unanswered(error.message, **place)  # type: ignore[arg-type]
 
 
 class Reading:
-    """What holds while a document is read: the unit of bare angles, the rules, and what is worth telling."""
+    """The settings while a document is read: the unit of bare angles, the rules, and warnings."""
 
     __slots__ = ("bare_numbers", "degrees", "earth", "faults", "framed", "here", "normalize", "notes", "source")
 
@@ -73,11 +73,11 @@ class Reading:
         self, source: Source, *, degrees: bool = False, normalize: bool = False,
         earth: Earth | None = None,
     ) -> None:  # fmt: skip
-        """Begin at the top of a document of `source`; `notes` collects what is odd.
+        """Start at the top of a document of `source`; `notes` collects warnings.
 
-        `bare_numbers` is set for the forms of other tools,
-        which read neither `90deg` nor `pi/2`.  earth: what is said of all places on the Earth.  `framed` is set where
-        poses are those of frames: one at a place on the Earth has axes, even if nothing turns it
+        `bare_numbers` is set for formats of other tools, which have neither `90deg` nor `pi/2`.  earth: options for all
+        positions on the Earth.  `framed` is set if poses are those of frames: a frame on the Earth has axes even
+        without a rotation.
         """
         self.source = source
         self.degrees = degrees
@@ -89,17 +89,17 @@ class Reading:
         self.faults: list[Misfit] | None = None
 
     def refuse(self, misfit: Misfit) -> None:
-        """Raise what is wrong with one entry; or keep it in `faults`, for a reader that goes on with the next."""
+        """Raise an error in one entry; or collect it in `faults`, for a reader that continues with the next entry."""
         if self.faults is None:
             raise misfit
         self.faults.append(misfit)
 
     def note(self, message: str, *path: str | int, rule: str = "odd") -> None:
-        """Keep something worth telling about a place below `here`."""
+        """Record a warning about a place below `here`."""
         self.notes.append(Finding(rule, message, path=(*self.here, *path)))
 
     def bare(self, name: str, *path: str | int) -> str:
-        """Take one leading `/` off a frame's name, as tf2 does, and note it."""
+        """Remove one leading `/` from a frame's name, as tf2 does, and note it."""
         if not is_slashed(name):
             return name
         self.note(slash_note(name), *path, rule="slash")
@@ -107,7 +107,7 @@ class Reading:
 
 
 def tell(source: Source, notes: list[Finding], most: int = 10) -> None:
-    """Warn of what was noted while reading, the same once, with its place; only count what exceeds `most`."""
+    """Emit the recorded warnings with their places, the same ones once; only count those beyond `most`."""
     if not notes:
         return
     from collections import Counter
@@ -129,12 +129,12 @@ def tell(source: Source, notes: list[Finding], most: int = 10) -> None:
 
 
 def alike(note: Finding) -> str:
-    """Return what notes have in common that are told once, whatever the names and numbers in some are."""
+    """Return the common part of warnings that are emitted once, whatever the names and numbers in some are."""
     return str(note.rule if note.rule in ("slash", "identity", "rounded") else note.message)
 
 
 def more_like_it(count: int) -> str:
-    """Say of how many places a note is true, if of more than one."""
+    """Return the number of further places of a warning, if any."""
     return f" ({count - 1} more like it)" if count > 1 else ""
 
 
@@ -144,12 +144,12 @@ def is_slashed(name: str) -> bool:
 
 
 def slash_note(name: str) -> str:
-    """Say that a name lost its leading `/`."""
+    """Return the warning that a name lost its leading `/`."""
     return f"frame {shown(name)}: the leading / is no part of a name and was left out"
 
 
 def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Call a reader for something further down; its misfits then name the whole path."""
+    """Call a reader for a nested value; its errors then have the whole path."""
     try:
         return read(*arguments, **options)
     except Misfit as misfit:
@@ -157,7 +157,7 @@ def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any
 
 
 def kind(value: Any) -> str:
-    """Say in words what a value is."""
+    """Return a description of a value for messages."""
     if value is None:
         return "nothing"
     if isinstance(value, dict):
@@ -166,7 +166,7 @@ def kind(value: Any) -> str:
 
 
 def as_mapping(value: Any, what: str) -> dict[str, Any]:
-    """Take a value for a mapping, or say what stands there instead."""
+    """Return a value that must be a mapping; otherwise raise an error that describes it."""
     if type(value) is not dict:
         from frametool.documents.document import explain_scalar
 
@@ -183,7 +183,7 @@ def read_number(value: Any) -> float:
 
 
 def places_in(value: list[Any]) -> Sequence[tuple[int, ...]]:
-    """Return where the numbers of a list stand, also of one written as a column or a row of a matrix: [[x], ..]."""
+    """Return the paths of the numbers of a list, also if it is written as a column or a row of a matrix: [[x], ..]."""
     if value and all(type(each) is list and len(each) == 1 for each in value):
         return [(at, 0) for at in range(len(value))]
     if len(value) == 1 and type(value[0]) is list:
@@ -192,9 +192,9 @@ def places_in(value: list[Any]) -> Sequence[tuple[int, ...]]:
 
 
 def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> list[Any]:
-    """Return the values of a list of fixed length, or of a mapping by these names, in their order.
+    """Return the values of a list of fixed length, or of a mapping with these names, in their order.
 
-    partial: names missing in a mapping count as 0.
+    partial: missing names in a mapping count as 0.
     """
     if type(value) is list:
         texts: list[Any] = value
@@ -205,7 +205,7 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
         return texts
     if type(value) is not dict:
         raise Misfit(f"expected [{', '.join(names)}], found {kind(value)}")
-    if (*value,) == names:  # most mappings, and in their order
+    if (*value,) == names:  # the common case: all names in their order
         return [*value.values()]
     if unknown := [key for key in value if key not in names]:
         raise Misfit(f"unknown key {shown(unknown[0])}; expected {', '.join(names)}", (unknown[0],), key=True)
@@ -217,9 +217,9 @@ def read_texts(value: Any, names: Sequence[str], *, partial: bool = False) -> li
 def read_numbers(
     value: Any, names: Sequence[str], *, partial: bool = False, each: Callable[[Any], float] = read_number
 ) -> tuple[float, ...]:
-    """Read a list of fixed length, or a mapping by these names, as floats.
+    """Read a list of fixed length, or a mapping with these names, as floats.
 
-    each: reads one that is no plain number
+    each: reads a value that is not a plain number
     """
     texts = read_texts(value, names, partial=partial)
     try:
@@ -233,7 +233,7 @@ def read_numbers(
 
 
 def misfit_among(texts: Sequence[Any], value: Any, names: Sequence[str], read: Callable[[Any], Any]) -> Misfit:
-    """Find which of several values does not fit, and name its place."""
+    """Find out which of several values does not fit, and return the error with its path."""
     for index, text in enumerate(texts):
         place: Path = (names[index],) if type(value) is dict else places_in(value)[index]
         try:

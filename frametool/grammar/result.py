@@ -1,6 +1,6 @@
-"""Poses as the mappings that machine formats write: the grammar of `frametool.grammar.pose`, backwards.
+"""Poses as the mappings that machine formats write: the inverse of the grammar in `frametool.grammar.pose`.
 
-In drawings an edge is a few words: millimetres and hundredths of a degree are enough there.
+Drawings show an edge in short: millimetres and hundredths of a degree.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ ROUNDED_TO_ZERO = 1e-12  # below it, on a screen
 
 
 class Recorded(NamedTuple):
-    """What of results a recording holds.
+    """The part of results that is written to a recording.
 
-    kinds: the messages, by their names in `recordings.made`; () as results are
-    topic: of all of them; "" the usual ones
-    frames: which frame poses are seen from and which is theirs, where they do not say it
-    folder: where there is room for it while it is written
+    kinds: the messages, by their names in `recordings.made`; () for the default of each result
+    topic: of all of them; "" for the usual ones
+    frames: the reference frame and the body frame, for poses that do not name them
+    folder: for temporary files while it is written
     """
 
     kinds: tuple[str, ...] = ()
@@ -44,14 +44,14 @@ class Recorded(NamedTuple):
 class Style:
     """How results are written: format, notations, unit of bare angles, digits, sign of quaternions.
 
-    precision: digits after the point; None for the shortest text that reads back
-    full: that text for people too, who are else shown some decimals of an overview, or 9 digits on a screen
+    precision: decimals; None for the shortest text that reads back
+    full: that text for people too, who otherwise see a rounded overview, or 9 digits on a screen
     screen: whether a terminal shows the text
-    axes: those of the camera that the poses are of, `optical` or `opengl`; "" where that is not known
-    in_camera: whether they are seen from the same camera at another time
-    place: how positions on the Earth are written, None where x, y, z are
-    in_cm: whether positions are xyz_cm, for axes whose users count so
-    recording: what of results goes into a recording
+    axes: of the camera whose poses are written, `optical` or `opengl`; "" if unknown
+    in_camera: whether the reference frame is the same camera at another time
+    place: how positions on the Earth are written, None for x, y, z
+    in_cm: whether positions are xyz_cm, for axes of tools that use centimetres
+    recording: the part of results that is written to a recording
     """
 
     __slots__ = (
@@ -69,7 +69,7 @@ class Style:
         full: bool = False,
         keep_sign: bool = False,
     ) -> None:
-        """Keep what the options of a command say."""
+        """Store the options of a command."""
         self.form = form
         self.axes = ""
         self.in_camera = self.in_cm = self.screen = False
@@ -82,7 +82,7 @@ class Style:
         self.keep_sign = keep_sign
 
     def in_form(self, form: str) -> Style:
-        """Return the same style in another form."""
+        """Return the same style in another format."""
         style = Style(
             form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
             keep_sign=self.keep_sign,
@@ -93,7 +93,7 @@ class Style:
         return style
 
     def put_at(self, place: Place | None) -> None:
-        """Write positions as places on the Earth; in tables convergence and scale of UTM have no column."""
+        """Write positions as positions on the Earth; tables have no columns for convergence and scale of UTM."""
         self.place = place and place.with_grid(gridded=self.form in ("text", "yaml", "json"))
 
     def in_notations(self, notations: tuple[Notation, ...]) -> Style:
@@ -103,14 +103,14 @@ class Style:
         return style
 
     def number(self, value: float) -> str:
-        """Write a finite number: shortest text that reads back to the same bits, or fixed decimals; never -0."""
+        """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
         value = value + 0.0 if self.full or not self.screen or self.form != "text" else _nine_digits(value)
         return repr(value) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
-        """Return True if a notation's angles are written in degrees: its own suffix wins."""
+        """Return True if a notation's angles are written in degrees: its own suffix has priority."""
         return notation.in_degrees(self.degrees)
 
 
@@ -120,17 +120,17 @@ def _nine_digits(value: float) -> float:
 
 
 class Result:
-    """A pose and what else is known about it (distance, angle, ..)."""
+    """A pose and further results (distance, angle, ..)."""
 
     __slots__ = ("extras", "pose")
 
     def __init__(self, pose: Pose, extras: dict[str, Any] | None = None) -> None:
-        """Keep the two together."""
+        """Store both."""
         self.pose = pose
         self.extras = extras or {}
 
     def mapping(self, style: Style) -> dict[str, Any]:
-        """Return the tree entry: name, parent, xyz, one key a representation, then what is only said."""
+        """Return the tree entry: name, parent, xyz, one key per representation, then the extras."""
         pose = self.pose
         entry: dict[str, Any] = {key: name for key, name in (("name", pose.name), ("parent", pose.parent)) if name}
         extras = self.said(style)
@@ -151,13 +151,13 @@ class Result:
         return entry | extras
 
     def said(self, style: Style) -> dict[str, Any]:
-        """Return what is said beside the pose, its scale too unless the one matrix that is written holds it."""
+        """Return the extras of a pose, and its scale unless the only matrix that is written contains it."""
         extras = with_entries(self.extras)
         return extras if self.pose.scale == 1.0 or holds_scale(style.notations) else {SCALE: self.pose.scale} | extras
 
 
 def placed(position: Sequence[float], style: Style) -> dict[str, list[float]]:
-    """Return a position by its key; of centimetres the decimals that read back to the same metres."""
+    """Return a position by its key; in centimetres with the decimals that read back to the same metres."""
     if not style.in_cm:
         return {"xyz": list(position)}
     from decimal import Decimal
@@ -166,12 +166,12 @@ def placed(position: Sequence[float], style: Style) -> dict[str, list[float]]:
 
 
 class NoResult(Result):
-    """What stands for a bad row that is kept: its frames and what else it says, with null in the place of its pose."""
+    """A bad row that is kept: its frames and other keys, with null in place of its pose."""
 
     __slots__ = ()
 
     def mapping(self, style: Style) -> dict[str, Any]:
-        """Return the keys that a result would have."""
+        """Return the keys of a result."""
         if self.pose == Pose():
             return dict(self.extras)
         entry = Result(self.pose).mapping(style)
@@ -179,12 +179,12 @@ class NoResult(Result):
 
 
 def without_frame(entry: dict[str, Any], place: Place) -> dict[str, Any]:
-    """Return a result without the frame it is given in, where that is an origin's: its keys say its axes."""
+    """Return a result without its frame if that is the frame of an origin: the keys state its axes."""
     return entry if place.origin is None else {key: value for key, value in entry.items() if key != "parent"}
 
 
 def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
-    """Return numbers by name with those of a covariance, c11 .. c33 or c66, as the one list that mappings have."""
+    """Return numbers by name with those of a covariance, c11 .. c33 or c66, as a single list for mappings."""
     if not any(name.endswith("c11") for name in extras):
         return extras
     first = next(name for name in extras if name.endswith("c11"))
@@ -199,7 +199,7 @@ def with_entries(extras: dict[str, Any]) -> dict[str, Any]:
 
 
 def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return what is said beside poses or points as a table has it: a covariance as c11 .. c66, or c11 .. c33."""
+    """Return the extras of poses or points as columns: a covariance as c11 .. c66, or c11 .. c33."""
     entries = extras.get("covariance")
     if not (isinstance(entries, list) and len(entries) in (36, 9)):
         return extras
@@ -210,7 +210,7 @@ def in_columns(extras: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _add(entry: dict[str, Any], key: str, value: Any) -> None:
-    """Add a rotation; Euler angles about different axes share their key and make a list."""
+    """Add a rotation; Euler angles about different axes share a key and become a list."""
     if key not in entry:
         entry[key] = value
         return
@@ -220,7 +220,7 @@ def _add(entry: dict[str, Any], key: str, value: Any) -> None:
 
 
 def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
-    """Yield a tree as the entries of its list form: roots, then edges; moving ones with their samples."""
+    """Yield the entries of a tree in list form: roots, then edges; moving ones with their samples."""
     cameras = {name: {"camera": camera.mapping()} for name, camera in tree.cameras.items()}
     yield from ({"name": root, **cameras.get(root, {})} for root in tree.roots)
     for track in tree.tracks():
@@ -243,9 +243,9 @@ def _by_xyz(style: Style) -> Style:
 
 
 def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
-    """Return an edge as a mapping: under the Earth's frame at its place, where positions are written so.
+    """Return an edge as a mapping: in the Earth's frame at its position, if positions are written like that.
 
-    above: the frame that a sample hangs under, where it does not name it
+    above: the parent of a sample that does not name it
     """
     if style.place is None or style.place.name == EARTH_FRAMES[0] or (above or pose.parent) not in EARTH_FRAMES:
         return Result(pose, uncertain(pose.covariance)).mapping(_by_xyz(style))
@@ -257,7 +257,7 @@ def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
 
 
 def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
-    """Return what a result says of its covariance: nothing where it is exact."""
+    """Return the covariance part of a result; empty if it is exact."""
     if entries is None:
         return {}
     from frametool.grammar.covariance import COVARIANCE, Unrounded
@@ -266,14 +266,14 @@ def uncertain(entries: Iterable[float] | None) -> dict[str, Any]:
 
 
 def _samples(track: MovingTrack, style: Style) -> Iterator[dict[str, Any]]:
-    """Yield the samples of a moving frame; one under another parent than the newest names it."""
+    """Yield the samples of a moving frame; a sample under another parent than the newest names it."""
     for stamp_ns, parent, components in track.walk():
         pose = Pose.of(components, None, None if parent == track.parent else parent)
         yield {"stamp_ns": stamp_ns} | _edge(pose, style, parent)
 
 
 def sample_results(tree: Frames) -> Iterator[Result]:
-    """Yield every sample as a result of its own, frame by frame; those that move have their stamp."""
+    """Yield every sample as a separate result, frame by frame; those of moving frames have their stamp."""
     for track in tree.tracks():
         for stamp_ns, parent, components in track.walk():
             extras = {} if stamp_ns is None else {"stamp_ns": stamp_ns}
@@ -281,37 +281,37 @@ def sample_results(tree: Frames) -> Iterator[Result]:
 
 
 def edge_results(tree: Frames) -> Iterator[Result]:
-    """Yield every edge as a result, with the time at which the tree stood so, if it was asked for."""
+    """Yield every edge as a result, with the time of the tree, if one was chosen."""
     extras = {} if tree.at_ns is None else {"stamp_ns": tree.at_ns}
     return (Result(Pose.of(transform.components, child, parent), extras) for parent, child, transform in tree.edges())
 
 
 def carries_position(notation: Notation) -> bool:
-    """Return True if a notation takes the position of a pose into itself."""
+    """Return True if a notation includes the position of a pose."""
     return notation.representation.whole is not None
 
 
 def holds_scale(notations: Sequence[Notation]) -> bool:
-    """Return True if a similarity is written as one matrix, whose 3 x 3 is s R."""
+    """Return True if a similarity is written as a single matrix whose 3 x 3 is s R."""
     return len(notations) == 1 and carries_position(notations[0])
 
 
 def is_locked(pose: Pose, notation: Notation) -> bool:
-    """Return True if the Euler angles asked for are not unique here: the third was set to 0."""
+    """Return True if the requested Euler angles are not unique: the third was set to 0."""
     axes = notation.euler_axes
     return axes is not None and pose.rotation is not None and bool(euler.locked(*pose.rotation, axes))
 
 
 def rotation_numbers(pose: Pose, notation: Notation, style: Style) -> Sequence[float]:
-    """Return a pose's rotation as the numbers of one notation, in column order."""
+    """Return a pose's rotation as the numbers of a notation, in column order."""
     unit = quaternion.unit(*pose.components[3:], floats)
     numbers = notation.from_quaternion(*unit, floats, degrees=style.in_degrees(notation), keep_sign=style.keep_sign)
     scale = pose.scale if holds_scale(style.notations) else 1.0
-    return [number * scale + 0.0 for number in numbers]  # none is -0.0
+    return [number * scale + 0.0 for number in numbers]  # avoids -0.0
 
 
 def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence[str], Sequence[float]]:
-    """Return the columns and the numbers of one notation: of the whole pose where it carries the position."""
+    """Return the columns and the numbers of a notation: of the whole pose if it includes the position."""
     numbers, whole = rotation_numbers(pose, notation, style), notation.representation.whole
     if whole is None or pose.position is None:
         return notation.columns_in(degrees=style.degrees), numbers
@@ -319,7 +319,7 @@ def pose_numbers(pose: Pose, notation: Notation, style: Style) -> tuple[Sequence
 
 
 def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, Any]:
-    """Return the key and the value of one notation, in the shape the grammar reads."""
+    """Return the key and the value of a notation, in the shape that the grammar reads."""
     row = notation.representation
     key = f"{row.name}_deg" if row.angles and style.in_degrees(notation) else row.name
     return key, spelled(notation, pose_numbers(pose, notation, style)[1])
@@ -328,13 +328,13 @@ def rotation_entry(pose: Pose, notation: Notation, style: Style) -> tuple[str, A
 METRES = 3
 DEGREES = 2
 MOST_PLAIN = 1e9
-NOISE = 1e-9  # what rounding leaves of a zero, metres or degrees
+NOISE = 1e-9  # the rounding error of a zero, metres or degrees
 
 
 def edge_label(transform: Transform, style: Style, parent: str) -> tuple[str, str]:
-    """Return two lines: `xyz 0.1 0 1.2` and `rpy_deg 0 15 0`, or the first representation asked for.
+    """Return two lines: `xyz 0.1 0 1.2` and `rpy_deg 0 15 0`, or the first requested representation.
 
-    Under the Earth's frame: `lat 48.1 lon 11.5 alt 520` and `enu rpy_deg 0 15 0`.
+    In the Earth's frame: `lat 48.1 lon 11.5 alt 520` and `enu rpy_deg 0 15 0`.
     """
     pose, at, axes = Pose.of(transform.components, None, parent), "", ""
     digits = {"lat": 9, "lon": 9} if style.precision is None else {}  # 0.1 mm
@@ -356,17 +356,17 @@ def edge_label(transform: Transform, style: Style, parent: str) -> tuple[str, st
 
 
 def graphviz(text: str) -> str:
-    """Write a text as it stands between double quotes; & and a backslash would begin escapes of graphviz."""
+    """Escape a text for double quotes in graphviz, where & and a backslash begin escapes."""
     return text.replace("&", "&amp;").replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
 def _short(values: Iterable[float], decimals: int) -> str:
-    """Round for reading; trailing zeros and minus zero say nothing."""
+    """Round for display, without trailing zeros and minus zero."""
     return " ".join(_rounded(value, decimals) for value in values)
 
 
 def _rounded(value: float, decimals: int) -> str:
-    """Round a number for reading; what would vanish or grow endless gets an exponent."""
+    """Round a number for display; very small and very large numbers get an exponent."""
     if abs(value) < NOISE:
         value = 0.0
     if value and not 0.5 * 10.0**-decimals <= abs(value) < MOST_PLAIN:

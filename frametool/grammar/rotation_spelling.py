@@ -1,4 +1,4 @@
-"""A rotation in YAML and JSON: the shapes that representations name, and the unit of its angles."""
+"""The notation of a rotation in YAML and JSON: the shapes of representations, and the unit of angles."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
     from frametool.grammar.readers import Path, Quaternion, Vector
 
-    Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # what it is, one text a component, and where each stands
+    Spelled = tuple[Notation, Sequence[Any], Sequence[Path]]  # notation, one text per component, the path of each
 
-# what others call a position in metres, and a rotation (OpenCV, COLMAP): ours that it means, "" where the shape of its
-# value says so.  Only a list or mapping under these words is meant; `t` may be a time, and `T` is a 4x4 matrix too
+# names of other tools (OpenCV, COLMAP) for a position in metres and a rotation, and the key of the grammar; "" if the
+# shape of the value decides.  They need a list or mapping: `t` alone may be a time, and `T` is also a 4x4 matrix
 POSITION_WORDS = ("tvec", "trans", "pos", "t", "T")
 ROTATION_WORDS = {
     "rvec": "rotvec_rad", "qvec": "wxyz", "R": "matrix", "T": "matrix", "rotation_matrix": "matrix",
@@ -30,11 +30,11 @@ LISTED_WORDS = frozenset((*POSITION_WORDS, *ROTATION_WORDS)).difference(("rotati
 XYZ = ("x", "y", "z")
 AXES_KEY = "axes"  # a constant rotation by name instead of numbers
 TURN = 2.0 * math.pi
-AGREEMENT = 1e-6  # radians, metres: how far two spellings of one entry may lie apart
+AGREEMENT = 1e-6  # radians, metres: the largest difference between two notations in one entry
 
 
 def _rotation_keys() -> dict[str, Notation]:
-    """List every key that holds a rotation, with and without a unit."""
+    """Return every key for a rotation, with and without a unit."""
     keys = {}
     for name, row in ROTATIONS.items():
         for spelled in (name, f"{name}_deg", f"{name}_rad") if row.angles else (name,):
@@ -46,14 +46,14 @@ ROTATION_KEYS = _rotation_keys()
 
 
 def is_position(key: str, value: Any) -> bool:
-    """Return True if a key of a position says one with this value: of the words of others a list or mapping does."""
+    """Return True if a key with this value is a position: names of other tools need a list or mapping."""
     if key in ("t", "T"):
         return type(value) is list and len(value) in (1, 3) and len(places_in(value)) == len(XYZ)
     return key not in LISTED_WORDS or type(value) in (list, dict)
 
 
 def is_rotation(key: str, value: Any) -> bool:
-    """Return True if a key says a rotation with this value; raises nothing, what is wrong with it reading says."""
+    """Return True if a key with this value is a rotation; never raises: errors are reported when it is read."""
     if key not in LISTED_WORDS:
         return key in ROTATION_KEYS or (key == AXES_KEY and type(value) is str)
     if key not in ROTATION_WORDS or type(value) not in (list, dict):
@@ -68,9 +68,9 @@ def _is_rows(value: list[Any]) -> bool:
 
 
 def own_key(key: str, value: Any) -> str:
-    """Return the key of ours that a key of a rotation means with its value.
+    """Return the key of the grammar for a rotation key and its value.
 
-    Raises Misfit for three or four numbers under a word that does not say what they are.
+    Raises Misfit for three or four numbers under a key that does not state their notation.
     """
     is_short = key == "R" and len(value) in (3, 4) and not _is_rows(value)
     if (meant := ROTATION_WORDS.get(key, key)) and not is_short:
@@ -86,9 +86,9 @@ def own_key(key: str, value: Any) -> str:
 
 
 def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None, Quaternion]:
-    """Read the value of a rotation key as x, y, z, w; a 4x4 matrix also gives a position.
+    """Read the value of a rotation key as x, y, z, w; a 4x4 matrix also has a position.
 
-    Raises Misfit or ValueInvalid: wrong shape, no number, no rotation, or several that do not agree.
+    Raises Misfit or ValueInvalid: wrong shape, not a number, not a rotation, or several that do not agree.
     """
     if key == AXES_KEY:
         return None, _read_axes(value)
@@ -101,7 +101,7 @@ def read_rotation(key: str, value: Any, reading: Reading) -> tuple[Vector | None
 
 
 def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
-    """Accept a second spelling of the rotation if it says the same; return the first."""
+    """Accept a second notation of the rotation if both agree; return the first."""
     apart = quaternion.distance(*first, *second, floats)
     if apart > AGREEMENT:
         raise NotARotation(f"two rotations in one entry disagree by {math.degrees(apart):.6g} degrees; keep one")
@@ -109,15 +109,15 @@ def agreeing_rotation(first: Quaternion, second: Quaternion) -> Quaternion:
 
 
 def _is_several(key: str, value: Any) -> bool:
-    """Tell a list of Euler angles about different axes from what is one rotation."""
+    """Return True for a list of Euler angles about different axes, False for a single rotation."""
     row = ROTATION_KEYS[key].representation
     return row.axes == NAMED_AXES and type(value) is list and bool(value) and all(type(each) is dict for each in value)
 
 
 def shape_of(key: str, value: Any) -> Spelled:
-    """Take the value of a rotation key apart: its notation, one text a component, and where each stands below it.
+    """Split the value of a rotation key: its notation, one text per component, and the path of each below it.
 
-    Of several under one key it takes the first; its numbers then stand nowhere, so that nobody replaces them alone.
+    For several rotations under one key it returns the first; its numbers have no paths, so that they are not replaced.
     """
     if key == AXES_KEY:
         return parse_notation("quaternion"), [repr(part) for part in _read_axes(value)], [(name,) for name in "xyzw"]
@@ -144,7 +144,7 @@ def _read_axes(value: Any) -> Quaternion:
 def read_spelled(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading
 ) -> tuple[Vector | None, Quaternion]:
-    """Read one text a component: a rotation, or as many as a notation has for the whole pose."""
+    """Read one text per component: a rotation, or the numbers of a whole pose."""
     whole = notation.representation.whole
     if whole is None or len(texts) != len(whole.columns):
         return None, rotation_of(notation, texts, places, reading)
@@ -159,7 +159,7 @@ def read_spelled(
 
 
 def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
-    """Turn one text a component into x, y, z, w, in the unit that applies, checked to be a rotation."""
+    """Convert one text per component into x, y, z, w, in the unit that applies, checked to be a rotation."""
     numbers, degrees = read_components(notation, texts, places, reading)
     if not notation.representation.can_fail:
         return notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
@@ -167,7 +167,7 @@ def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path]
 
 
 def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
-    """Return the quaternion of numbers that make a rotation; what is odd about them is noted."""
+    """Return the quaternion of numbers that are a rotation; record warnings."""
     try:
         rotation, odd = overheard(
             notation.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
@@ -185,7 +185,7 @@ def read_components(
     places: Sequence[Path],
     reading: Reading,
 ) -> tuple[list[float], bool]:
-    """Read the components of a rotation; returns them with the unit of the angles among them (True: degrees)."""
+    """Read the components of a rotation; return them with the unit of the angles (True: degrees)."""
     degrees = reading.degrees if notation.degrees is None else notation.degrees
     try:
         numbers = list(map(parse_number, texts))
@@ -198,7 +198,7 @@ def read_components(
 
 
 def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str]) -> list[float]:
-    """Return the rotation nearest to one that is written with few digits, if only these digits are off; else it."""
+    """Return the nearest rotation to numbers written with few digits, if rounding alone makes them invalid."""
     row, rule = notation.representation, notation.representation.batch
     if rule is None or rule.explained is None:
         return numbers
@@ -216,7 +216,7 @@ def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str]) -> 
 def _read_one_by_one(
     notation: Notation, texts: Sequence[Any], places: Sequence[Path], angles: Sequence[int], *, degrees: bool
 ) -> tuple[list[float], bool]:
-    """Read components among which an angle says its own unit, or one is no number: then say where."""
+    """Read components if an angle has its own unit or one is not a number: then the error states where."""
     numbers, units = [], []
     for index, text in enumerate(texts):
         try:
@@ -235,14 +235,14 @@ def _read_one_by_one(
 def _unit_for(unit: str | None, text: str, notation: Notation) -> str | None:
     """Refuse an angle whose own unit contradicts its key's."""
     if unit == "deg" and notation.degrees is False and "pi" not in text:
-        raise ValueInvalid(f"{shown(text)} is in degrees, but {notation.spec} says radians")
+        raise ValueInvalid(f"{shown(text)} is in degrees, but {notation.spec} is in radians")
     if notation.degrees and unit is not None and (unit == "rad" or "pi" in text):
-        raise ValueInvalid(f"{shown(text)} is in radians, but {notation.spec} says degrees")
+        raise ValueInvalid(f"{shown(text)} is in radians, but {notation.spec} is in degrees")
     return unit
 
 
 def _one_unit(numbers: list[float], angles: Sequence[int], units: Sequence[str | None], bare: str) -> bool:
-    """Bring angles of one rotation to one unit, in place: degrees if all that are not 0 have them, else radians."""
+    """Convert the angles of one rotation to one unit, in place: degrees if all non-zero ones have it, else radians."""
     given = [unit or bare for unit in units]
     if all(unit == "deg" or numbers[index] == 0.0 for index, unit in zip(angles, given, strict=True)):
         return True
@@ -253,7 +253,7 @@ def _one_unit(numbers: list[float], angles: Sequence[int], units: Sequence[str |
 
 
 def _note_degrees(notation: Notation, numbers: Sequence[float], places: Sequence[Path], reading: Reading) -> None:
-    """Wonder about bare angles beyond a full turn."""
+    """Warn about bare angles beyond a full turn."""
     index = max(notation.representation.angles, key=lambda index: abs(numbers[index]))
     if abs(numbers[index]) > TURN:
         name = notation.representation.name
@@ -262,7 +262,7 @@ def _note_degrees(notation: Notation, numbers: Sequence[float], places: Sequence
 
 
 def _list_or_map(notation: Notation, value: Any) -> Spelled:
-    """Take a list in column order, or a mapping by column names where every angle counts as 0 if missing."""
+    """Read a list in column order, or a mapping by column names in which missing angles count as 0."""
     row = notation.representation
     is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
     columns = row.whole.columns if row.whole and is_whole else row.columns
@@ -273,12 +273,12 @@ def _list_or_map(notation: Notation, value: Any) -> Spelled:
 
 
 def _take_named(notation: Notation, value: Any) -> Spelled:
-    """Take a mapping by short names."""
+    """Read a mapping by short names."""
     return notation, read_texts(value, notation.names), [(name,) for name in notation.names]
 
 
 def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
-    """Build the error for a list where only names would say the order."""
+    """Return the error for a list whose order only names could state."""
     others = [
         f"{name}: [..]" for name, row in ROTATIONS.items()
         if row.shape == LIST and set(row.columns) == set(notation.representation.columns)
@@ -288,7 +288,7 @@ def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
 
 
 def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelled:
-    """Take a mapping whose keys hold so many numbers each, beside `axes` where Euler axes are named."""
+    """Read a mapping whose keys hold several numbers each, with `axes` if Euler axes are named."""
     named = notation.representation.axes == NAMED_AXES
     if type(value) is not dict:
         keys = ", ".join(f"{key}: [..]" if count > 1 else f"{key}: a" for key, count in parts.items())
@@ -317,7 +317,7 @@ def _take_parts(notation: Notation, value: Any, parts: dict[str, int]) -> Spelle
 
 
 def _with_axes(notation: Notation, value: dict[str, Any]) -> Notation:
-    """Bind the Euler axes that a mapping names: `axes`, or `order` and `frame`; raises KeyError for what is missing."""
+    """Return the notation with the Euler axes of a mapping: `axes`, or `order` and `frame`; KeyError if missing."""
     axes = value["axes"] if "axes" in value else axes_name(value["order"], value["frame"])
     if type(axes) is not str:
         raise Misfit(f"expected axes like rzyx, found {kind(axes)}", ("axes",))
@@ -325,7 +325,7 @@ def _with_axes(notation: Notation, value: dict[str, Any]) -> Notation:
 
 
 def _take_rows(notation: Notation, value: Any) -> Spelled:
-    """Take the rows of a rotation or of a whole pose, or all their numbers in one list."""
+    """Read the rows of a rotation or of a whole pose, or all their numbers in one list."""
     row = notation.representation
     counts = {len(each): math.isqrt(len(each)) for each in (row.columns, *([row.whole.columns] if row.whole else []))}
     expected = " or ".join(f"{size} rows of {size}{' numbers' * (not at)}" for at, size in enumerate(counts.values()))
@@ -345,7 +345,7 @@ SHAPES = {LIST: _list_or_map, MAP: _list_or_map, NAMED: _take_named, ROWS: _take
 
 
 def spelled(notation: Notation, numbers: Sequence[float]) -> Any:
-    """Write the numbers of a rotation, or of a whole pose, in the shape that `shape_of` takes apart."""
+    """Return the numbers of a rotation, or of a whole pose, in the shape that `shape_of` splits."""
     row = notation.representation
     if isinstance(row.shape, dict):
         entry: dict[str, Any] = {"axes": notation.axes} if row.axes == NAMED_AXES else {}

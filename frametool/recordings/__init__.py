@@ -1,1 +1,1 @@
-"""Recordings: ROS 1 bags, ROS 2 bags and MCAP files, read, written and copied, through rosbags and mcap."""
+"""Read, write and copy recordings: ROS 1 bags, ROS 2 bags and MCAP files, through rosbags and mcap."""

@@ -1,7 +1,7 @@
-"""Messages whose numbers lie at the same bytes, as lines of JSON many at once.
+"""Messages of equal layout, converted to lines of JSON many at once.
 
-One message is taken apart as its type says: where each number stands, and what stands between them, names and lengths,
-which others must have to the byte.
+One message is parsed according to its type: where each number is, and which bytes are in between (names and lengths),
+in which other messages must agree exactly.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
 
 CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "uint16": "<u2", "int16": "<i2",
          "uint8": "<u1", "int8": "<i1"}  # fmt: skip
-MOST_NUMBERS = 200  # of a message
+MOST_NUMBERS = 200  # per message
 CDR_LE = b"\0\1"
-HOLE = "\0"  # stands for a number; JSON has it in no text
-POINT_ZERO = 2  # characters that a whole number has too many where it is written as a float
+HOLE = "\0"  # a placeholder for a number; no JSON text contains it
+POINT_ZERO = 2  # the characters `.0` that an integer written as a float has too many
 
 
 class Varies(Exception):
-    """Stop at a part of a message that has no fixed place."""
+    """Raised for a part of a message that has no fixed position."""
 
 
 class MessageLayout(NamedTuple):
-    """Where the numbers of messages stand, what all of them share, and the text around the numbers on their lines."""
+    """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between."""
 
     numbers: np.dtype[Any]
     shared: Sequence[tuple[slice, bytes]]
     texts: Sequence[bytes]
 
     def lines(self, messages: Sequence[bytes]) -> bytes | None:
-        """Return messages of one length as lines; None where they differ in more than finite numbers."""
+        """Return messages of equal length as lines; None if they differ in more than finite numbers."""
         text = b"".join(messages)
         rows = np.frombuffer(text, np.uint8).reshape(len(messages), -1)
         columns = np.frombuffer(text, self.numbers)
@@ -66,7 +66,7 @@ def _repeated(text: bytes, count: int) -> Spans:
 
 
 class _Reader:
-    """Takes one message apart."""
+    """Parses one message."""
 
     def __init__(self, types: MessageTypes, data: bytes) -> None:
         self.fields, self.data = types.store.fielddefs, data
@@ -76,7 +76,7 @@ class _Reader:
         self.shared = [slice(self.begin)]
 
     def _place(self, size: int) -> int:
-        """Go on behind the next part of so many bytes; return where it stands."""
+        """Skip the next part of this many bytes; return its position."""
         place = self.at + (-(self.at - self.begin) % size if self.aligned else 0)
         self.at = place + size
         if self.at > len(self.data):
@@ -84,7 +84,7 @@ class _Reader:
         return place
 
     def line(self, kind: str) -> str:
-        """Return a message of a type, or a part of one, as JSON with a hole for each number."""
+        """Return a message of a type, or a part of one, as JSON with a placeholder for each number."""
         parts = (f"{dumps(name)}: {self._value(*node)}" for name, node in self.fields[kind][1])
         return f"{{{', '.join(parts)}}}"
 
@@ -108,7 +108,7 @@ class _Reader:
 
 
 def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> MessageLayout | None:
-    """Return how messages lie that are like one; None unless it becomes the line that the full reader makes of it."""
+    """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
     reader = _Reader(types, data)
     if reader.aligned and data[:2] != CDR_LE:
         return None

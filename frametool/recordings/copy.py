@@ -1,8 +1,8 @@
-"""A recording copied with something changed: messages are bytes, and all that nobody asked to change stays as it is.
+"""Copy a recording with changes: messages are bytes, and everything else is preserved.
 
-It is read twice: first to see what there is and whether it is whole, then to be written.  No messages are kept.  Edges
-of a tree can be added to its own, and messages of poses and points be moved into another frame, each at its stamp:
-covariances are turned along; the twist of an Odometry is given in its child's frame and stays.
+The recording is read twice: first to analyse and check it, then to write the copy.  No messages are kept in memory.
+Edges of a tree can be added, and messages of poses and points be transformed to another frame, each at its stamp,
+including covariances; the twist of an Odometry is in its child's frame and is unchanged.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ if TYPE_CHECKING:
     from frametool.recordings.messages import RawTransform
     from frametool.recordings.read import Channel, RecordingReader
 
-    Advance = Callable[[int, int], None]  # takes how many messages and bytes were read
-    Change = Callable[[bytes], bytes | None]  # of a message; None leaves it out
+    Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
+    Change = Callable[[bytes], bytes | None]  # of a message; None drops it
 
-SAME = 1e-12  # metres, of positions a metre long, and radians: what composing and writing numbers leaves
+SAME = 1e-12  # metres, for positions of about a metre, and radians: the rounding of composing and writing numbers
 STATIC = "tf_static"
 MOST_NAMED = 8  # edges
 
 
 class RecordedEdge:
-    """What a recording says of one frame: its parents, its topics, its first values, and whether others follow."""
+    """The data of one frame in a recording: its parents, its topics, its first values, and whether others follow."""
 
     __slots__ = ("is_static", "numbers", "parents", "topics", "varies")
 
     def __init__(self, numbers: Rigid) -> None:
-        """Begin with the first message that has it."""
+        """Begin with the first message that contains it."""
         self.numbers = numbers
         self.parents: dict[str, None] = {}
         self.topics: dict[str, None] = {}
@@ -60,7 +60,7 @@ class RecordedEdge:
 
 
 class AddedEdge(NamedTuple):
-    """An edge that stands still: parent_from_child."""
+    """A static edge: parent_from_child."""
 
     parent: str
     child: str
@@ -72,7 +72,7 @@ class AddedEdge(NamedTuple):
 
 
 class EdgePlan(NamedTuple):
-    """The edges of a tree, by what is done with them in a recording that has them with the same values or others."""
+    """The edges of a tree, grouped by whether a recording lacks them or has the same or other values."""
 
     added: list[AddedEdge]
     same: list[AddedEdge]
@@ -83,12 +83,12 @@ class RecordedEdges:
     """The edges of a recording, by their children."""
 
     def __init__(self, name: str) -> None:
-        """Begin without any; `name` is that of the recording in messages."""
+        """Create an empty set; `name` is that of the recording, for messages."""
         self.name = name
         self.known: dict[str, RecordedEdge] = {}
         self.names, self._topics = Names(), Topics()
         self._conflicts: dict[str, str] = {}  # of frames that come from two robots
-        self._topic_of: dict[str, str] = {}  # frame -> the topic by which it came first
+        self._topic_of: dict[str, str] = {}  # frame -> its first topic
 
     def add(self, topic: str, transform: RawTransform) -> None:
         """Add a transform."""
@@ -112,28 +112,28 @@ class RecordedEdges:
 
     @property
     def frames(self) -> dict[str, str]:
-        """Return all frames, each with the topic by which it came first."""
+        """Return all frames, each with its first topic."""
         return self._topic_of
 
     def topic_for(self, edge: AddedEdge, added: Iterable[AddedEdge]) -> str:
-        """Return the topic that an edge is added on: `tf_static` beside what the frames came by that it hangs from."""
+        """Return the topic for an added edge: `tf_static` in the namespace of the frames above it."""
         parents = {each.child: each.parent for each in added}
         line = [*to_root(edge.parent, parents.get), edge.child]
         topic = next((self._topic_of[frame] for frame in line if frame in self._topic_of), "/tf")
         return f"{topic.rpartition('/')[0]}/{STATIC}"
 
     def apart(self, added: Sequence[AddedEdge]) -> list[str]:
-        """Return the roots of edges that are added and hang together with nothing that is here."""
+        """Return the roots of added edges that are not connected to the recording."""
         parents, known = {each.child: each.parent for each in added}, self._topic_of.keys()
         root_of = {edge: to_root(edge.parent, parents.get)[-1] for edge in added}
         held = {root for edge, root in root_of.items() if not known.isdisjoint((edge.parent, edge.child))}
         return sorted({*root_of.values()} - held) if known else []
 
     def plan(self, tree: Frames, *, replace: bool) -> EdgePlan:
-        """Sort the edges of a tree: missing here, there with the same values, or there with others.
+        """Group the edges of a tree: missing in the recording, present with the same values, or with others.
 
-        replace: the last may be there
-        Raises BadTopology for a frame that moves here or there, has another parent or would hang below itself, and for
+        replace: accept other values
+        Raises BadTopology for a frame that moves here or there, has another parent or would be below itself, and for
         other values without `replace`.
         """
         found = EdgePlan([], [], [])
@@ -153,11 +153,11 @@ class RecordedEdges:
         parents = {child: [*edge.parents][-1] for child, edge in self.known.items()}
         parents |= {edge.child: edge.parent for edge in found.added}
         for edge in found.added:
-            to_root(edge.child, parents.get)  # raises where one hangs a frame below itself
+            to_root(edge.child, parents.get)  # raises for a frame below itself
         return found
 
     def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
-        """Raise BadTopology for a frame with another parent, one that moves, and one that comes from two robots."""
+        """Raise BadTopology for a frame with another parent, a moving one, and one that comes from two robots."""
         here = f"{self.name}, {first_of([*known.topics], MOST_NAMED)}"
         if edge.child in self._conflicts:
             raise BadTopology(self._conflicts[edge.child], source=self.name, rule="two-topics")
@@ -168,7 +168,7 @@ class RecordedEdges:
             raise static_and_moving(edge.child, f": {both}")
 
     def _others(self, edges: list[AddedEdge], tree: str) -> str:
-        """Return which edges have other values, and how far off they are."""
+        """Return which edges have other values, and the differences."""
         told = []
         for edge in edges:
             known = self.known[edge.child]
@@ -176,11 +176,11 @@ class RecordedEdges:
             off = f"{metres:.3g} m and {radians * floats.RADIAN:.3g} deg off"
             told.append(f"{edge} on {first_of([*known.topics], MOST_NAMED)} ({off})")
         what = first_of(told, MOST_NAMED)
-        return f"{self.name}: other values than in {bare(tree)}: {what}; --replace puts those of {bare(tree)} in"
+        return f"{self.name}: other values than in {bare(tree)}: {what}; --replace uses those of {bare(tree)}"
 
 
 def is_same(a: Rigid, b: Rigid) -> bool:
-    """Return True if two transforms are one, whatever the sign of their quaternions; zeros are no rotation."""
+    """Return True if two transforms are equal, whatever the sign of their quaternions; a zero quaternion never is."""
     if not (any(a[3:]) and any(b[3:])):
         return a == b
     metres, radians = rigid.distance(*_unit(*a), *_unit(*b), xp=floats)
@@ -192,7 +192,7 @@ def _unit(tx: float, ty: float, tz: float, x: float, y: float, z: float, w: floa
 
 
 def replaced(message: Any, edges: dict[str, AddedEdge], bare_name: Callable[[str], str]) -> bool:
-    """Put other numbers into some edges of a message of transforms; return True if it has any of them."""
+    """Replace the numbers of some edges in a message of transforms; return True if it has any of them."""
     found = [(each, edges.get(bare_name(each.child_frame_id))) for each in message.transforms]
     for each, edge in found:
         if edge is not None:
@@ -202,7 +202,7 @@ def replaced(message: Any, edges: dict[str, AddedEdge], bare_name: Callable[[str
 
 
 def put(part: Any, numbers: Sequence[float]) -> None:
-    """Put numbers into x, y, z and w of a part of a message."""
+    """Write numbers to x, y, z and w of a part of a message."""
     for name, number in zip("xyzw", numbers, strict=False):
         setattr(part, name, number)
 
@@ -215,37 +215,37 @@ MOVED_TYPES = frozenset((
 
 
 class MessageHeader(NamedTuple):
-    """What a header says: in which frame and when."""
+    """The frame and the stamp of a header."""
 
     frame: str
     stamp_ns: int
 
     @classmethod
     def of(cls, header: Any) -> MessageHeader:
-        """Read a header; raises ValueInvalid for a stamp that is none."""
+        """Read a header; raises ValueInvalid for an invalid stamp."""
         if problem := stamp_problem(header.stamp.sec, header.stamp.nanosec, STAMPS[0]):
             raise problem
         return cls(header.frame_id, header.stamp.sec * BILLION + header.stamp.nanosec)
 
 
 class MessageMover:
-    """What moves messages into one frame, by transforms that may move themselves."""
+    """Transforms messages to one frame, by static or moving transforms."""
 
     def __init__(self, frames: Frames, into: str, types: MessageTypes, *, normalize: bool = False) -> None:
-        """Take the transforms; raises UnknownFrame for a frame that they do not know.
+        """Store the transforms; raises UnknownFrame for a frame that they do not have.
 
-        normalize: take any non-zero quaternion
+        normalize: accept any non-zero quaternion
         """
         frames.require(into)
         self.frames, self.into, self.types, self.normalize = frames, frames.resolve_name(into), types, normalize
-        self.tally = Tally()  # of names with a leading slash, and rough quaternions
-        self.header: MessageHeader | None = None  # of the message that was moved last, as far as it was read
+        self.tally = Tally()  # names with a leading slash, and quaternions that are not unit
+        self.header: MessageHeader | None = None  # of the last message, as far as it was read
         self._last: tuple[MessageHeader, Rigid] | None = None
 
     def moved(self, channel: Channel, data: bytes) -> bytes:
-        """Return a message of one of MOVED_TYPES in the frame; the same object where it is in it already.
+        """Return a message of one of MOVED_TYPES in the frame; the same object if it is in this frame already.
 
-        Raises ValueInvalid for what cannot be read or is no pose, LookupFailed where no transform leads to the frame.
+        Raises ValueInvalid if it cannot be read or is not a pose, LookupFailed if no transform leads to the frame.
         """
         self.header = None
         message = self.types.read(channel, data)
@@ -266,7 +266,7 @@ class MessageMover:
         return self.tally.names.bare(header.frame) if header.frame else ""
 
     def _pose_of(self, header: MessageHeader) -> Rigid | None:
-        """Return the pose that moves what is given as a header says; None for what is in the frame already."""
+        """Return the pose that transforms from the frame of a header; None for the target frame itself."""
         name = self._name(header)
         if name == self.into:
             return None
@@ -277,7 +277,7 @@ class MessageMover:
         return self._last[1]
 
     def _move(self, part: Any, mover: Rigid) -> None:
-        """Move a point, or a pose and its covariance."""
+        """Transform a point, or a pose and its covariance."""
         if hasattr(part, "point"):
             numbers = part.point.x, part.point.y, part.point.z
             if not abs(sum(numbers)) < uncertainty.INFINITE:
@@ -306,17 +306,17 @@ STEP = 1 << 10  # messages between two reports
 
 
 class RecordCopy:
-    """What is in a recording, and how its copy differs.
+    """The contents of a recording, and the changes of its copy.
 
-    window: the first and the last log time that is copied, but all of what is static
-    change: makes the new messages of a channel
+    window: the first and the last log time that is copied; static data are always copied
+    change: returns the new messages of a channel
     counts: of messages by channel; span: the first and the last log time
     inside, outside: how many are copied in the window and outside of it; first_ns: the first log time that is copied
     undefined: types that the recording does not define, and whether ROS 2 Humble does
     """
 
     def __init__(self, reader: RecordingReader, window: tuple[int, int] | None = None) -> None:
-        """Begin before it is read."""
+        """Store what to copy; nothing is read yet."""
         self.reader, self.window = reader, window
         self.change: dict[Channel, Change] = {}
         self.counts: Counter[Channel] = Counter()
@@ -326,7 +326,7 @@ class RecordCopy:
         self.undefined: dict[str, bool] = {}
 
     def look(self, advance: Advance, see: Callable[[Channel, bytes], None]) -> None:
-        """Read it all, and let every message be seen; raises FormatError for a recording that is not whole."""
+        """Read everything and pass every message to `see`; raises FormatError if the recording is not complete."""
         for message in self._messages(advance):
             channel, log_ns, data, *_ = message
             self.counts[channel] += 1
@@ -358,9 +358,9 @@ class RecordCopy:
     def pieces(
         self, form: str, folder: str, added: Mapping[str, Sequence[AddedEdge]], stamp_ns: int, advance: Advance
     ) -> Iterator[bytes]:
-        """Yield the bytes of the copy in a form, with edges of some topics first; stamp_ns: of these.
+        """Yield the bytes of the copy in a format, starting with edges on some topics; stamp_ns: of these.
 
-        folder: where there is room for it while it is written
+        folder: for temporary files while it is written
         """
         files = self.reader.files
         for each in self.reader.all:
@@ -386,7 +386,7 @@ class RecordCopy:
             yield from file.pieces(said or self.reader.metadata, itself=said is not None)
 
     def _others(self, file: RecordingFile) -> dict[str, Any] | None:
-        """Copy attachments and metadata of MCAP; return what rosbag2 says of it there, or None."""
+        """Copy attachments and metadata of MCAP; return the metadata of rosbag2 in them, or None."""
         said = None
         for source in self.reader.files:
             for other in source.others() if hasattr(source, "others") else ():
@@ -397,7 +397,7 @@ class RecordCopy:
         return said
 
     def _define(self, channel: Channel) -> None:
-        """Define a type that the recording does not define as ROS 2 Humble does, if it does."""
+        """Define a type that the recording does not define as ROS 2 Humble does, if possible."""
         store = typestore(ros1=False)
         is_known = channel.type in store.types
         self.undefined[channel.type] = is_known
@@ -405,9 +405,9 @@ class RecordCopy:
         channel.schema = channel.type, "ros2msg" if is_known else "", text.encode()
 
     def _latched(self, topic: str) -> Channel:
-        """Return a channel of transforms for good: that of the recording, or a new one.
+        """Return a channel of static transforms: that of the recording, or a new one.
 
-        In a ROS 1 bag it is always new, for whoever plays it keeps the last message of each.
+        In a ROS 1 bag it is always new, because players keep only the last message of each.
         """
         ros1 = self.reader.is_ros1
         same = [each for each in self.reader.channels if (each.topic, each.type) == (topic, TF_STATIC.type)]

@@ -1,7 +1,7 @@
-"""Messages that are made: transforms, poses, points and fixes, as rosbags serialises them.
+"""New messages: transforms, poses, points and fixes, serialised by rosbags.
 
-A message is serialised by the library once for the frames it names; stamps and numbers are then put in their places,
-for one and for a million alike.  Messages that are read are objects of rosbags too, of the types that the recording
+The library serialises a message once for each set of frames; stamps and numbers are then written into its bytes,
+for one message or a million.  Messages that are read are objects of rosbags too, of the types that the recording
 defines.
 """
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 
 BAG1 = "bag1"
-SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; those of ROS 2 are int32
+SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; int32 in ROS 2
 SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
 
 
 class Kind(NamedTuple):
-    """What one kind of message is: the usual topic, its type, how many numbers each of its stamps has.
+    """One kind of message: its usual topic, its type, and the count of numbers per stamp.
 
-    stays: it is latched, so that who comes late gets it too
+    stays: it is latched, so that late subscribers get it too
     """
 
     topic: str
@@ -68,14 +68,14 @@ def check_stamps(stamps_ns: Ints, form: str) -> None:
     bad = stamps_ns[(seconds < first) | (seconds > last)]
     if len(bad):
         stamp = format_stamp(int(bad[0]))
-        raise ValueInvalid(f"stamp {stamp} has no place in {form}, whose seconds are {first} .. {last}")
+        raise ValueInvalid(f"stamp {stamp} does not fit in {form}, whose seconds are {first} .. {last}")
 
 
 class MessageTemplate:
-    """The bytes of a message about one frame, and where its stamp and numbers stand in them."""
+    """The bytes of a message about one frame, and the positions of its stamp and numbers."""
 
     def __init__(self, kind: Kind, form: str, parent: str, child: str = "") -> None:
-        """Serialise one with numbers that nothing else in it is; raises ValueInvalid for names that are no text."""
+        """Serialise a message with unique numbers to find their positions; ValueInvalid for names that are not text."""
         numbers = [_PROBE * (at + 1) for at in range(kind.numbers)]
         self.bytes = serialised(kind, form, [(parent, child)], [_PROBE_NS], [numbers])
         self.stamp_at = self.bytes.index(struct.pack("<II", *divmod(_PROBE_NS, BILLION)))
@@ -85,7 +85,7 @@ class MessageTemplate:
         """Return a message for each of stamps (n,) and numbers (n, k)."""
         count, size = len(stamps_ns), len(self.bytes)
         rows = np.tile(np.frombuffer(self.bytes, np.uint8), (count, 1))
-        times = np.column_stack(np.divmod(stamps_ns, BILLION)).astype("<u4")  # seconds before 1970 wrap, as int32 does
+        times = np.column_stack(np.divmod(stamps_ns, BILLION)).astype("<u4")  # seconds before 1970 wrap, like int32
         for at, part in ((self.stamp_at, times), (self.numbers_at, np.ascontiguousarray(numbers, "<f8"))):
             own = part.view(np.uint8)
             rows[:, at : at + own.shape[1]] = own
@@ -103,7 +103,7 @@ def serialised(
 ) -> bytes:  # fmt: skip
     """Return one message; frames: (parent, child) of each of its transforms or poses.
 
-    Raises ValueInvalid for names that are no text.
+    Raises ValueInvalid for names that are not text.
     """
     store = typestore(ros1=form == BAG1)
     stamps = [divmod(stamp, BILLION) for stamp in stamps_ns]
@@ -112,7 +112,7 @@ def serialised(
     try:
         return bytes((store.serialize_ros1 if form == BAG1 else store.serialize_cdr)(message, kind.type))
     except UnicodeEncodeError as error:
-        raise ValueInvalid(f"{shown(error.object)} is no name that can be written") from None
+        raise ValueInvalid(f"{shown(error.object)} is not a name that can be written") from None
 
 
 def _message(
@@ -148,7 +148,7 @@ def _message(
     if kind == KINDS["point"]:
         return make(header(0), part("Point", *numbers[0]))
     fixed_by_gps = types["sensor_msgs/msg/NavSatStatus"](0, 1)
-    return make(header(0), fixed_by_gps, *numbers[0], np.zeros(9), 0)  # covariance not known
+    return make(header(0), fixed_by_gps, *numbers[0], np.zeros(9), 0)  # unknown covariance
 
 
 BETWEEN_IDL = "=" * 80 + "\nIDL: "  # before the name of each file
@@ -156,10 +156,10 @@ TIMES = {"builtin_interfaces/msg/Time": "uint32", "builtin_interfaces/msg/Durati
 
 
 class MessageTypes:
-    """The types of some channels: those the recording defines, or the usual ones where it defines none."""
+    """The types of some channels: those defined in the recording, or the usual ones if it defines none."""
 
     def __init__(self, channels: Sequence[Channel], *, ros1: bool) -> None:
-        """Begin without any: one that cannot be read is in the way of its own messages only."""
+        """Create an empty set; a type that cannot be read affects only its own messages."""
         from rosbags.interfaces import Nodetype
         from rosbags.typesys import Stores, get_typestore
 
@@ -170,20 +170,20 @@ class MessageTypes:
             self.store.fielddefs[name] = ([], fields)
 
     def read(self, channel: Channel, data: bytes) -> Any:
-        """Return a message; raises ValueInvalid for bytes that are none."""
+        """Return a message; raises ValueInvalid for invalid bytes."""
         if channel.type not in self.store.types:
             self._learn(channel.type)
         try:
             return (self.store.deserialize_ros1 if self.ros1 else self.store.deserialize_cdr)(data, channel.type)
         except Exception:  # noqa: BLE001 - of broken bytes the library raises anything
-            raise ValueInvalid(f"its bytes are no {channel.type}") from None
+            raise ValueInvalid(f"its bytes are not a {channel.type}") from None
 
     def write(self, channel: Channel, message: Any) -> bytes:
         """Return the bytes of a message that was read."""
         return bytes((self.store.serialize_ros1 if self.ros1 else self.store.serialize_cdr)(message, channel.type))
 
     def _learn(self, kind: str) -> None:
-        """Find out what messages of a type hold; raises ValueError where that is not what their hash says."""
+        """Learn the definition of a type; raises ValueError if it does not match its hash."""
         from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
         found: dict[str, Any] = {}
@@ -211,5 +211,5 @@ class MessageTypes:
                 raise ValueError(f"hash of {kind} is {made}, not {digest}")
 
     def _register(self, types: dict[str, Any]) -> None:
-        """Take types that are not known yet."""
+        """Register types that are not known yet."""
         self.store.register({name: each for name, each in types.items() if name not in self.store.types})

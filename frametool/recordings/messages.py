@@ -1,7 +1,7 @@
-"""What messages of a recording say: transforms as edges, clouds as records of numpy, all else as lines of JSON.
+"""The contents of a recording's messages: transforms as edges, clouds as numpy records, everything else as JSON lines.
 
-Points, poses, fixes, twists, wrenches and the like are a stream of JSON lines, one a message.  Transforms are read from
-every topic that holds some; what comes by a topic `tf_static` stands still.  Points of clouds are not copied.
+Points, poses, fixes, twists, wrenches and the like are a stream of JSON lines, one per message.  Transforms are read
+from every topic that has any; those on a topic `tf_static` are static.  Points of clouds are not copied.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-_MOST_VALUES = 1 << 16  # of one point
+_MOST_VALUES = 1 << 16  # per point
 
 
 class PointCloud(NamedTuple):
@@ -49,7 +49,7 @@ class PointCloud(NamedTuple):
 
     number: of the message among those of its topics, from 1
     frame: that of its header, "" for none
-    names: of the columns; rows: (n,) records whose fields are called 0, 1, .. in their order
+    names: of the columns; rows: (n,) records with the fields 0, 1, .. in their order
     width, height: n is their product
     """
 
@@ -64,10 +64,10 @@ class PointCloud(NamedTuple):
 
 
 def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
-    """Return the topics whose clouds are wanted: those chosen, or the only one there is.
+    """Return the topics of clouds to read: those chosen, or the only one.
 
     chosen: with or without a leading `/`
-    Raises Unanswered where there are several to choose from, FormatError where there is none.
+    Raises Unanswered if there are several, FormatError if there is none.
     """
     there = sorted({each.topic for each in reader.channels if each.type == CLOUD})
     wanted = {topic.strip("/") for topic in chosen}
@@ -86,7 +86,7 @@ def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
 
 
 def read_clouds(reader: Any, topics: Sequence[str], path: str, tally: Tally) -> Iterator[PointCloud | FormatError]:
-    """Yield the clouds of some topics in the order they were recorded; in the place of a broken one its error."""
+    """Yield the clouds of some topics in the order of the recording; an invalid one is replaced by its error."""
     channels = [each for each in reader.channels if each.topic in topics and each.type == CLOUD]
     for number, (channel, _, data, *_) in enumerate(reader.messages(channels), 1):
         try:
@@ -96,7 +96,7 @@ def read_clouds(reader: Any, topics: Sequence[str], path: str, tally: Tally) -> 
 
 
 def _cloud(message: Any, number: int, topic: str, tally: Tally) -> PointCloud:
-    """Take a message apart; raises ValueInvalid for what contradicts itself."""
+    """Parse a message; raises ValueInvalid if it contradicts itself."""
     stamp = message.header.stamp
     if problem := stamp_problem(stamp.sec, stamp.nanosec, STAMPS[0]):
         raise problem
@@ -130,7 +130,7 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
         formats += [order + code] * count
         offsets += range(offset, end, size)
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ValueInvalid(f"field {shown(twice[0])} stands twice")
+        raise ValueInvalid(f"field {shown(twice[0])} appears twice")
     if missing := [name for name in "xyz" if name not in names]:
         raise ValueInvalid(f"no field {', '.join(missing)}; fields: {listing(names) or 'none'}")
     places = [f"{place}" for place in range(len(names))]
@@ -168,8 +168,8 @@ class Posed:
 def posed_messages(message: Any, kind: str) -> Sequence[Any] | Iterator[Any]:
     """Return the poses of a message that is a list of them, each with its header; else the message itself.
 
-    A pose of a Path has its own header; frame and stamp that it leaves open are those of the path.  The stamp 0 beside
-    a frame is one where other poses have stamps.
+    A pose of a Path has its own header; a missing frame or stamp is that of the path.  A stamp of 0 with a frame is
+    a valid time if other poses have stamps.
     """
     if kind == POSE_ARRAY:
         return (Posed(message.header, pose) for pose in message.poses)
@@ -180,7 +180,7 @@ def posed_messages(message: Any, kind: str) -> Sequence[Any] | Iterator[Any]:
 
 
 def _completed(own: Any, outer: Any, has_stamps: bool) -> Any:  # noqa: FBT001 - it reads so
-    """Return a header with the frame, and the stamp, of the one around it where it has none."""
+    """Return a header in which a missing frame and stamp are those of the outer header."""
     says_when = own.stamp.sec or own.stamp.nanosec or (has_stamps and own.frame_id)
     return replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)
 
@@ -196,10 +196,10 @@ RECORDS = frozenset((
 
 
 def record_channels(reader: RecordingReader, chosen: Collection[str]) -> list[Channel]:
-    """Return the channels whose messages are wanted: those chosen, or those of the only topic that holds records.
+    """Return the channels to read: those chosen, or those of the only topic with records.
 
     chosen: topics with or without a leading `/`
-    Raises Unanswered where several hold records and none is chosen.
+    Raises Unanswered if several have records and none is chosen.
     """
     there = [each for each in reader.channels if each.type in RECORDS]
     wanted = {topic.strip("/") for topic in chosen}
@@ -211,9 +211,9 @@ def record_channels(reader: RecordingReader, chosen: Collection[str]) -> list[Ch
 
 
 def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedReader | None:
-    """Open the messages of a bag as JSON lines; None where the topics that are wanted hold clouds.
+    """Open the messages of a bag as JSON lines; None if the chosen topics have clouds.
 
-    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or holds neither.
+    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or has neither.
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
@@ -234,9 +234,9 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
 
 
 def open_trajectory(path: str, chosen: Collection[str], tally: Tally) -> tuple[BufferedReader, str] | None:
-    """Open the poses of the one topic that is chosen, or that moves alone, as JSON lines; return it too.
+    """Open the poses of the chosen topic, or of the only moving one, as JSON lines; return the topic too.
 
-    None for other topics, and where nobody chose and transforms are there too.
+    None for other topics, and if none was chosen and there are transforms too.
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
@@ -250,7 +250,7 @@ def open_trajectory(path: str, chosen: Collection[str], tally: Tally) -> tuple[B
 
 
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
-    """Yield each message, or each pose of a list, as a line, many together; an error comes behind the lines before."""
+    """Yield the messages, or the poses of lists, as lines, many together; an error follows the lines before it."""
     held: list[bytes] = []
     number = 1
     layouts: dict[Any, MessageLayout | None] = {}
@@ -272,7 +272,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
 
 
 def _stretches(blocks: Iterator[Iterable[Message]]) -> Iterator[list[Message]]:
-    """Yield messages many together; those before an error too."""
+    """Yield messages in groups; those before an error too."""
     held: list[Message] = []
     try:
         for block in blocks:
@@ -289,9 +289,9 @@ def _stretches(blocks: Iterator[Iterable[Message]]) -> Iterator[list[Message]]:
 def _lines(
     types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, MessageLayout | None]
 ) -> Iterator[tuple[bytes, int]]:
-    """Yield the lines of messages of one length, and of how many: all at once where they lie alike.
+    """Yield the lines of messages of equal length, and their number: all at once if their layout is equal.
 
-    layouts: what was learned, by channel and length; None where no two messages lie alike
+    layouts: those known, by channel and length; None if no two messages have the same layout
     """
     key = channel, len(messages[0])
     known = layouts.get(key)
@@ -313,7 +313,7 @@ def _text(types: MessageTypes, channel: Channel, data: bytes) -> bytes:
 
 
 def _line(message: Any) -> str:
-    """Return a message as a line of JSON; a number that JSON has not by its name."""
+    """Return a message as a line of JSON; numbers that JSON does not have are written by name."""
     try:
         return f"{_encode(message)}\n"
     except ValueError:
@@ -321,7 +321,7 @@ def _line(message: Any) -> str:
 
 
 def _named(value: Any) -> Any:
-    """Return a message, or a part of one, with the names of numbers that are not finite."""
+    """Return a message, or a part of one, with numbers that are not finite replaced by their names."""
     if isinstance(value, float):
         return value if isfinite(value) else str(value)
     if isinstance(value, str | int):
@@ -343,7 +343,7 @@ def _plain(value: Any) -> Any:
 
 @cache
 def _marks(kind: Any) -> list[str]:
-    """Return the fields of a type that are no data: the library's own, and constants."""
+    """Return the fields of a type that are not data: the library's own, and constants."""
     return [name for name in kind.__dataclass_fields__ if not name[0].islower()]
 
 
@@ -354,7 +354,7 @@ TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
 
 
 class RawTransform(NamedTuple):
-    """A transform as it was recorded, unchecked; numbers: tx, ty, tz, x, y, z, w; stamp: seconds and nanoseconds."""
+    """A transform as recorded, unchecked; numbers: tx, ty, tz, x, y, z, w; stamp: seconds and nanoseconds."""
 
     parent: str
     child: str
@@ -363,7 +363,7 @@ class RawTransform(NamedTuple):
 
     @classmethod
     def of(cls, message: Any, body: str = "") -> RawTransform:
-        """Return what a TransformStamped says, or a pose over time, of a frame or of a body."""
+        """Return the contents of a TransformStamped, or of a pose over time, of a frame or of a body."""
         if hasattr(message, "transform"):
             body, moved, turned = message.child_frame_id, message.transform.translation, message.transform.rotation
         else:
@@ -375,10 +375,10 @@ class RawTransform(NamedTuple):
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the transforms of a bag in the order they were recorded.
+    """Yield the transforms of a bag in the order of the recording.
 
     An edge's line is the number of its message among those with transforms.
-    Raises FileProblem when the extra is missing; FormatError for a bag that is broken or holds no transforms.
+    Raises FileProblem when the extra is missing; FormatError for a bag that is broken or has no transforms.
     """
     try:
         with opened_recording(file.path, options.tally) as reader:
@@ -388,7 +388,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
-    """Return the channels with transforms, and those chosen that hold poses; raises FormatError without any."""
+    """Return the channels with transforms, and chosen ones with poses; raises FormatError if there are none."""
     reader.refuse_foreign(options.topics.chosen)
     chosen = options.topics.chooses
     found = [each for each in reader.channels if each.type in TYPES or (each.type in POSES and chosen(each.topic))]
@@ -408,7 +408,7 @@ def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
 
 
 def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options: Options) -> Iterator[Edge]:
-    """Yield the edges of the messages on some channels; raises FormatError where there is none, or one is broken."""
+    """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
     number = 0
     for number, (channel, received_ns, data, *_) in enumerate(reader.messages(channels), 1):
         try:
@@ -424,10 +424,10 @@ def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options
 
 
 def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: str, options: Options) -> Edge | None:
-    """Return the edge that a message on a topic says; None where the topic does not count.
+    """Return the edge in a message on a topic; None if the topic is not read.
 
     number: of the message among those with transforms
-    Raises FormatError for one that is none.
+    Raises FormatError for an invalid one.
     """
     if not options.topics.takes(topic):
         return None

@@ -1,6 +1,6 @@
-"""Recordings read: ROS 1 bags by rosbags, MCAP files by mcap, databases by sqlite3; the extra `frametool[bag]`.
+"""Read recordings: ROS 1 bags with rosbags, MCAP files with mcap, databases with sqlite3; the extra `frametool[bag]`.
 
-Messages are bytes here, in the order of their log times; whoever wants to know what they say asks `types`.
+Messages are bytes here, in the order of their log times; `types` parses them.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 BAG1, BAG2, MCAP = "bag1", "bag2", "mcap"
 CDR = "cdr"
 METADATA, INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
-ITSELF, SERIALIZED = "rosbag2", "serialized_metadata"  # the metadata that rosbag2 puts into an MCAP file, of itself
-QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # what rosbag2 says of a channel of MCAP
-MOST = 1 << 28  # bytes of a chunk: one that promises more is not unpacked
+ITSELF, SERIALIZED = "rosbag2", "serialized_metadata"  # of rosbag2, in an MCAP file about itself
+QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # metadata of rosbag2 about a channel of MCAP
+MOST = 1 << 28  # bytes of a chunk: a larger one is not unpacked
 LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
 NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 RECORD_HEAD = 9  # bytes
-RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # what a record begins with, and a message in it (mcap.dev/spec)
+RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # the header of a record, and of a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
-LENGTH = Struct("<I")  # of ROS 1 bags (wiki.ros.org/Bags/Format/2.0), with what the headers of their records say
+LENGTH = Struct("<I")  # of ROS 1 bags (wiki.ros.org/Bags/Format/2.0), with the fields of their record headers
 TIME = Struct("<II")
 OF_MESSAGE, OF_CONNECTION = b"\4\0\0\0op=\2", b"\4\0\0\0op=\7"
 CONNECTION, OF_TIME = b"\x09\0\0\0conn=", b"\x0d\0\0\0time="
@@ -45,12 +45,12 @@ CONNECTION, OF_TIME = b"\x09\0\0\0conn=", b"\x0d\0\0\0time="
 
 @dataclass(eq=False, slots=True)
 class Channel:
-    """What messages of one publisher have in common.
+    """The common properties of the messages of one publisher.
 
     topic, type: as ROS 2 writes them, `/pose` and `geometry_msgs/msg/PoseStamped`
-    encoding: of its messages: `cdr`, `ros1`, or what else there is
-    schema: name, encoding and text of the definition of its type, as in MCAP; None where there is none
-    said: what else is said of it: quality of service in ROS 2, callerid and latching in ROS 1
+    encoding: of its messages: `cdr`, `ros1`, or another
+    schema: name, encoding and text of the definition of its type, as in MCAP; None if there is none
+    said: further metadata: quality of service in ROS 2, callerid and latching in ROS 1
     digest: the hash of the type
     """
 
@@ -63,17 +63,17 @@ class Channel:
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """Return what makes it another one."""
+        """Return the values in which channels differ."""
         return self.topic, self.type, self.encoding, self.schema, *self.said.items()
 
     @property
     def is_static(self) -> bool:
-        """Return True for a topic of transforms for good."""
+        """Return True for a topic of static transforms."""
         return self.topic.rpartition("/")[2] == "tf_static"
 
 
 class Message(NamedTuple):
-    """A message as it was recorded; times are nanoseconds."""
+    """A message as recorded; times are nanoseconds."""
 
     channel: Channel
     log_ns: int
@@ -83,7 +83,7 @@ class Message(NamedTuple):
 
 
 class _Bounded(BufferedReader):
-    """A file of which no more is asked for than is there, whatever a length in it says."""
+    """A file wrapper that never reads more than exists, whatever a length field states."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(FileIO(path))
@@ -98,7 +98,7 @@ class McapFile:
     """An MCAP file; compression: of its chunks."""
 
     def __init__(self, path: Path, opened: ExitStack, tally: Tally) -> None:
-        """Read its summary, or all of it where that says too little."""
+        """Read its summary, or the whole file if the summary is incomplete."""
         from mcap.reader import SeekingReader
 
         self.stream = opened.enter_context(_Bounded(path))
@@ -120,7 +120,7 @@ class McapFile:
                 pass
 
     def expected(self, wanted: Collection[Channel] | None) -> int | None:
-        """Return how many messages there are said to be on some channels, or on all; None where nothing is said."""
+        """Return the stated number of messages on some channels, or on all; None if it is not stated."""
         if wanted is None or self.said is None:
             return self.said.message_count if self.said else None
         counts = self.said.channel_message_counts
@@ -138,14 +138,14 @@ class McapFile:
             yield from (each for each in self._all() if isinstance(each, Attachment | Metadata))
 
     def _all(self) -> Iterator[Any]:
-        """Yield all records as they lie."""
+        """Yield all records in the order of the file."""
         from mcap.stream_reader import StreamReader
 
         self.stream.seek(0)
         yield from StreamReader(self.stream, emit_chunks=True).records
 
     def _records(self, wanted: Collection[Channel] | None) -> Iterator[Any]:
-        """Yield the records that hold messages of some channels: chunk by chunk, or else all there are."""
+        """Yield the records with messages of some channels: chunk by chunk, or else all records."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Chunk
 
@@ -243,12 +243,12 @@ def _in_order(chunks: Iterable[list[Message]]) -> Iterator[list[Message]]:
 
 
 class DatabaseFile:
-    """A sqlite3 file of rosbag2; what its tables hold depends on its version."""
+    """A sqlite3 file of rosbag2; the contents of its tables depend on its version."""
 
     head, compression = None, ""
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Tally) -> None:
-        """Let sqlite3 check its pages, as rows on a broken one would be missing without a word, and read its topics."""
+        """Let sqlite3 check its pages, because rows on a broken one would be missing silently, and read its topics."""
         from sqlite3 import Row, connect
 
         self.database = connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
@@ -274,7 +274,7 @@ class DatabaseFile:
         return Channel(topic["name"], kind, topic["serialization_format"], schema, said, digest)
 
     def expected(self, _wanted: Collection[Channel] | None) -> None:
-        """Return None: only the metadata of the folder say how many messages there are."""
+        """Return None: only the metadata of the folder state the number of messages."""
 
     def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
         """Yield the messages on some channels, or on all."""
@@ -313,7 +313,7 @@ class Bag1File:
         return Channel(connection.topic, connection.msgtype, "ros1", schema, said, connection.digest)
 
     def expected(self, wanted: Collection[Channel] | None) -> int:
-        """Return how many messages the chunks say that there are on some channels, or on all."""
+        """Return the number of messages on some channels, or on all, as stated in the chunks."""
         others = {number for number, each in self.channels.items() if wanted is not None and each not in wanted}
         counts = (chunk.connection_counts for chunk in self.reader.chunk_infos)
         return sum(count for each in counts for number, count in each.items() if number not in others)
@@ -355,14 +355,14 @@ class Bag1File:
 
 
 class RecordingReader:
-    """A recording that is open.
+    """An open recording.
 
-    channels: equal ones of several files are one; foreign: those whose messages are not ROS's
+    channels: equal ones of several files are merged; foreign: those whose messages are not ROS's
     metadata: of a folder, every value as text; head: profile and library of MCAP
     """
 
     def __init__(self, path: str, opened: ExitStack, tally: Tally) -> None:
-        """Open its files, as long as the stack is."""
+        """Open its files; the stack closes them."""
         from frametool.recordings.made import MessageTypes
 
         self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
@@ -394,7 +394,7 @@ class RecordingReader:
             yield {**each["topic_metadata"], "count": each["message_count"]}
 
     def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Message]:
-        """Yield the messages on some channels, or on all; raises FormatError where not all are there."""
+        """Yield the messages on some channels, or on all; raises FormatError if any are missing."""
         return chain.from_iterable(self.blocks(wanted))
 
     def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Iterable[Message]]:
@@ -410,7 +410,7 @@ class RecordingReader:
         self._check(total, self._expected(wanted), wanted)
 
     def _expected(self, wanted: Collection[Channel] | None) -> int | None:
-        """Return how many messages the metadata say that there are."""
+        """Return the number of messages stated in the metadata."""
         if wanted is None:
             said = self.metadata.get("message_count")
             return None if said is None else int(said)
@@ -419,13 +419,13 @@ class RecordingReader:
         return sum(counts) if counts else None
 
     def _check(self, count: int, expected: int | None, wanted: Collection[Channel] | None) -> None:
-        """Raise FormatError unless as many messages are there as are said to be."""
+        """Raise FormatError unless all stated messages were found."""
         if expected not in (None, count):
             names = "" if wanted is None else f" on {', '.join(sorted({each.topic for each in wanted}))}"
             raise FormatError(f"the bag is damaged: {count} of {expected} messages{names} are there", source=self.path)
 
     def refuse_foreign(self, chosen: Iterable[str]) -> None:
-        """Raise FormatError for a topic that is asked for and whose messages are in another encoding than ROS's."""
+        """Raise FormatError for a chosen topic whose messages are not encoded as ROS does."""
         named = {topic.strip("/") for topic in chosen}
         for each in self.foreign:
             if each.topic.strip("/") in named:
@@ -441,9 +441,9 @@ def _unpacked(message: Message) -> Message:
 
 
 def read_metadata(text: str, name: str) -> dict[str, Any]:
-    """Read metadata, of a folder or as they stand in an MCAP file; every value in them is text.
+    """Read metadata, of a folder or in an MCAP file; all values are text.
 
-    Raises ValueError for what is no YAML.
+    Raises ValueError if they are not YAML.
     """
     try:
         documents = parse_documents(text, name)
@@ -454,7 +454,7 @@ def read_metadata(text: str, name: str) -> dict[str, Any]:
 
 
 def _files_of(folder: Path, metadata: dict[str, Any], opened: ExitStack) -> list[Path]:
-    """Return the files of a bag in their order; those compressed as a whole are unpacked, as long as it is open."""
+    """Return the files of a bag in their order; files that are compressed as a whole are unpacked while it is open."""
     found = [folder / PurePath(name).name for name in metadata["relative_file_paths"]]
     if metadata.get("compression_mode", "").lower() != "file":
         return found
@@ -470,12 +470,12 @@ def _files_of(folder: Path, metadata: dict[str, Any], opened: ExitStack) -> list
 
 @contextmanager
 def opened_recording(path: str, tally: Tally) -> Iterator[RecordingReader]:
-    """Open a recording; whatever the libraries raise for a broken one is one error.
+    """Open a recording; any exception of the libraries for a broken one becomes one error.
 
     Raises FileProblem without the extra.
     """
     if path != "-" and Path(path).is_file() and not Path(path).stat().st_size:
-        raise FormatError("nothing in it: an empty file is no bag", source=path)
+        raise FormatError("nothing in it: an empty file is not a bag", source=path)
     try:
         import mcap  # noqa: F401 - whether it is there
         import rosbags.typesys  # noqa: F401 - as well
@@ -490,7 +490,7 @@ def opened_recording(path: str, tally: Tally) -> Iterator[RecordingReader]:
 
 @contextmanager
 def broken(path: str) -> Iterator[None]:
-    """Make one error of whatever reading a broken bag raises: anything, also MemoryError."""
+    """Convert any exception from reading a broken bag into one error, even MemoryError."""
     try:
         yield
     except (FrametoolError, BrokenPipeError):

@@ -1,6 +1,6 @@
-"""Recordings written: MCAP files and folders by mcap, ROS 1 bags by rosbags, the extra `frametool[bag]`.
+"""Write recordings: MCAP files and folders with mcap, ROS 1 bags with rosbags, the extra `frametool[bag]`.
 
-New messages are logged at their stamps, or at the one before where a stamp goes back.
+New messages are logged at their stamps, or at the previous log time if a stamp goes back.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.recordings.made import Kind
 
-NAME = "recording"  # of the file in a bag2 folder, whatever that is called: two runs write the same bytes
+NAME = "recording"  # of the file in a bag2 folder, whatever the folder's name: two runs write the same bytes
 PIECE = 1 << 20  # bytes
 NO_EXTRA = "recordings are written with an extra; install it: pip install 'frametool[bag]'"
-VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last that says policies by numbers
+VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last with numeric policies
 BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service
 
 
@@ -46,17 +46,17 @@ class FirstPiece(bytes):
     name: str
 
     def __new__(cls, piece: bytes, name: str) -> Self:
-        """Take a piece and a name."""
+        """Store a piece and a name."""
         made = super().__new__(cls, piece)
         made.name = name
         return made
 
 
 class RecordingFile:
-    """A recording that is being written, into a file without a name until `pieces` yields what is in it."""
+    """A recording that is being written, to an unnamed file until `pieces` yields its contents."""
 
     def __init__(self, form: str, folder: str = "", compression: str = "", *, head: Any = None) -> None:
-        """Open it in a folder that has room for it; raises FileProblem without the extra.
+        """Open it in a folder for temporary files; raises FileProblem without the extra.
 
         compression: of its chunks, as MCAP files and bags name them; head: profile and library of MCAP
         """
@@ -88,11 +88,11 @@ class RecordingFile:
                 self._writer.start(*((head.profile, head.library) if head else ("ros2", "frametool")))
             self._file = place.open("rb")
         self._discard = finalize(self, _discarded, self._stream, self._file, home)
-        with suppress(OSError):  # Windows does not let go of the name of an open file
+        with suppress(OSError):  # Windows keeps the name of an open file
             rmtree(home)
 
     def channel(self, kind: Kind, topic: str = "") -> Channel:
-        """Begin a topic, the usual one of its kind unless told, and return what `write` takes."""
+        """Begin a topic, by default the usual one of its kind, and return the argument for `write`."""
         made = new_channel(kind, topic or kind.topic, ros1=self.form == BAG1)
         self.begin([made])
         return made
@@ -122,7 +122,7 @@ class RecordingFile:
         return int(self._writer.register_channel(channel.topic, channel.encoding, number, channel.said))
 
     def write(self, channel: Channel, stamp_ns: int, data: bytes | memoryview) -> None:
-        """Write one message; what comes late is logged with the one before."""
+        """Write one message; a late one is logged with the previous one."""
         self.log_ns = max(self.log_ns, stamp_ns)
         self.add(Message(channel, self.log_ns, bytes(data), self.log_ns))
 
@@ -142,16 +142,16 @@ class RecordingFile:
         self.span = min(first, log_ns), max(last, log_ns)
 
     def add_other(self, other: Any) -> None:
-        """Write an attachment or metadata, a record of mcap; what rosbag2 says of the file itself is made anew."""
+        """Write an attachment or metadata, a record of mcap; rosbag2's metadata about the file itself are replaced."""
         if hasattr(other, "metadata"):
             self._writer.add_metadata(other.name, other.metadata)
         else:
             self._writer.add_attachment(other.create_time, other.log_time, other.name, other.media_type, other.data)
 
     def pieces(self, before: dict[str, Any] | None = None, *, itself: bool = True) -> Iterator[bytes]:
-        """End the recording and yield its bytes; of a folder file after file, each begun by a FirstPiece.
+        """Finish the recording and yield its bytes; for a folder file after file, each starting with a FirstPiece.
 
-        before: the metadata of what is copied; itself: whether MCAP holds what rosbag2 says of a file
+        before: the metadata of the source of a copy; itself: whether MCAP contains rosbag2's metadata about a file
         """
         metadata: dict[str, Any] = {}
         with room_in(self._folder):
@@ -171,7 +171,7 @@ class RecordingFile:
         self._discard()
 
     def _metadata(self, before: dict[str, Any]) -> dict[str, Any]:
-        """Return what rosbag2 says of a recording, with what it said before of where that comes from."""
+        """Return rosbag2's metadata of a recording, including those of its source."""
         from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
         first, last = self.span or (0, 0)
@@ -180,7 +180,7 @@ class RecordingFile:
         for each, count in self.counts.items():
             qos: Any = each.said.get(QOS, "")
             if not by_numbers:
-                with suppress(Exception):  # what cannot be read stays as it is
+                with suppress(Exception):  # metadata that cannot be parsed are unchanged
                     qos = dump_qos_v9(parse_qos(qos or []))
             about = {"name": each.topic, "type": each.type, "serialization_format": each.encoding, QOS: qos}
             about["type_description_hash"] = each.digest
@@ -199,11 +199,11 @@ class RecordingFile:
 
 
 def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
-    """Yield the bytes of a recording of a tree: what stands in one message, what moves in one for each stamp."""
+    """Yield the bytes of a recording of a tree: static edges in one message, moving ones in one per stamp."""
     form, asked = style.form, style.recording
     topics = {"tf_static": any(track.is_static for track in tree.tracks()), "tf": tree.moves}
     if asked.topic and all(topics.values()):
-        raise ValueInvalid(f"the tree stands and moves, on two topics; {asked.topic} names one")
+        raise ValueInvalid(f"the tree has static and moving frames, on two topics; {asked.topic} names one")
     if not any(topics.values()):
         raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
     file = RecordingFile(form, asked.folder)
@@ -226,7 +226,7 @@ Sample: TypeAlias = "tuple[int, tuple[str, str], Components]"
 
 
 def _samples(track: Track, style: Style) -> Iterator[Sample]:
-    """Yield the samples of a frame as stamp, (parent, child) and pose; what stands has the stamp 0."""
+    """Yield the samples of a frame as stamp, (parent, child) and pose; static ones with the stamp 0."""
     for stamp_ns, parent, (tx, ty, tz, x, y, z, w) in track.walk():
         turn = (x, y, z, w) if style.keep_sign else quaternion.from_quaternion(x, y, z, w, floats)
         yield stamp_ns or 0, (parent, track.child), tuple(part + 0.0 for part in (tx, ty, tz, *turn))
@@ -240,7 +240,7 @@ def _columns(samples: Sequence[Sample]) -> Iterator[Any]:
 def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:
     """Close what was opened for a recording, and remove what is left of it."""
     for each in (stream, file):
-        with suppress(OSError):  # on a full disk what waits in it finds no room
+        with suppress(OSError):  # on a full disk the buffered data cannot be written
             each.close()
     rmtree(folder, ignore_errors=True)
 

@@ -1,10 +1,10 @@
 """ROS messages as the tools print them: `rostopic echo` (ros1) and `ros2 topic echo` (ros2), `---` after each.
 
-    header:                     header:·             rostopic leaves a blank behind a key that opens a block,
+    header:                     header:·             rostopic writes a blank after a key that opens a block,
       frame_id: map               frame_id: "map"    quotes names, and aligns nanoseconds to nine columns
 
-A message is a mapping in the order of its fields; its stamps are mappings too. Nothing here knows which messages
-there are, only that a transform, a point and a pose have a header.
+A message is a mapping in the order of its fields; its stamps are mappings too. This module does not know message
+types, except that a transform, a point and a pose have a header.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return TransformStamped messages; frames without a name are "", a stamp that is not known is 0."""
+    """Return TransformStamped messages; frames without a name are "", an unknown stamp is 0."""
     return write_messages((transform_stamped(result, style) for result in results), style)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return PointStamped and Vector3Stamped messages; what is a message already stays one."""
+    """Return PointStamped and Vector3Stamped messages; messages are unchanged."""
     return write_messages((_stamped(record, style) for record in records), style)
 
 
 def write_tree(tree: FrameTree, style: Style) -> str:
-    """Return one TFMessage with every edge, as a latched /tf_static holds it."""
+    """Return one TFMessage with every edge, as in a latched /tf_static."""
     return write_messages([{"transforms": [transform_stamped(edge, style) for edge in edge_results(tree)]}], style)
 
 
@@ -55,7 +55,7 @@ def message_text(message: dict[str, Any], style: Style) -> str:
 
 
 def _respelled(value: Any, form: str) -> Any:
-    """Return a message with the headers and stamps of the other ROS, where it has those."""
+    """Convert the headers and stamps of a message to the other ROS version."""
     if isinstance(value, list):
         return [_respelled(each, form) for each in value]
     if not isinstance(value, dict):
@@ -95,12 +95,12 @@ def stamp(stamp_ns: int, form: str) -> dict[str, int]:
     names = STAMPS[form == "ros1"]
     whole, rest = divmod(stamp_ns, BILLION)
     if problem := stamp_problem(whole, rest, names):
-        raise ValueInvalid(f"stamp {format_stamp(stamp_ns)} has no place in {form}: {problem}")
+        raise ValueInvalid(f"stamp {format_stamp(stamp_ns)} does not fit in {form}: {problem}")
     return dict(zip(names, (whole, rest), strict=True))
 
 
 def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
-    """Put a point or vector into its message; leave alone what has a header or is another message."""
+    """Return the message of a point or vector; anything with a header, or another message, is unchanged."""
     inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
     values: list[Any] = inner if isinstance(inner, list) else [inner.get(axis) for axis in "xyz"]
     if not MESSAGE_KEYS.isdisjoint(record) or len(values) != 3 or any(type(each) is not float for each in values):
@@ -110,7 +110,7 @@ def _stamped(record: dict[str, Any], style: Style) -> dict[str, Any]:
 
 
 def _ros2_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:
-    """Write block style as PyYAML does: items of a list stand as far left as its key."""
+    """Write block style as PyYAML does: items of a list have the indentation of its key."""
     for key, value in mapping.items():
         if isinstance(value, dict) and value:
             yield f"{indent}{key}:"
@@ -142,7 +142,7 @@ def _ros2_scalar(value: Any, style: Style) -> str:
 
 
 def _ros1_lines(mapping: dict[str, Any], style: Style, indent: str) -> Iterator[str]:
-    """Write as genpy does: a list of messages in items of their own, a list of numbers on one line."""
+    """Write as genpy does: a list of messages as separate items, a list of numbers on one line."""
     for key, value in mapping.items():
         if isinstance(value, dict):
             yield f"{indent}{key}: "

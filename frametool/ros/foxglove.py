@@ -1,4 +1,4 @@
-"""Foxglove's JSON: FrameTransform and FrameTransforms, one message a line.
+"""Foxglove's JSON: FrameTransform and FrameTransforms, one message per line.
 
     {"timestamp": {"sec": 1, "nsec": 0}, "parent_frame_id": "world", "child_frame_id": "turtle1",
      "translation": {"x": 0, ..}, "rotation": {"x": 0, "y": 0, "z": 0, "w": 1}}
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one FrameTransform a line; frames without a name are "", a stamp that is not known is 0."""
+    """Return one FrameTransform per line; frames without a name are "", an unknown stamp is 0."""
     return "".join(f"{dump(_frame_transform(result, style), style.number)}\n" for result in results)
 
 

@@ -1,14 +1,14 @@
-"""Messages and transforms of a recording in text, one after the other: bounded memory, any length.
+"""Messages and transforms of a recording in text, one after another: bounded memory, any length.
 
-Of what the echo tools print and their CSV, of rosbridge's and Foxglove's JSON lines; what the tools or the shell print
-in between is passed over and counted.  A message is plain values, as the document reader gives them.
+From the output of the echo tools, their CSV, and JSON lines of rosbridge and Foxglove; what the tools or the shell
+print in between is skipped and counted.  A message is plain values, as the document reader returns them.
 
     %time,field.header.seq,field.header.stamp,field.header.frame_id,field.point.x,..      rostopic echo -p
     1795206353524626016,1,1795206353524626016,turtle1,1.0,..                               stamps in ns, nothing quoted
     1683377979,902062451,world,turtle1,5.5,5.5,0.0,0.0,0.0,0.0,1.0                         ros2 topic echo --csv
 
-rostopic names every field once, in the header; later rows may hold more or fewer transforms than it names.  The other
-has no header: how many fields there are tells the kind of message; several transforms follow each other.
+rostopic names every field once, in the header; later rows may have more or fewer transforms than that.  ros2 has no
+header: the number of fields identifies the kind of message; several transforms follow one another.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def message1(cells: Sequence[str], header: Sequence[str]) -> dict[str, Any]:
 def message2(cells: Sequence[str]) -> dict[str, Any]:
     """Return the message of one row of `ros2 topic echo --csv`.
 
-    Raises Misfit for a row that none of the known messages gives.
+    Raises Misfit for a row that matches none of the known messages.
     """
     if len(cells) == 6:
         is_number = not cells[2].strip("-+.0123456789eE")
@@ -79,7 +79,7 @@ def message2(cells: Sequence[str]) -> dict[str, Any]:
 
 
 def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]:
-    """Take the transforms of one row apart."""
+    """Split one row into its transforms."""
     size = len(names)
     if not cells or len(cells) % size:
         raise Misfit(
@@ -89,7 +89,7 @@ def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]
 
 
 def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
-    """Put cells where their dotted names say; a stamp in nanoseconds becomes secs and nsecs."""
+    """Arrange cells by their dotted names; a stamp in nanoseconds becomes secs and nsecs."""
     message: dict[str, Any] = {}
     for name, cell in zip(names, cells, strict=True):
         *outer, last = name.split(".")
@@ -108,7 +108,7 @@ def _stamp1(cell: str) -> dict[str, str]:
     return {"secs": str(seconds), "nsecs": str(nanoseconds)}
 
 
-# what the tools or the shell print between messages; the note about lost messages is the one that ends a document
+# what the tools or the shell print between messages; only the warning about lost messages ends a document
 NOISE = re.compile(
     r"""(?x) \ufeff? (?:
       A\ message\ was\ lost!!! | \ttotal\ count\ change:\ ?\d+ | \ttotal\ count:\ ?\d+(?:---)?
@@ -120,11 +120,11 @@ NOISE = re.compile(
 
 
 _SEPARATOR = re.compile(r"^.*---[ \t]*$\n?", re.MULTILINE)
-_ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins so
+_ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins like this
 
 
 class Message(NamedTuple):
-    """The plain values of one message, with the text they stand in and the number of its first line."""
+    """The plain values of one message, with its text and the number of its first line."""
 
     value: Any
     source: Source
@@ -134,7 +134,7 @@ class Message(NamedTuple):
     received_ns: int | None = None
 
     def error(self, misfit: Misfit) -> FormatError:
-        """Make the error for what does not fit in this message, placed in the whole file."""
+        """Return the error for this message, with its place in the whole file."""
         if self.cells:
             error = FormatError(str(misfit), source=self.source.name, line=1, rule=misfit.rule)
         else:
@@ -144,7 +144,7 @@ class Message(NamedTuple):
 
 
 def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
-    """Yield the messages of a recording; where one cannot be read the error stands in its place."""
+    """Yield the messages of a recording; an unreadable one is replaced by its error."""
     if form in {"echo", "jsonl"}:
         for piece in (documents if form == "echo" else lines)(stream, name):
             yield from piece_messages(piece, name, form, tally)
@@ -169,7 +169,7 @@ def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator
 
 
 def without_noise(text: str, line: int, tally: Tally) -> str:
-    """Blank the lines that are known to be no data; the others keep their numbers."""
+    """Blank the lines that are known not to be data; the others keep their numbers."""
     if _ODD_START.search(text) is None:
         return text
     kept = text.split("\n")
@@ -193,7 +193,7 @@ def _parsed(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
 
 
 def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[Message | FormatError]:
-    """Yield the messages on a line that must be JSON, if it is neither blank nor noise."""
+    """Yield the messages on a line that must be JSON, unless it is blank or noise."""
     if not _is_data(text, line, tally):
         return
     source = Source(name, text.removeprefix("\ufeff"))
@@ -217,7 +217,7 @@ def line_texts(stream: BinaryIO, name: str, tally: Tally) -> Iterator[tuple[int,
 
 
 def _is_data(line: str, number: int, tally: Tally) -> bool:
-    """Return True if a line is neither blank nor noise; count what is noise."""
+    """Return True if a line is neither blank nor noise; count noise."""
     if NOISE(line):
         tally.noise.append((number, line.strip()))
         return False
@@ -245,7 +245,7 @@ _HEADER = re.compile(r"\bheader\b")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
-    """Yield the transforms of every message, in the order they were recorded."""
+    """Yield the transforms of every message, in the order of the recording."""
     if file.form in {"echo", "jsonl"} and (file.form == "echo" or not options.topics.chosen):
         cut, end = (documents, "---\n") if file.form == "echo" else (lines, "\n")
         for piece in cut(file.stream, file.name):
@@ -257,7 +257,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
 
 
 def _cut(piece: Piece, end: str, size: int) -> Iterator[Piece]:
-    """Cut a piece, where documents or lines end, into stretches of a size, or of one document that is longer."""
+    """Split a piece, where documents or lines end, into chunks of a size, or of one longer document."""
     text, line = piece
     at = 0
     while at < len(text):
@@ -271,7 +271,7 @@ def _cut(piece: Piece, end: str, size: int) -> Iterator[Piece]:
 
 
 def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
-    """Read plain messages fast, all at once or by halves, and the others in full."""
+    """Read plain messages fast, all at once or by bisection, and the others in full."""
     found = plain_columns(*piece, options.tally, normalize=options.normalize)
     if found and not found.topics:
         yield found
@@ -288,7 +288,7 @@ def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterato
 
 
 def _message_edges(message: Message | FormatError, options: Options) -> Iterator[Edge]:
-    """Yield the edges of one message; what is wrong with one of them does not touch the others."""
+    """Yield the edges of one message; an error in one of them does not affect the others."""
     if isinstance(message, FormatError):
         options.report(message)
         return
@@ -313,7 +313,7 @@ def _message_edges(message: Message | FormatError, options: Options) -> Iterator
 
 
 def _on_topic(edge: Edge, name: str, options: Options) -> Edge:
-    """Take the stamp from an edge that came by tf_static; one frame by two topics is a fault."""
+    """Remove the stamp of an edge on tf_static; the same frame on two topics is an error."""
     if problem := options.topics.conflict(edge.topic, edge.child):
         options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
     return edge._replace(stamp_ns=None) if edge.topic.endswith("tf_static") else edge
@@ -322,7 +322,7 @@ def _on_topic(edge: Edge, name: str, options: Options) -> Edge:
 def _read(
     transform: dict[str, Any], reading: Reading, options: Options, line: int, topic: str
 ) -> tuple[str, str, Rigid, int | None]:
-    """Read one transform; notes of rotations that had to be normalised are counted, one sentence for all."""
+    """Read one transform; warnings about normalised rotations are counted and emitted once."""
     if is_pose(transform):
         found = read_pose(transform, reading, body_of(topic, options.answers))
     else:
@@ -333,9 +333,9 @@ def _read(
 
 
 def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:
-    """Yield every transform of a message, or of a list of messages; count messages that hold none.
+    """Yield every transform of a message, or of a list of messages; count messages without any.
 
-    A pose counts where its topic was chosen, or where topics are not named.
+    A pose counts if its topic was chosen, or if topics are not named.
     """
     if type(value) is list:
         for index, item in enumerate(value):

@@ -1,4 +1,4 @@
-"""ROS messages of transforms, poses and positions of joints: read from plain values, as ROS 1 and ROS 2 spell them.
+"""ROS messages of transforms, poses and joint positions: read from plain values in the notation of ROS 1 or ROS 2.
 
     {header: {stamp: {sec: 1, nanosec: 0}, frame_id: map}, child_frame_id: base, transform: {translation: {..}, ..}}
     {header: {stamp: .., frame_id: map}, pose: {position: {x, y, z}, orientation: {x, y, z, w}}}        PoseStamped
@@ -9,8 +9,8 @@
     %time,field.header.seq,field.header.stamp,field.header.frame_id,field.name0,field.position0,..      rostopic echo -p
     1683377979,902062451,,elbow,wrist,0.5,-0.2,0.1,0.0                                            ros2 topic echo --csv
 
-Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become int nanoseconds.
-Positions of joints are radians or metres; a message may speak of some joints only.
+Quaternions x, y, z, w; metres; header.frame_id is the parent: parent_from_child. Stamps become integer nanoseconds.
+Joint positions are radians or metres; a message may contain only some joints.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ if TYPE_CHECKING:
 STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 1, Foxglove
 SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
 PARTS = "a TransformStamped has header, child_frame_id, transform"
-# of messages that hold more than one thing, or what does not look like what it is: the fields given in the frame of the
-# header, and of what kind they are, then those given in another frame, which stay; all others say what they hold
+# messages with more than one part, or whose content is not obvious: the fields expressed in the frame of the header,
+# and their kinds, then the fields in another frame, which are unchanged; all other messages name their content
 HELD: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
     "Imu": ({"orientation": "attitude", "angular_velocity": "vector", "linear_acceleration": "vector"}, ()),
     "MagneticField": ({"magnetic_field": "vector"}, ()),
     "QuaternionStamped": ({"quaternion": "rotation"}, ()),
-    "Odometry": ({"pose": ""}, ("twist",)),  # given in the child's frame
-    "Marker": ({"pose": ""}, ("scale", "points", "uv_coordinates")),  # given in the frame of the pose
+    "Odometry": ({"pose": ""}, ("twist",)),  # in the child's frame
+    "Marker": ({"pose": ""}, ("scale", "points", "uv_coordinates")),  # in the frame of the pose
 }
 MOST_DIGITS = 25
 _INTEGER = rf"(?a) *[-+]?\d{{1,{MOST_DIGITS}}}"
 _LEFT_OUT = "<(array|sequence) type: .*>"
 LISTS = ("transforms", "static_transforms")
-MESSAGE_KEYS = frozenset(("header", "linear", "force"))  # of messages that hold geometry
+MESSAGE_KEYS = frozenset(("header", "linear", "force"))  # of messages with geometry
 MARKS = frozenset(("child_frame_id", *LISTS))
-STALE = "euler_angles_degree"  # Apollo writes it beside the quaternion and does not keep it up to date
+STALE = "euler_angles_degree"  # Apollo writes it next to the quaternion and does not update it
 STALE_DEGREES = 0.1
 EPOCH = 719_163  # the day 1970-01-01, counted from year 1
 _DATE = (
@@ -63,12 +63,12 @@ def is_message(value: dict[str, Any]) -> bool:
 
 
 def is_envelope(value: dict[str, Any]) -> bool:
-    """Return True if a mapping is what rosbridge puts around a message."""
+    """Return True if a mapping is rosbridge's envelope of a message."""
     return value.get("op") == "publish" and type(value.get("msg")) is dict
 
 
 def topic_of(value: Any) -> str:
-    """Return the topic that an envelope names, or ""."""
+    """Return the topic named in an envelope, or ""."""
     return str(value.get("topic") or "") if type(value) is dict and is_envelope(value) else ""
 
 
@@ -84,14 +84,14 @@ def messages(value: dict[str, Any], path: Path) -> Iterator[tuple[dict[str, Any]
         if key == "timestamp":  # of a FrameTransforms message
             continue
         if key not in LISTS:
-            raise Misfit(f"unknown key {shown(key)} beside transforms", here, key=True)
+            raise Misfit(f"unknown key {shown(key)} next to transforms", here, key=True)
         listed = within(here, whole_list, entries or [], f"{key} as a list of TransformStamped")
         for index, entry in enumerate(listed):
             yield within((*here, index), as_mapping, entry, "a TransformStamped"), (*here, index)
 
 
 def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); no stamp is None."""
+    """Read one TransformStamped as (parent, child, position, rotation, stamp_ns); None without a stamp."""
     if "parent_frame_id" in message:
         return _read_frame_transform(message, reading)
     only(message, ("header", "child_frame_id", "transform"))
@@ -108,7 +108,7 @@ def read_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str,
 
 
 def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) -> None:
-    """Compare the angles beside a quaternion with it; the quaternion is what counts."""
+    """Compare the angles of an entry with its quaternion; the quaternion is used."""
     from math import degrees
 
     from frametool.geometry import floats, quaternion
@@ -133,12 +133,12 @@ def is_pose(value: Any) -> bool:
 
 
 def body_of(topic: str, answers: Answers) -> str:
-    """Name a body that its messages do not name: as --frames does, else by its topic."""
+    """Return the name of a body that its messages do not name: that of --frames, else the topic."""
     return answers.frames[-1] if answers.frames else topic.strip("/") or "body"
 
 
 def read_pose(message: dict[str, Any], reading: Reading, body: str) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one message as (parent, child, position, rotation, stamp_ns); `body` is the child where it names none."""
+    """Read one message as (parent, child, position, rotation, stamp_ns); `body` is the default child."""
     header = part(message, "header", HAS)
     pose = part(message, "pose", HAS)
     path: Path = ("pose",)
@@ -151,7 +151,7 @@ def read_pose(message: dict[str, Any], reading: Reading, body: str) -> tuple[str
 
 
 def _read_frame_transform(message: dict[str, Any], reading: Reading) -> tuple[str, str, Vector, Quaternion, int | None]:
-    """Read one FrameTransform as (parent, child, position, rotation, stamp_ns); no timestamp is None."""
+    """Read one FrameTransform as (parent, child, position, rotation, stamp_ns); None without a timestamp."""
     only(message, ("timestamp", "parent_frame_id", "child_frame_id", "translation", "rotation"))
     parent = frame_of(message, "parent_frame_id", (), reading)
     child = frame_of(message, "child_frame_id", (), reading)
@@ -161,7 +161,7 @@ def _read_frame_transform(message: dict[str, Any], reading: Reading) -> tuple[st
 
 
 def _read_timestamp(value: Any) -> int:
-    """Read {sec, nsec}, or a date as RFC 3339 has it, `2023-11-14T22:13:20.123456789Z`, to the nanosecond."""
+    """Read {sec, nsec}, or a date of RFC 3339, `2023-11-14T22:13:20.123456789Z`, to the nanosecond."""
     if type(value) is not str:
         return read_stamp(value)
     from datetime import date
@@ -180,14 +180,14 @@ def _read_timestamp(value: Any) -> int:
 
 
 def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
-    """Refuse keys that are not known."""
+    """Refuse unknown keys."""
     for key in mapping:
         if key not in known:
             raise Misfit(f"unknown key {shown(key)}; expected {', '.join(known)}", (key,), key=True)
 
 
 def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
-    """Return a mapping inside a message; `what` says which keys the message has."""
+    """Return a mapping inside a message; `what` lists the keys of the message, for errors."""
     if key not in message:
         raise Misfit(f"missing {key}; {what}")
     inner: dict[str, Any] = within((key,), as_mapping, message[key], f"{key} as a mapping")
@@ -195,7 +195,7 @@ def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
 
 
 def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) -> str:
-    """Read a frame's name; one leading `/` goes, as tf2 does it, and is noted."""
+    """Read a frame's name; one leading `/` is removed, as in tf2, with a note."""
     name = mapping.get(key)
     here = (*path, key) if key in mapping else path
     if type(name) is not str or not name:
@@ -204,7 +204,7 @@ def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) ->
 
 
 def header_stamp(header: dict[str, Any]) -> int | None:
-    """Read the stamp of a header as nanoseconds; None where there is none."""
+    """Read the stamp of a header as nanoseconds; None if there is none."""
     if "stamp" not in header:
         return None
     stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
@@ -224,7 +224,7 @@ def read_stamp(value: Any) -> int:
 
 
 def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Misfit | None:
-    """Return what is wrong with a stamp that no message can hold."""
+    """Return the error for a stamp that no message can hold."""
     allowed = SECONDS[names[0]]
     if seconds not in allowed:
         return Misfit(f"{names[0]} {seconds} is beyond {allowed[0]} .. {allowed[-1]}", (names[0],))
@@ -243,7 +243,7 @@ def _whole(stamp: dict[str, Any], key: str) -> int:
 
 
 def whole_list(value: Any, what: str) -> list[Any]:
-    """Take a value for a list that was printed whole; the tools cut long ones unless told otherwise."""
+    """Return a value that must be a complete list; the tools truncate long ones by default."""
     if type(value) is str and re.fullmatch(_LEFT_OUT, value):
         raise Misfit(f"the numbers are not there, only {shown(value)}: record without --no-arr (--noarr)")
     if type(value) is not list:
@@ -254,7 +254,7 @@ def whole_list(value: Any, what: str) -> list[Any]:
 
 
 def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading) -> tuple[Vector, Quaternion]:
-    """Read position and rotation under the keys that a kind of message has for them."""
+    """Read position and rotation under the keys of a kind of message."""
     for key in keys:
         if key not in mapping:
             raise Misfit(f"missing {key}")
@@ -269,7 +269,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?|[-+]?(?:nan
 
 
 def is_joint_state(value: dict[str, Any]) -> bool:
-    """Return True if a mapping is a JointState: it names joints in a list."""
+    """Return True if a mapping is a JointState: it has a list of joint names."""
     return type(value.get("name")) is list or ("position" in value and "velocity" in value and "name" in value)
 
 
@@ -280,14 +280,14 @@ def stamp_of_state(value: dict[str, Any]) -> int | None:
 
 
 def positions(value: dict[str, Any]) -> Iterator[tuple[str, Any, Path]]:
-    """Yield the name of each joint, its position as written, and the path to that.
+    """Yield the name of each joint, its position as text, and the path to it.
 
     Raises Misfit.
     """
     names = within(("name",), whole_list, value["name"], "name as a list of joints")
     listed = within(("position",), whole_list, value.get("position", []), "position as a list of numbers")
     if not listed and names:
-        raise Misfit("a JointState without positions says of no joint where it stands", ("name",), key=True)
+        raise Misfit("a JointState without positions", ("name",), key=True)
     if len(names) != len(listed):
         raise Misfit(f"{len(names)} names and {len(listed)} positions; each joint has one", ("position",))
     for index, (name, position) in enumerate(zip(names, listed, strict=True)):
@@ -297,7 +297,7 @@ def positions(value: dict[str, Any]) -> Iterator[tuple[str, Any, Path]]:
 
 
 def position_of(joint: str, value: Any) -> Path | None:
-    """Return the path to the position of a joint below a JointState; None for what is none, or has no such joint."""
+    """Return the path to the position of a joint in a JointState; None for anything else, or without such a joint."""
     if type(value) is not dict or type(value.get("name")) is not list or joint not in value["name"]:
         return None
     index = value["name"].index(joint)
@@ -306,7 +306,7 @@ def position_of(joint: str, value: Any) -> Path | None:
 
 
 def of_numbered(message: dict[str, Any]) -> dict[str, Any]:
-    """Return the JointState of a row of `rostopic echo -p`, which numbers the entries of lists."""
+    """Return the JointState of a row of `rostopic echo -p`, which numbers the items of lists."""
     lists: dict[str, list[Any]] = {"name": [], "position": []}
     for key, value in message.items():
         if (match := _NUMBERED.fullmatch(key)) and int(match[2]) == len(lists[match[1]]):
@@ -329,12 +329,12 @@ def of_row(cells: Sequence[str]) -> dict[str, Any]:
 
 
 def looks_like_row(line: str) -> bool:
-    """Tell a row of `ros2 topic echo --csv` from a header of CSV."""
+    """Return True for a row of `ros2 topic echo --csv`, False for a header of CSV."""
     return re.match(r"-?\d+,\d+,[^,]*,[^,]*[A-Za-z_]", line) is not None
 
 
 def unquoted(line: str) -> list[str]:
-    """Cut a row that quotes nothing.
+    """Split a row without quotes.
 
     Raises Misfit for one with quotes.
     """

@@ -1,16 +1,16 @@
-"""What people paste from ROS tools: blocks of tf2_echo, arguments of publishers, parts of `rostopic echo`.
+"""Text pasted from ROS tools: blocks of tf2_echo, arguments of publishers, parts of `rostopic echo`.
 
     At time 1253924110.083                                            ROS 1 and tf_echo
     - Translation: [0.000, 0.000, 0.025]
     - Rotation: in Quaternion [0.000, 0.000, 0.000, 1.000]            ROS 2: in Quaternion (xyzw) [..]
                 in RPY (radian) [0.000, -0.000, 0.000]
     - Pose [ XYZ (m) ] [ RPY (rad) ]:                                 Gazebo's `gz model -m NAME -p`
-      [0.500000 -1.000000 2.000000]
-      [0.000000 -0.000000 1.570796]
+        [0.500000 -1.000000 2.000000]
+        [0.000000 -0.000000 1.570796]
     args="0 0 5 0 0 0 world odom 100"                                 x y z yaw pitch roll parent child ms
 
-All become text of the grammar of poses, and what `pasted_poses` knows with them.  Of a block the quaternion counts:
-its angles and its matrix say the same with as few digits.
+All are converted to text of the grammar of poses, together with `pasted_poses`.  Of a block the quaternion is used:
+its angles and its matrix are the same with as few digits.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
-_TRANSLATION = re.compile(r"(?m)^[ \t]*+(?:-\s+)?Translation:")  # a selection may begin behind the dash
+_TRANSLATION = re.compile(r"(?m)^[ \t]*+(?:-\s+)?Translation:")  # a selection may begin after the dash
 _TIME = re.compile(rf"(?m)^[ \t]*+At time ({NUMBER})")
 _HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
@@ -68,18 +68,18 @@ _BEGIN = re.compile(
 
 
 def may_be_pasted(text: str) -> bool:
-    """Tell by the beginning of a text whether it is worth looking for what people paste."""
+    """Return True if the beginning of a text may be a pasted print."""
     return bool(_BEGIN.match(text) or _TRANSLATION.search(text, 0, 4096)) or _mended(text) != text
 
 
 def in_grammar(
     source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
-    """Return a pasted text as text of the grammar, a value a line; None for what is none, or is grammar already.
+    """Return a pasted text as text of the grammar, one value per line; None if it is not one, or grammar already.
 
-    given: the notation of numbers that do not say theirs; normalize: accept any non-zero quaternion
+    given: the notation of numbers that do not state theirs; normalize: accept any non-zero quaternion
     points: three numbers are a point
-    Raises FormatError for what is known and cannot be taken.
+    Raises FormatError for a known print that cannot be read.
     """
     text = source.text
     if len(text) > MOST_PASTED or not may_be_pasted(text):
@@ -116,7 +116,7 @@ def _size(value: Any) -> tuple[int, int]:
 
 
 def _blocks(text: str) -> list[Any]:
-    """Read every block that tf2_echo printed; one may lack its position or its time."""
+    """Read all blocks printed by tf2_echo; a block may lack its position or its time."""
     begins = [match.start() for match in _TRANSLATION.finditer(text)]
     if not begins:
         return [value] if (value := _block(text)) else []
@@ -134,7 +134,7 @@ def _blocks(text: str) -> list[Any]:
 
 
 def _block(text: str) -> dict[str, Any]:
-    """Read position and rotation of one block; of several notations the first that is there."""
+    """Read position and rotation of one block; of several notations the first."""
     turned = next(((key, found) for key, heading in _ROTATIONS if (found := heading.search(text))), None)
     moved = _TRANSLATION.search(text)
     value: dict[str, Any] = {}
@@ -149,7 +149,7 @@ def _block(text: str) -> dict[str, Any]:
 
 
 def _stamp(seconds: str) -> int | None:
-    """Return the time of a block; 0 is that of a static one, and what has too many digits is left out."""
+    """Return the time of a block; 0 is that of a static one, and one with too many digits is omitted."""
     try:
         return parse_stamp(seconds)
     except ValueInvalid:
@@ -157,7 +157,7 @@ def _stamp(seconds: str) -> int | None:
 
 
 def _gazebo(text: str) -> list[Any]:
-    """Read the pose of a model; raises ValueInvalid where its links and their inertias are printed with it."""
+    """Read the pose of a model; raises ValueInvalid if its links and their inertias are printed with it."""
     found = _GAZEBO.findall(text)
     if len(found) > 1:
         raise ValueInvalid(f"Gazebo printed {len(found)} poses; `gz model -m NAME -p` prints the model's alone")
@@ -188,7 +188,7 @@ def _published(source: Source, *, normalize: bool) -> list[Any]:
 
 
 def _mended(text: str) -> str:
-    """Put back the blanks that a selection from the middle of a line has lost before its first word."""
+    """Restore the indentation that a selection from the middle of a line has lost before its first word."""
     first, newline, rest = text.partition("\n")
     lines = [line for line in rest.split("\n")[:200] if line.strip() and not line.startswith("---")]
     if not lines or not re.fullmatch(r"[A-Za-z_]\w*:( .*)?", first.rstrip()):

@@ -1,4 +1,4 @@
-"""The fast way through transforms as tools print them: one pattern for one transform.
+"""The fast path for transforms as tools print them: one pattern for one transform.
 
     transforms:                                                           ros2 topic echo, rostopic echo
     - header:
@@ -9,8 +9,8 @@
     {"transforms": [{"header": ..}, ..]}
     {"op": "publish", "topic": "/tf", "msg": {"transforms": [..]}}
 
-The patterns take plain numbers and plain names in the order of the message's definition, and nothing else: other
-messages are left to the full reader, so that both give the same records.
+The patterns match plain numbers and plain names in the order of the message's definition, and nothing else: other
+messages are left to the full reader, so that both return the same records.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ ROS1 = (
     .replace("header:", "header:\n      seq: [0-9]+") + "\n"
 )  # fmt: skip
 ECHO_GROUPS = {
-    ":\n": ": ?\n",  # rostopic leaves a blank where a block opens
+    ":\n": ": ?\n",  # rostopic writes a blank where a block opens
     "-\n": "- ?\n",
     "NUMBER": "([-+0-9.eE]+)",
     "WHOLE": " *([0-9]{1,20})",
@@ -74,21 +74,21 @@ TRANSFORMS = '{"transforms": LIST'
 JSON_GROUPS = {
     "{": r"\{",
     "}": r"\}",
-    ": ": ": ?",  # some tools leave the blanks behind colons and commas out
+    ": ": ": ?",  # some tools omit the blanks after colons and commas
     ", ": ", ?",
     "LIST": r"\[",
     "NUMBER": f"({JSON_NUMBER})",
     "WHOLE": "(0|[1-9][0-9]{0,19})",
-    "NAME": r'("[A-Za-z0-9_][\w/.+-]*")',  # a leading / is told of, with its place
+    "NAME": r'("[A-Za-z0-9_][\w/.+-]*")',  # a leading / is reported with its place
     "TOPIC": r'("/[\w/]+")',
 }
 
 
 class MessageLayout(NamedTuple):
-    """How a tool writes messages of transforms: the pattern of one transform, and of what stands around it.
+    """How a tool writes messages of transforms: the patterns of one transform, and of the text around it.
 
     opening: of a message, with a group if it names a topic; closing: of the last one; gap: between two transforms
-    lines: of one transform, 0 if a message is one line; first: which of them counts as its place
+    lines: of one transform, 0 if a message is one line; first: the line that counts as its place
     """
 
     opening: re.Pattern[str]
@@ -100,27 +100,27 @@ class MessageLayout(NamedTuple):
 
 
 def _pattern(layout: str, groups: Mapping[str, str]) -> str:
-    """Put patterns in the place of the words of a layout."""
+    """Replace the words of a layout by patterns."""
     for mark, group in groups.items():
         layout = layout.replace(mark, group)
     return layout
 
 
 def _layout(opening: str, entry: str, between: str, closing: str, *lines: int) -> MessageLayout:
-    """Make a layout from the patterns of its parts."""
+    """Return a layout made from the patterns of its parts."""
     gap, end = f"{between}|{closing}{opening}", f"{closing}|\\Z" if lines else closing
     first, each, inner, last = (re.compile(part, re.ASCII) for part in (opening, entry, gap, end))
     return MessageLayout(first, each, inner, last, *lines)
 
 
 def _echoed(entry: str) -> MessageLayout:
-    """Make the layout of documents that a tool prints."""
+    """Return the layout of documents printed by a tool."""
     opening, pattern = (_pattern(part, ECHO_GROUPS) for part in ("transforms:\n", entry))
     return _layout(opening, pattern, "", "---\n", entry.count("\n"), entry[: entry.index("header")].count("\n"))
 
 
 def _on_lines(opening: str, between: str, closing: str) -> list[MessageLayout]:
-    """Make the layouts of a kind of lines, in ROS 2 and in ROS 1."""
+    """Return the layouts of a kind of lines, in ROS 2 and in ROS 1."""
     entries = (JSON_FIELDS.replace("STAMP", stamp) for stamp in STAMPS)
     return [_layout(_pattern(opening, JSON_GROUPS), _pattern(each, JSON_GROUPS), between, closing) for each in entries]
 
@@ -132,14 +132,14 @@ LAYOUTS = (
     _on_lines("", "\n", "\n"),
 )
 ROS1_BEGINS = "  ", '{"header": {"seq"', '{"header":{"seq"'
-EACH = 12  # what `split` gives for a transform: the text before it, two parts of its stamp, two names, seven numbers
+EACH = 12  # items that `split` returns per transform: text, two parts of the stamp, two names, seven numbers
 
 
 def plain_columns(text: str, line: int, tally: Tally, *, normalize: bool = False) -> EdgeColumns | None:
-    """Return the edges of a text that begins on a line; None, and no notes, where not every message is plain.
+    """Return the edges of a text that begins on a line; None, and no warnings, if not every message is plain.
 
-    One `split` finds all transforms, and what is left between them tells whether anything else is there.
-    normalize: take any non-zero quaternion.
+    A single `split` finds all transforms, and the remaining text shows whether there is anything else.
+    normalize: accept any non-zero quaternion.
     """
     layouts, opened = next((row, match) for row in LAYOUTS if (match := row[0].opening.match(text)))
     layout = layouts[text.startswith(ROS1_BEGINS, opened.end())]
@@ -172,10 +172,10 @@ def plain_columns(text: str, line: int, tally: Tally, *, normalize: bool = False
 def _components(
     columns: Sequence[Sequence[str]], lines: Sequence[int], tally: Tally, *, normalize: bool
 ) -> list[Rigid] | None:
-    """Read tx, ty, tz, x, y, z, w of each row; None, and no notes, if one of them is refused."""
+    """Read tx, ty, tz, x, y, z, w of each row; None, and no warnings, if one of them is refused."""
     rough = len(tally.rough)
     found: list[Rigid] = []
-    with suppress(ValueError):  # of float
+    with suppress(ValueError):  # raised by float
         for row, line in zip(zip(*(map(float, column) for column in columns), strict=True), lines, strict=True):
             if (components := unit_components(row, line, tally, normalize)) is None:
                 break
@@ -189,7 +189,7 @@ def _components(
 def unit_components(numbers: Rigid, line: int, tally: Tally, normalize: bool) -> Rigid | None:  # noqa: FBT001 - fast
     """Return tx, ty, tz, x, y, z, w with a unit quaternion; None for numbers that every reader refuses.
 
-    normalize: take any non-zero quaternion.  The tally notes the line of one that was off.
+    normalize: accept any non-zero quaternion.  The tally records the line of one that was off.
     """
     tx, ty, tz, x, y, z, w = numbers
     squared = x * x + y * y + z * z + w * w

@@ -1,11 +1,11 @@
-"""The arguments of static_transform_publisher, one call a line: the pose of the child in its parent.
+"""The arguments of static_transform_publisher, one call per line: the pose of the child in its parent.
 
     --x 0.1 --y 0.0 --z 0.2 --qx 0.0 --qy 0.0 --qz 0.0 --qw 1.0 --frame-id base --child-frame-id camera      static2
     0.1 0.0 0.2 0.0 0.0 0.0 1.0 base camera                                                                  static1
 
-Metres and radians; quaternions x, y, z, w. Angles are --roll --pitch --yaw in the new spelling and yaw, pitch, roll
+Metres and radians; quaternions x, y, z, w. Angles are --roll --pitch --yaw in the new syntax and yaw, pitch, roll
 in the old one, about fixed axes. The old tf package has a period in ms at the end. `ros2 run tf2_ros
-static_transform_publisher` may stand before them.
+static_transform_publisher` may precede them.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _FORMS = "x y z qx qy qz qw PARENT CHILD, or x y z yaw pitch roll PARENT CHILD"
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one line a pose; it must say which frame it is in which, and no frame may have two poses.
+    """Return one line per pose; it must name both frames, and no frame may have two poses.
 
     Raises ValueInvalid.
     """
@@ -61,12 +61,12 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 
 def moving_frames(names: Iterable[str]) -> str:
-    """Return the sentence that frames have more than one pose."""
+    """Return the error that frames have more than one pose."""
     return f"frames move and cannot be published as static: {', '.join(names)}"
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return one line an edge."""
+    """Return one line per edge."""
     return "".join(
         f"{_line(Pose.of(transform.components, child, parent), style)}\n" for parent, child, transform in tree.edges()
     )
@@ -79,7 +79,7 @@ def _line(pose: Pose, style: Style) -> str:
         raise ValueInvalid(f"{CALL} needs the names of both frames; give name: and parent:")
     for name in (pose.parent, pose.name):
         if not name.isprintable() or (style.form == "static1" and any(map(str.isspace, name))):
-            raise ValueInvalid(f"frame {name!r} has no place in {style.form}: it could not be read back")
+            raise ValueInvalid(f"frame {name!r} cannot be written in {style.form}: it could not be read back")
     angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
     numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
     position = [style.number(value) for value in pose.components[:3]]
@@ -101,7 +101,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _calls(file: InputFile) -> Iterator[tuple[int, str]]:
-    """Yield the lines of a file with their numbers; one that ends in a backslash goes on in the next."""
+    """Yield the lines of a file with their numbers; a line that ends in a backslash continues in the next."""
     number, first, call = 0, 1, ""
     for piece in lines(file.stream, file.name):
         for line in re.split(r"\r\n|[\r\n]", piece.text.removesuffix("\n").removesuffix("\r")):
@@ -118,7 +118,7 @@ def _calls(file: InputFile) -> Iterator[tuple[int, str]]:
 def read_edge(
     arguments: str | Sequence[str], file: InputFile, options: Options, line: int, column: int = 0
 ) -> Edge | None:
-    """Read the arguments of one call, a line or its words; None if they are wrong and reading goes on behind them."""
+    """Read the arguments of one call, a line or its words; None if they are wrong and reading continues."""
     reading = Reading(Source(file.name, ""), normalize=options.normalize)
     try:
         pose = read_call(arguments, reading) if isinstance(arguments, str) else read_words(arguments, reading)
@@ -131,25 +131,25 @@ def read_edge(
 
 
 def read_call(line: str, reading: Reading) -> Pose:
-    """Read one call as a shell would take it apart.
+    """Read one call, split as by a shell.
 
     Raises ValueInvalid.
     """
     from shlex import split
 
-    # XML and YAML make a blank of the line's end
+    # XML and YAML replace the end of a line by a blank
     line = re.sub(r"""('[^']*'|"[^"]*")|\\(?:\r?\n|\Z)|(?<!\S)\\\s+""", lambda found: found[1] or " ", line)
     try:
-        words = split(line, comments=re.search(r"(?:^|\s)#", line) is not None)  # in a word it is part of it
+        words = split(line, comments=re.search(r"(?:^|\s)#", line) is not None)  # inside a word it is part of it
     except ValueError as error:
         raise ValueInvalid(f"a quote is not closed ({str(error).lower()})") from None
     return read_words(words, reading)
 
 
 def read_words(words: Sequence[str], reading: Reading) -> Pose:
-    """Read one call from its words: what stands before the tool's name, and what is said to ROS itself, is left out.
+    """Read one call from its words, without those before the tool's name and those for ROS itself.
 
-    Its numbers have no units of their own.
+    Its numbers have no units.
     Raises ValueInvalid.
     """
     reading.bare_numbers = True
@@ -161,14 +161,14 @@ def read_words(words: Sequence[str], reading: Reading) -> Pose:
         del words[words.index(ROS_ARGUMENTS) :]
     if words[-1:] == ["&"]:  # a script starts the tool in the background
         del words[-1]
-    words = [word for word in words if ":=" not in word]  # a remapping, as __name:=camera
+    words = [word for word in words if ":=" not in word]  # remappings such as __name:=camera
     if any(word.startswith("--") for word in words):
         return read_flags(_flags(words), reading)
     return read_positional(words, reading)
 
 
 def _flags(words: Sequence[str]) -> dict[str, str]:
-    """Pair flags and values, `--x 1` or `--x=1`."""
+    """Return the flags and their values, `--x 1` or `--x=1`."""
     found: dict[str, str] = {}
     rest = iter(words)
     for word in rest:
@@ -182,7 +182,7 @@ def _flags(words: Sequence[str]) -> dict[str, str]:
 
 
 def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
-    """Read the new spelling; what is missing is 0 or the identity."""
+    """Read the new syntax; missing values are 0 or the identity."""
     both = [name for name in (*QUATERNION, *RPY) if name in flags]
     if any(name in QUATERNION for name in both) and any(name in RPY for name in both):
         raise ValueInvalid(f"a quaternion and angles at once (--{', --'.join(both)}); keep one")
@@ -192,14 +192,14 @@ def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
     angles = any(name in RPY for name in both)
     rotation = [flags.get(name, "0") for name in RPY] if angles else [flags.get(name, "0") for name in QUATERNION]
     if not angles and "qw" not in flags:
-        rotation[3] = "1"  # the tool's default, also beside other components: refused below unless they are 0
+        rotation[3] = "1"  # the tool's default, also with other components: refused below unless they are 0
     numbers = [flags.get(name, "0") for name in XYZ]
     key = "rpy" if angles else "quaternion"
     return _pose(numbers, key, rotation, flags["frame-id"], flags["child-frame-id"], reading)
 
 
 def read_positional(words: Sequence[str], reading: Reading) -> Pose:
-    """Read the old spelling: 8 or 9 words, maybe a period in ms after them; a numeric seventh means a quaternion."""
+    """Read the old syntax: 8 or 9 words, with an optional period in ms; a numeric seventh means a quaternion."""
     angles = len(words) >= 7 and not _NUMBER.match(words[6])
     size = 6 if angles else 7
     if len(words) not in (size + 2, size + 3):

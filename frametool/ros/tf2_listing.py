@@ -1,4 +1,4 @@
-"""tf2's `all_frames_as_yaml`: for each frame its parent, who sent it, how often, and over which time.
+"""tf2's `all_frames_as_yaml`: for each frame its parent, publisher, rate, and time span.
 
     laser:
       parent: 'base_link'
@@ -31,7 +31,7 @@ _FACTS = ("rate", "buffer_length", "most_recent_transform")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a listing; how often each comes goes to the tally, the poses are none."""
+    """Yield the edges of a listing; their rates are recorded in the tally, there are no poses."""
     for entry in re.finditer(r"(?m)^(\S.*?):[ \t]*\r?\n((?:[ \t]+\S.*(?:\n|\Z))+)", file.text):
         facts = dict(re.findall(r"(?m)^\s*(\w+):[ \t]*(.*?)\s*$", entry[2]))
         child, parent = (options.tally.names.bare(each.strip("'\"")) for each in (entry[1], facts.get("parent", "")))

@@ -79,7 +79,7 @@ def _place_of(name: str, names: Sequence[str]) -> int:
     if name not in names:
         raise ValueInvalid(f"no column {shown(name)}{alternatives(name, names, 'columns')}")
     if names.count(name) > 1:
-        raise ValueInvalid(f"column {shown(name)} stands twice")
+        raise ValueInvalid(f"column {shown(name)} appears twice")
     return names.index(name)
 
 

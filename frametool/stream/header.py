@@ -142,7 +142,7 @@ class Header:
         places = tuple(spot[0] for spot in spots if spot)
         names = tuple(self.names[place] for place in places)
         twice = next((name for name in names if self.count[name] > 1), "")
-        wrong = f"column {twice} stands twice; choose by number with --columns" if twice else ""
+        wrong = f"column {twice} appears twice; choose by number with --columns" if twice else ""
         return Columns(places, names, *self.affixes.get(key, key), wrong=wrong, spots=tuple(spots))
 
     def is_plain(self, match: Columns) -> bool:
@@ -487,7 +487,7 @@ def named_pose(
     places = [place for word in spec.split(",") for place in places_named(word.strip(), numbers, width)]
     header = Header(names or [f"column {place + 1}" for place in range(width)])
     if twice := sorted(header.names[place] for place, count in Counter(places).items() if count > 1):
-        raise Misused(f"--columns: {', '.join(twice)} stands twice")
+        raise Misused(f"--columns: {', '.join(twice)} appears twice")
     if kind in SIX:
         return PoseColumns(_six(places, header.names, kind), None)
     count, rotation = _chosen_rotation(header, places, given)

@@ -237,7 +237,7 @@ def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
         if {"x", "y", "z"} <= {*twice}:
             hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
             raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")
-        raise Misused(f"--to: columns {', '.join(twice)} would stand twice")
+        raise Misused(f"--to: columns {', '.join(twice)} would appear twice")
     clash = sorted(set(new).intersection(kept))
     if clash:
-        raise Misused(f"columns {', '.join(clash)} would stand twice; name the new ones with --prefix")
+        raise Misused(f"columns {', '.join(clash)} would appear twice; name the new ones with --prefix")

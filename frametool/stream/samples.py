@@ -302,7 +302,7 @@ def _points(
             if given is None:
                 raise ValueInvalid(f"{place}: no {key}, the others have one")
             if (before := first.setdefault(given, place)) is not place:
-                raise ValueInvalid(f"{place}: {key} {shown(str(given))} stands twice, first at {before}")
+                raise ValueInvalid(f"{place}: {key} {shown(str(given))} appears twice, first at {before}")
     weights = None
     if any(each is not None for each in beside[WEIGHT]):
         weights = [_weight(each, place) for each, place in zip(beside[WEIGHT], places, strict=True)]

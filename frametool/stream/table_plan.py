@@ -288,7 +288,7 @@ def _place(name: str, names: Sequence[str], source: str) -> int:
     if name not in names:
         raise Misused(f"no column {shown(name)}{alternatives(name, names, 'columns')}", source=source, line=1)
     if names.count(name) > 1:
-        raise Misused(f"column {shown(name)} stands twice", source=source, line=1)
+        raise Misused(f"column {shown(name)} appears twice", source=source, line=1)
     return names.index(name)
 
 
@@ -370,7 +370,7 @@ def _several(
         columns[place] = Named(place, role)
     ours = [place for pose in poses for each in pose if each for place in each.places]
     if twice := sorted({table.name(place) for place in ours if ours.count(place) > 1}):
-        raise Misused(f"--columns: {', '.join(twice)} stands twice")
+        raise Misused(f"--columns: {', '.join(twice)} appears twice")
     first = 0
     for pose, shape, target in zip(poses, shapes, targets, strict=True):
         if request.notations or not _in_place(pose, shape, target, request._replace(poses=1)):

@@ -2,7 +2,7 @@
 
 Both sides read and write C-order float64 arrays; each time is the best of several, the sides taking turns.  Ratios are
 SciPy's time to ours, without and with an array for the result (`out=`); the goals are those for 1e6 rows and AVX-512.
-SciPy's SE(3) stands twice: reading and writing translations and quaternions, and its own 4x4 matrices.
+SciPy's SE(3) appears twice: reading and writing translations and quaternions, and its own 4x4 matrices.
 """
 
 from __future__ import annotations

@@ -275,7 +275,7 @@ WRONG = {
     ("lookup values.yaml a b", 1): "values.yaml:2:1: frame 'b' has two different poses in 'a': line 1 and line 2",
     ("lookup cycle.yaml a b", 1): "cycle.yaml:4:5: frames form a cycle: c <- a <- b <- c",
     ("lookup self.yaml a b", 1): "self.yaml:1:1: frame 'a' is its own parent",
-    ("lookup duplicate.yaml a b", 1): "duplicate.yaml:3:3: key 'b' stands twice; first at 2:3",
+    ("lookup duplicate.yaml a b", 1): "duplicate.yaml:3:3: key 'b' appears twice; first at 2:3",
     ("lookup keys.yaml a b", 1):
         "keys.yaml:1:22: unknown key 'xzy', did you mean 'xyz'?; a pose has xyz and one rotation: quaternion, xyzw, "
         "wxyz, rpy, euler, axis_angle, rotvec, matrix, mrp, six_d",

@@ -188,7 +188,7 @@ FIELD = ROS2.types["sensor_msgs/msg/PointField"]
         ({"point_step": 12}, "field 'intensity' ends at byte 18, a point has 12 (point_step)"),
         ({"fields": [FIELD("x", 0, 7, 1)]}, "no field y, z; fields: x"),
         ({"fields": [FIELD(name, 0, 9, 1) for name in "xyz"]}, "field 'x' has the datatype 9, known are 1 to 8"),
-        ({"fields": [FIELD(name, 0, 7, 1) for name in "xyzx"]}, "field 'x' stands twice"),
+        ({"fields": [FIELD(name, 0, 7, 1) for name in "xyzx"]}, "field 'x' appears twice"),
         ({"fields": [FIELD("x", 0, 7, 4_000_000_000)]}, "field 'x' ends at byte 16000000000, a point has 24 (point_step)"),
         ({"width": 4_000_000_000, "height": 4_000_000_000, "row_step": 0}, "points need"),
     ],

@@ -108,7 +108,7 @@ def test_without_the_extra_one_line_says_what_to_install(folder: Path, run: Run,
 @pytest.mark.parametrize("name", ["empty.mcap", "empty.bag", "empty.db3"])
 def test_an_empty_file_is_named_as_that(name: str, run: Run) -> None:
     done = run("record", name, "-o", "new.bag" if name == "empty.bag" else "new.mcap", files={name: b""})
-    assert (done.status, done.err) == (1, f"frametool: {name}: nothing in it: an empty file is no bag\n")
+    assert (done.status, done.err) == (1, f"frametool: {name}: nothing in it: an empty file is not a bag\n")
 
 
 def test_quiet_says_nothing(folder: Path, run: Run) -> None:

@@ -519,7 +519,7 @@ BAD_POINTS: tuple[tuple[str, str, str], ...] = (
     ("id,x,y,z\na,0,0,0\nb,1,0,0\n", FLAT, "2 matched points; 3 are needed, not on a line"),
     (LINE, FLAT, "the points lie on a line: the turn about it cannot be known"),
     (FOUR + "e,1,1,1\n", FOUR.replace("d,0,0,1", "d,0,0,-1") + "e,1,1,-1\n", "a mirror image fits"),
-    (FLAT + "a,1,1,1\n", FLAT, "a.csv:5: id 'a' stands twice, first at a.csv:2"),
+    (FLAT + "a,1,1,1\n", FLAT, "a.csv:5: id 'a' appears twice, first at a.csv:2"),
     (FLAT.replace("b,", ","), FLAT, "a.csv:3: no id, the others have one"),
     ("id,x,y,z,weight\na,0,0,0,1\nb,1,0,0,-2\nc,0,1,0,1\n", FLAT, "a.csv:3: weight is negative: -2"),
     ("id,x,y,z,weight\na,0,0,0,1\nb,1,0,0,x\nc,0,1,0,1\n", FLAT, "a.csv:3: weight: 'x' is not a number"),

@@ -63,9 +63,9 @@ READ = {
 }
 
 REFUSED = {
-    "a: 1\nb: {x: 1, x: 2}": "f:2:11: key 'x' stands twice; first at 2:5",
-    '{"a": {"b": 1,\n "b": 2}}': "f:2:2: key 'b' stands twice; first at 1:8",
-    "- {a: 1}\n- a: 1\n  b: 2\n  a: 3": "f:4:3: key 'a' stands twice; first at 2:3",
+    "a: 1\nb: {x: 1, x: 2}": "f:2:11: key 'x' appears twice; first at 2:5",
+    '{"a": {"b": 1,\n "b": 2}}': "f:2:2: key 'b' appears twice; first at 1:8",
+    "- {a: 1}\n- a: 1\n  b: 2\n  a: 3": "f:4:3: key 'a' appears twice; first at 2:3",
     "a:\n\tb: 1": "f:2:1: a tab cannot indent YAML; use blanks",
     "a: 1\n\tb: 2": "f:2:1: a tab cannot indent YAML; use blanks",
     "a: @x": "f:1:4: nothing can begin with '@' here; quote the name: \"@x\"",

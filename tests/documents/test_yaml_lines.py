@@ -74,7 +74,7 @@ def test_anything_else_is_left_to_the_parser(line: str, sizes: Sizes) -> None:
 
 def test_mistakes_before_such_a_list_are_told_where_they_are(sizes: Sizes) -> None:
     sizes(aside=0)
-    with pytest.raises(FormatError, match="f:2:1: key 'a' stands twice"):
+    with pytest.raises(FormatError, match="f:2:1: key 'a' appears twice"):
         parse_documents("a: 1\na: 2\nframes:\n  - {a: b}\n", "f")
 
 

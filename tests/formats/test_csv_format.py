@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def test_two_notations_that_need_one_column_are_refused(run: Run) -> None:
     outcome = run("convert", "{rpy: [1, 2, 3]}", "--to", "euler:rxyz,euler:rzxy", "-f", "csv")
     assert (outcome.status, outcome.out) == (1, "")
-    assert "columns euler_1, euler_2, euler_3 would stand twice" in outcome.err
+    assert "columns euler_1, euler_2, euler_3 would appear twice" in outcome.err
 
 
 def test_an_angle_that_the_notation_says_stands_once(run: Run) -> None:

@@ -456,7 +456,7 @@ def test_extrinsics_of_apollo_have_a_name(run: Callable[..., Any]) -> None:
 def test_an_empty_recording_is_empty_whatever_is_installed(run: Callable[..., Any], suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     done = run("tree", f"a.{suffix}", files={f"a.{suffix}": b""})
-    assert (done.status, done.err) == (1, f"frametool: a.{suffix}: nothing in it: an empty file is no bag\n")
+    assert (done.status, done.err) == (1, f"frametool: a.{suffix}: nothing in it: an empty file is not a bag\n")
 
 
 def test_a_cloud_without_y_has_no_points(run: Callable[..., Any]) -> None:

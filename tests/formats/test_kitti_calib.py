@@ -101,7 +101,7 @@ def test_frames_are_called_as_told(tmp_path: Path) -> None:
         ("Tr: ", "Tr: 1 ", "calib.txt:3:5: Tr: expected 12 numbers, found 13"),
         ("Tr: 0.0 -1.0", "Tr: 0.5 -1.0", "calib.txt:3:1: Tr: matrix is not a rotation"),
         ("Tr: 0.0 -1.0", "Tr: 0.0 1.0", "calib.txt:3:1: Tr: matrix has determinant -1: it is left-handed"),
-        ("P1", "P0", "calib.txt:2:1: P0 stands twice; first in line 1"),
+        ("P1", "P0", "calib.txt:2:1: P0 appears twice; first in line 1"),
         ("P1: 700.0", "P1: 0.0", "calib.txt:2:1: P1: the focal length 0 is not positive"),
         ("Tr:", "???", "calib.txt:3:1: expected NAME: numbers, found '???"),
     ],

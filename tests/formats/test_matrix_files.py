@@ -305,7 +305,7 @@ def test_what_is_wrong_is_one_line_with_its_place(tmp_path: Path, text: str, sai
         ("1.0</data>", "abc</data>", "7:3: 'abc' is not a number"),
         ("1.0</data>", "</data>", "7:3: expected 4 x 4 = 16 numbers, found 15"),
         ("</opencv_storage>", "", "not XML: it ends too early"),
-        ("<rows>4</rows>", "<rows>4</rows><rows>4</rows>", "key 'rows' stands twice"),
+        ("<rows>4</rows>", "<rows>4</rows><rows>4</rows>", "key 'rows' appears twice"),
         ("<rows>4</rows>", "<_>" * 200 + "</_>" * 200, "more than 100 elements inside one another"),
     ],
 )

@@ -292,7 +292,7 @@ def refusal(path: Path) -> str:
 @pytest.mark.parametrize("name", ["run.bag", "run.db3", "run.mcap"])
 def test_an_empty_bag_is_named_as_that(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(b"")
-    assert refusal(tmp_path / name) == "nothing in it: an empty file is no bag"
+    assert refusal(tmp_path / name) == "nothing in it: an empty file is not a bag"
 
 
 def test_a_comment_that_begins_as_a_bag_does_makes_no_bag(tmp_path: Path) -> None:
@@ -337,7 +337,7 @@ def test_seconds_of_ros1_are_not_negative(tmp_path: Path) -> None:
 def test_no_message_is_written_whose_stamp_no_message_can_hold() -> None:
     assert stamp(-1, "ros2") == {"sec": -1, "nanosec": 999_999_999}
     for form, stamp_ns in (("ros1", -1), ("ros1", 2**32 * 10**9), ("ros2", 2**63)):
-        with pytest.raises(ValueInvalid, match="has no place in ros"):
+        with pytest.raises(ValueInvalid, match="does not fit in ros"):
             stamp(stamp_ns, form)
 
 

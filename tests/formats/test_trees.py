@@ -140,8 +140,8 @@ REFUSED = {
     "{name: b, child: c, parent: a}": "0.yaml:1:8: name is 'b' and child is 'c'; keep one",
     "{name: b, parent: a, xyz: {x: 1, q: 2}}": "0.yaml:1:34: unknown key 'q'; expected x, y, z",
     "{name: b, parent: a, rpy: [1:30, 0, 0]}": "0.yaml:1:28: '1:30' is not a decimal number; base 60 is not read",
-    "{name: b, parent: a, rpy_deg: [pi, 0, 0]}": "0.yaml:1:32: 'pi' is in radians, but rpy_deg says degrees",
-    "{name: b, parent: a, rpy_rad: [90deg, 0, 0]}": "0.yaml:1:32: '90deg' is in degrees, but rpy_rad says radians",
+    "{name: b, parent: a, rpy_deg: [pi, 0, 0]}": "0.yaml:1:32: 'pi' is in radians, but rpy_deg is in degrees",
+    "{name: b, parent: a, rpy_rad: [90deg, 0, 0]}": "0.yaml:1:32: '90deg' is in degrees, but rpy_rad is in radians",
     "{name: b, parent: a, inverse: yes}": "0.yaml:1:31: inverse must be true or false, found 'yes'",
     "{name: b, parent: a, angles: grad}": "0.yaml:1:30: angles must be deg or rad, found 'grad'",
     "{name: b, parent: ~, xyz: [1, 2, 3]}":

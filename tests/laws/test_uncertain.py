@@ -259,7 +259,7 @@ def test_inverse_true_is_that_of_the_pose_as_it_is_written(run: Run, spelling: s
 
 def test_the_same_pose_twice_counts_as_two_and_that_is_told(run: Run) -> None:
     done = run("compose", "a.json", "inv(a.json)", files={"a.json": json.dumps(POSE | {"covariance": WHOLE})})
-    assert done.err == "frametool: warning: 'a.json' stands twice: the two count as independent, as all poses do\n"
+    assert done.err == "frametool: warning: 'a.json' appears twice: the two count as independent, as all poses do\n"
     assert run("compose", "a.json", "inv(a.json)", files={"a.json": json.dumps(POSE)}).err == ""
 
 

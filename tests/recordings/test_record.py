@@ -146,8 +146,8 @@ def test_an_edge_that_comes_again_and_again_is_replaced_in_every_message(tmp_pat
 
 BOTH = "{frames: [{name: lidar, parent: base_link, xyz: [1.5, 0, 0.5]}, {name: imu, parent: base_link, xyz: [0.1, 0.2, 0.3], rpy_deg: [0, 0, 92]}]}"
 REFUSED = {
-    NEW_LIDAR: "run: other values than in argument: base_link -> lidar on /tf_static (0.5 m and 0 deg off); --replace puts those of argument in",
-    BOTH: "run: other values than in argument: base_link -> lidar on /tf_static (0.5 m and 0 deg off), base_link -> imu on /tf_static (0 m and 2 deg off); --replace puts those of argument in",
+    NEW_LIDAR: "run: other values than in argument: base_link -> lidar on /tf_static (0.5 m and 0 deg off); --replace uses those of argument",
+    BOTH: "run: other values than in argument: base_link -> lidar on /tf_static (0.5 m and 0 deg off), base_link -> imu on /tf_static (0 m and 2 deg off); --replace uses those of argument",
     "{name: lidar, parent: odom, xyz: [1, 0, 0]}": "frame 'lidar' has two parents: 'base_link' (run, /tf_static) and 'odom' (argument)",
     "{name: base_link, parent: odom, xyz: [1, 0, 0]}": "frame 'base_link': it moves in 'odom' (run, /tf) and is static in it (argument)",
     "{name: odom, parent: lidar, xyz: [1, 0, 0]}": "frames form a cycle: odom <- base_link <- lidar <- odom",

@@ -198,8 +198,8 @@ WRONG = {
     "empty": (1, f"{AT}: its header names no frame"),
     "zero": (1, ", stamp 1700000000.000000000: quaternion 0 0 0 0 has no direction; give a non-zero one"),
     "nan": (1, ", stamp 1700000000.000000000: its position is not finite"),
-    "short": (1, ": its bytes are no geometry_msgs/msg/PoseStamped"),
-    "long": (1, ": its bytes are no geometry_msgs/msg/PoseStamped"),
+    "short": (1, ": its bytes are not a geometry_msgs/msg/PoseStamped"),
+    "long": (1, ": its bytes are not a geometry_msgs/msg/PoseStamped"),
 }
 
 

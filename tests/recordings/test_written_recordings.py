@@ -115,11 +115,11 @@ def test_stamps_before_1970_have_a_place_in_ros_2_only(run: Run, tmp_path: Path)
     assert (logged, message.header.stamp.sec, message.header.stamp.nanosec) == (0, -2, 500_000_000)
     done = run("convert", "-i", "w.tum", "-o", "w.bag")
     assert (done.status, (tmp_path / "w.bag").exists()) == (1, False)
-    assert done.err.endswith("stamp -1.500000000 has no place in bag1, whose seconds are 0 .. 4294967295\n")
+    assert done.err.endswith("stamp -1.500000000 does not fit in bag1, whose seconds are 0 .. 4294967295\n")
     late = as_tum([2**31 * 10**9], [[1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]])
     assert run("convert", "-i", "l.tum", "-o", "l.bag", files={"l.tum": late}).status == 0
     done = run("convert", "-i", "l.tum", "-o", "l.mcap")
-    assert done.err.endswith("stamp 2147483648.000000000 has no place in mcap, whose seconds are -2147483648 .. 2147483647\n")
+    assert done.err.endswith("stamp 2147483648.000000000 does not fit in mcap, whose seconds are -2147483648 .. 2147483647\n")
 
 
 def test_a_tree_of_2038_and_later_has_a_place_in_ros_1(run: Run) -> None:
@@ -228,7 +228,7 @@ def test_points_with_stamps_become_points_of_their_frame(run: Run, tmp_path: Pat
     (["convert", "-i", "k.txt", "--in", "kitti", "--quiet", "-o", "w.mcap"], 1, "mcap: the rows have no stamps, and messages need them; `convert --stamps FILE` says them, one a line\n"),
     (["convert", "-i", "v.jsonl", "-o", "w.mcap"], 1, "mcap is not written of rows of a vector; write csv, json or yaml\n"),
     (["convert", "-i", "v.csv", "-o", "w.mcap", "--as", "twist"], 2, "convert: no such option '--as'"),
-    (["tree", "t.yaml", "-o", "t.mcap", "--topic-out", "/a"], 1, "the tree stands and moves, on two topics; /a names one\n"),
+    (["tree", "t.yaml", "-o", "t.mcap", "--topic-out", "/a"], 1, "the tree has static and moving frames, on two topics; /a names one\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", "w.tum"], 5, "w.tum: exists; give --force to replace it\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", "w.tum", "--force"], 5, "w.tum: is a file; a folder is to be written there\n"),
     (["convert", "-i", "w.tum", "-f", "bag2", "-o", ".", "--force"], 5, ".: holds more than a bag ('k.txt'); it is not replaced\n"),
@@ -331,5 +331,5 @@ def test_a_bag_that_finds_no_room_is_one_line_and_leaves_nothing(tmp_path: Path)
 
 
 def test_a_name_that_is_no_text_is_refused() -> None:
-    with pytest.raises(ValueInvalid, match="is no name that can be written"):
+    with pytest.raises(ValueInvalid, match="is not a name that can be written"):
         MessageTemplate(KINDS["tf"], "mcap", "\udc80", "b")

@@ -82,7 +82,7 @@ def test_what_the_tool_would_guess_is_refused(line: str, message: str) -> None:
 )
 def test_a_name_that_cannot_be_read_back_is_not_written(name: str, form: str) -> None:
     pose = Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), name, "map")
-    with pytest.raises(ValueInvalid, match=f"has no place in {form}: it could not be read back"):
+    with pytest.raises(ValueInvalid, match=f"cannot be written in {form}: it could not be read back"):
         write_poses([Result(pose)], Style(form))
 
 

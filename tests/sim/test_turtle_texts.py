@@ -160,7 +160,7 @@ def test_a_list_of_turtles_and_a_leader_file_beside_the_scene_are_read(tmp_path:
         ("turtles:\n  a:\n  b: {follow: a, rate: 0}\n", "s.yaml:3:24: rate must be"),
         ("turtles:\n  a: {spawn: [1, x]}\n", "s.yaml:2:18: 'x' is not a number"),
         ("turtles:\n  a: {spawn: 3}\n", "s.yaml:2:14: expected [x, y, theta], found '3'"),
-        ("turtles:\n  a:\n  a:\n", "s.yaml:3:3: key 'a' stands twice"),
+        ("turtles:\n  a:\n  a:\n", "s.yaml:3:3: key 'a' appears twice"),
         ("turtles:\n- {name: a}\n- {name: a}\n", "s.yaml:3:10: A turtle named [a] already exists"),
         ("turtles:\n- {spawn: [1, 1]}\n", "s.yaml:2:3: missing name"),
         ("turtles:\n  world:\n", "s.yaml:2:3: a turtle cannot be called 'world'"),

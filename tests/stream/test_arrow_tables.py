@@ -158,7 +158,7 @@ def test_a_column_that_may_hold_no_null_gets_none() -> None:
 
 def test_a_column_that_stands_twice_is_refused() -> None:
     data = pa.Table.from_arrays([pa.array([1.0])] * 4, names=["x", "y", "z", "x"])
-    with pytest.raises(frametool.FrametoolError, match="column 'x' stands twice"):
+    with pytest.raises(frametool.FrametoolError, match="column 'x' appears twice"):
         frametool.apply_arrow(data, MOVER)
 
 

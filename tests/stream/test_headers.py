@@ -182,7 +182,7 @@ def test_a_quote_within_a_name_is_told_and_loses_no_row() -> None:
 @pytest.mark.parametrize("size", [0, 20])
 def test_names_that_stand_twice_matter_only_where_they_are_used(size: int) -> None:
     assert flow(b"tag,x,y,z,tag\na,1,2,3,b\n", MOVE, size=size).text == b"tag,x,y,z,tag\na,-1.0,3.0,6.0,b\n"
-    assert "column x stands twice" in flow(b"x,y,z,x\n1,2,3,4\n", MOVE, size=size).told[0]
+    assert "column x appears twice" in flow(b"x,y,z,x\n1,2,3,4\n", MOVE, size=size).told[0]
 
 
 def test_an_angle_that_stands_twice_is_the_one_beside_its_axis() -> None:

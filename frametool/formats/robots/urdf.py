@@ -302,7 +302,7 @@ def _numbers(values: Sequence[float], style: Style) -> str:
 def _attribute(name: str) -> str:
     """Write a name as the value of an attribute."""
     if "${" in name or "$(" in name:
-        raise ValueInvalid(f"frame {shown(name)} has no place in URDF: it reads as xacro")
+        raise ValueInvalid(f"frame {shown(name)} cannot be written in URDF: it reads as xacro")
     if any((ord(letter) < 32 and letter not in _ESCAPES) or letter in "\ufffe\uffff" for letter in name):
-        raise ValueInvalid(f"frame {shown(name)} has no place in URDF: XML has no such characters")
+        raise ValueInvalid(f"frame {shown(name)} cannot be written in URDF: XML has no such characters")
     return "".join(_ESCAPES.get(letter, letter) for letter in name)

@@ -139,7 +139,7 @@ def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] 
 def type_in(form: str, codes: Mapping[str, Code], column: OutColumn, taken: Collection[str] = ()) -> Code:
     """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold."""
     if (reason := misfit_of(codes, column, taken)) or column.kind is None:
-        raise ValueInvalid(f"column {shown(column.name)} has no place in {form}: {reason}")
+        raise ValueInvalid(f"column {shown(column.name)} does not fit in {form}: {reason}")
     return codes[column.kind.str[1:]]
 
 

@@ -59,7 +59,7 @@ def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
         columns, numbers = pose_numbers(pose, notation, style)
         rotation = dict(zip(columns, numbers, strict=True))
         if twice := [name for name in rotation if cells.get(name, rotation[name]) != rotation[name]]:
-            raise ValueInvalid(f"columns {', '.join(twice)} would stand twice; write json or yaml, or one --to at once")
+            raise ValueInvalid(f"columns {', '.join(twice)} would appear twice; write json or yaml, or a single --to")
         cells |= rotation
     if isinstance(result, NoResult):
         cells |= dict.fromkeys(cells.keys() - NAMES)

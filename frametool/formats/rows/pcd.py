@@ -146,7 +146,7 @@ class PcdHead:
             if (key := words[0].upper()) not in _KEYS:
                 raise fail(f"{shown(words[0])} is no key of a PCD header; keys: {listing(_KEYS)}")
             if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
-                raise fail(f"{key} stands twice, first on line {self.lines[key]}")
+                raise fail(f"{key} appears twice, first on line {self.lines[key]}")
             self.lines[key], self.words[key] = len(text), words[1:]
             if key == "DATA":
                 break
@@ -169,7 +169,7 @@ class PcdHead:
             raise self.problem("FIELDS", "FIELDS names no field")
         for name, times in Counter(names).items():
             if name != PADDING and times > 1:
-                raise self.problem("FIELDS", f"field {shown(name)} stands twice")
+                raise self.problem("FIELDS", f"field {shown(name)} appears twice")
         fields = tuple(self._field(*words) for words in zip(names, *found, strict=True))
         if sum(field.values for field in fields) > _WIDEST:
             raise self.problem("COUNT", f"more than {_WIDEST} values a point")

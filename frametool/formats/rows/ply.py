@@ -112,7 +112,7 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
                 count = clouds.count_in(words[2], f"{shown(words[2])} of element {shown(words[1])}", fail)
                 element = PlyElement(words[1], count, len(text), {})
                 if elements.setdefault(element.name, element) is not element:
-                    raise fail(f"element {shown(element.name)} stands twice")
+                    raise fail(f"element {shown(element.name)} appears twice")
             case "property":
                 if not elements:
                     raise fail("a property before the first element")
@@ -135,7 +135,7 @@ def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None
         if each not in TYPES:
             raise fail(f"{shown(each)} is no type; types: {', '.join(TYPES)}")
     if name in element.properties:
-        raise fail(f"property {shown(name)} of {shown(element.name)} stands twice")
+        raise fail(f"property {shown(name)} of {shown(element.name)} appears twice")
     codes = [TYPES[each] for each in types]
     if is_list and codes[0][0] == "f":
         raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")

@@ -111,7 +111,7 @@ class Calibration:
         if name in _NO_NUMBERS:
             return
         if name in self.fields:
-            raise line_error(self.file, line, 1, f"{name} stands twice; first in line {self.fields[name].line}")
+            raise line_error(self.file, line, 1, f"{name} appears twice; first in line {self.fields[name].line}")
         words = list(re.finditer(r"\S+", match[3]))
         numbers = []
         for word in words:

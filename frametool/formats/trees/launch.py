@@ -48,7 +48,7 @@ def write_tree(tree: Frames, style: Style) -> str:
     lines = publisher.write_tree(tree, style.in_form("static2")).splitlines()
     if unsafe := next((line for line in lines if "$(" in line), None):
         names = unsafe[unsafe.index("--frame-id") :]
-        raise ValueInvalid(f"a frame name with $( has no place in a launch file: {shown(names)}")
+        raise ValueInvalid(f"a frame name with $( cannot be written in a launch file: {shown(names)}")
     node = f'  <node pkg="tf2_ros" exec="{publisher.CALL}" args="{{}}"/>\n'
     return f"<launch>\n{''.join(node.format(escape(line)) for line in lines)}</launch>\n"
 

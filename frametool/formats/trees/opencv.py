@@ -108,7 +108,7 @@ class StoredXml:
             if element.depth > DEEPEST:
                 raise self.xml.error(element, f"more than {DEEPEST} elements inside one another")
             if element.tag in found:
-                raise self.xml.error(element, f"key {element.tag!r} stands twice")
+                raise self.xml.error(element, f"key {element.tag!r} appears twice")
             value = self._inside(elements, here)
             if element.tag == "_":
                 items.append(value)
