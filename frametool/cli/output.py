@@ -80,7 +80,7 @@ class Output:
         digits = inputs.peek("precision")
         self.style = Style(
             form, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
-            full=digits == FULL, keep_sign=bool(inputs.keep_sign),
+            full=digits is not None, keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
         self.style.screen = form == "text" and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)

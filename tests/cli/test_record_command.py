@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 pytest.importorskip("rosbags")
+import make_recording
+import make_trajectories
 from recorded import SECOND, START, Maker, Sent, read, write
 
 if TYPE_CHECKING:
@@ -180,3 +182,9 @@ def test_a_dot_is_the_tree_of_the_environment(folder: Path, run: Run, monkeypatc
     monkeypatch.setenv("FRAMETOOL_TREE", "tree.yaml")
     done = run("record", str(folder / "run.mcap"), "--with", ".", "-o", "new.mcap")
     assert (done.status, done.err) == (0, f"frametool: {folder / 'run.mcap'}: added on /tf_static: base -> camera\n")
+
+
+def test_the_example_is_what_its_script_makes(tmp_path: Path) -> None:
+    made, kept = (read(path) for path in (write(tmp_path / "run", "mcap", make_recording.messages()), make_trajectories.FOLDER / "run.mcap"))
+    assert [(each.topic, each.kind, each.log_ns, len(each.data)) for each in made] == [(each.topic, each.kind, each.log_ns, len(each.data)) for each in kept]
+    assert (make_trajectories.FOLDER / "run.mcap").stat().st_size < 100_000

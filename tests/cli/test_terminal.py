@@ -130,6 +130,8 @@ def test_a_terminal_shows_nine_digits_and_no_rounding_errors(folder: Path, argum
     assert ("\x1b[2m0.0\x1b[0m" in text) == (" 0.0" in f" {expected}".replace("\n", " "))  # zeros are dim
     exact = seen(folder, *arguments, *(("--precision", "full") if arguments[0] != "calc" else ()), NO_COLOR="1")
     piped = subprocess.run([sys.executable, "-m", "frametool", *arguments, "-f", "text"], cwd=folder, capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT)}).stdout
+    if arguments[-1] == "matrix":
+        assert "0.866025403784 " in seen(folder, *arguments, "--precision", "12", NO_COLOR="1")
     longest = [max(map(len, re.findall(r"\d+\.\d+", each))) for each in (exact, piped)]
     assert all(each > 12 for each in longest[arguments[0] == "calc" :])
 

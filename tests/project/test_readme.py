@@ -63,10 +63,6 @@ def test_a_readme_example_prints_what_the_readme_shows(command: str, output: str
 
 @pytest.mark.parametrize(("name", "command"), HELP_EXAMPLES, ids=[command for _, command in HELP_EXAMPLES])
 def test_an_example_in_a_help_runs(name: str, command: str, examples_folder: Path) -> None:
-    if name == "record":  # the recordings are anybody's own
-        from recorded import write_those_of_the_help
-
-        write_those_of_the_help(examples_folder)
     done = run_line(command, examples_folder, pipefail=True)
     differs = {1} if command.startswith("sed") and name == "diff" else set()
     assert done.status in {0} | differs, done.err

@@ -17,7 +17,9 @@ def section() -> Section:
 
 def _text(name: str) -> str:
     parts = [f"`frametool examples {name}` prints this file."]
-    if name.endswith((".svg", ".png")):
+    if name.endswith(".mcap"):
+        parts = [f"`frametool examples {name} -o {name}` copies this recording, `frametool tree {name}` draws its frames."]
+    elif name.endswith((".svg", ".png")):
         parts.append(f"![{name}]({name})")
     else:
         lines = (EXAMPLES / name).read_text("utf-8").splitlines()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1 import Writer as Writer1
@@ -136,24 +135,3 @@ def read(path: Path) -> list[Recorded]:
             Recorded(each.topic, each.msgtype, each.msgdef.data, (each.digest, each.ext), log_ns, bytes(data))
             for each, log_ns, data in reader.messages()
         ]
-
-
-def write_those_of_the_help(folder: Path) -> None:
-    """Write what the examples of `frametool record --help` name."""
-    still = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    for form, name in (("mcap", "run.mcap"), ("bag", "run.bag")):
-        made, odometry = Maker(form), "nav_msgs/msg/Odometry"
-        sent = [Sent("/tf_static", *made.transforms(("base_link", "lidar", still, START)), START)]
-        for at in range(30):
-            log_ns, numbers = START + at * SECOND, (float(at), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-            zero = made.part("Vector3", 0.0, 0.0, 0.0)
-            posed = made.part("PoseWithCovariance", made.posed(numbers), np.zeros(36))
-            twist = made.part("TwistWithCovariance", made.part("Twist", zero, zero), np.zeros(36))
-            moved = made.part(odometry, made.header("odom", log_ns), "base_link", posed, twist)
-            sent += [
-                Sent("/tf", *made.transforms(("map", "odom", still, log_ns), ("odom", "base_link", numbers, log_ns)), log_ns),
-                Sent("/pose", *made.pose("odom", log_ns, numbers), log_ns), Sent("/odom", odometry, moved, log_ns),
-            ]  # fmt: skip
-        write(folder / form, form, sent).rename(folder / name)
-    (folder / "extrinsics.yaml").write_text("{name: camera, parent: base_link, xyz: [0.1, 0, 0.3], rpy_deg: [-90, 0, -90]}")
-    (folder / "calibration.yaml").write_text("{name: lidar, parent: base_link, xyz: [1.01, 0, 0]}")

@@ -59,9 +59,9 @@ def command(inputs: Inputs) -> int:
     """Copy RECORDING with something changed; all other messages stay as they are.
 
     \b
-      frametool record run.mcap --with extrinsics.yaml -o fixed.mcap
-      frametool record run.bag --with calibration.yaml --replace -o new.bag
-      frametool record run.mcap --into map --topic /pose --topic /odom -o new.mcap
+      frametool record run.mcap --with camchain.yaml -o fixed.mcap
+      frametool record run.mcap --with sensors_calibration.yaml --replace -o b.mcap
+      frametool record run.mcap --into map --topic /pose --topic /odom -o map.mcap
       frametool record run.mcap --between 1700000010,1700000020 -o part.mcap
 
     --with adds the edges of a tree, in any form, that are missing: one message on /tf_static that comes first. An edge
