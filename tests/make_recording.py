@@ -2,7 +2,7 @@
 
     python tests/make_recording.py             # writes examples/run.mcap
 
-/tf_static  base_link -> imu, and base_link -> roof_kit_base_link as it was before sensors_calibration.yaml
+/tf_static  base_link -> imu, as it was before calibration.yaml
 /tf         map -> odom at 1 Hz, odom -> base_link at 5 Hz
 /odom       at 1 Hz, in odom;  /pose the same as PoseStamped;  /fix positions of the antenna at 1 Hz
 """
@@ -24,7 +24,6 @@ from frametool.earth import earth_pose, lla_from_ecef
 
 ODOM = Transform(Rotation.from_rpy([0.0, 0.0, 0.5]), [12.0, -3.0, 0.0])  # map<-odom
 IMU = (0.1, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0)
-ROOF = (0.84, 0.01, 2.04, 0.0, 0.0, 0.0, 1.0)
 ECEF = earth_pose(48.1, 11.5, 520.0)  # ecef<-map
 ODOMETRY, FIX = "nav_msgs/msg/Odometry", "sensor_msgs/msg/NavSatFix"
 
@@ -32,7 +31,7 @@ ODOMETRY, FIX = "nav_msgs/msg/Odometry", "sensor_msgs/msg/NavSatFix"
 def messages() -> list[Sent]:
     """Return the messages in the order of their times."""
     made = Maker("mcap")
-    sent = [Sent("/tf_static", *made.transforms(("base_link", "imu", IMU, START), ("base_link", "roof_kit_base_link", ROOF, START)), START)]
+    sent = [Sent("/tf_static", *made.transforms(("base_link", "imu", IMU, START)), START)]
     seconds = np.arange(0.0, SECONDS, 0.2)
     path = truth(seconds)
     path = path[0].inverse() @ path

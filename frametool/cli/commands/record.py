@@ -60,7 +60,7 @@ def command(inputs: Inputs) -> int:
 
     \b
       frametool record run.mcap --with camchain.yaml -o fixed.mcap
-      frametool record run.mcap --with sensors_calibration.yaml --replace -o b.mcap
+      frametool record run.mcap --with calibration.yaml --replace -o new.mcap
       frametool record run.mcap --into map --topic /pose --topic /odom -o map.mcap
       frametool record run.mcap --between 1700000010,1700000020 -o part.mcap
 
