@@ -189,7 +189,7 @@ def test_solids_are_drawn_under_the_frames_and_many_faces_only_if_asked_for(run:
     is_little = tab.evaluate("window.solids.FACES.length") <= 2000
     painted = []
     for _ in range(2):
-        painted.append(tab.evaluate(PAINTED) > 0.2)
+        painted.append(tab.evaluate(PAINTED) > 0.1)
         tab.click("#tools button:text-is('solids')")
     assert (is_little, painted) == ((True, [True, False]) if count == 8 else (False, [False, True]))
     tab.close()
