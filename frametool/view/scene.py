@@ -282,6 +282,8 @@ AXIS_PART = 0.55  # of the usual distance between a frame and its parent
 USUAL_LINK = 0.5  # metres, where there is none
 LEAST = 1e-9  # metres; below, frames lie on one point
 SPOT = 0.12  # of the picture: a small part of it
+# frames lie together within REACH times the distance that NEAR_PART of them keep, if one is VERY_FAR times as far
+REACH, NEAR_PART, VERY_FAR, FEWEST = 2.5, 0.7, 4.0, 4
 
 
 class Flat(NamedTuple):
@@ -318,8 +320,10 @@ class Projection:
     view: the directions right, up and toward the eye
     """
 
-    def __init__(self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED) -> None:
-        """Fit all that is drawn into the picture."""
+    def __init__(
+        self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED, *, most: bool = False
+    ) -> None:
+        """Fit all that is drawn into the picture; most: only what lies together, where a few frames are far away."""
         self.scene, self.size = scene, size
         sa, ca, se, ce = (function(angle) for angle in eye for function in (math.sin, math.cos))
         self.view = (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
@@ -329,8 +333,10 @@ class Projection:
         lengths = sorted(math.dist(self.poses[parent][:3], self.poses[name][:3]) for parent, name in self.links)
         lengths = [length for length in lengths if length > LEAST]
         usual = lengths[len(lengths) // 2] if lengths else USUAL_LINK
-        self.low, self.high = _bounds(self._points())
-        flat = [self.turned(point) for point in self._points()]
+        fitted = self._together() if most else [*self._points()]
+        self.low, self.high = _bounds(fitted)
+        self.centre = [(low + high) / 2.0 for low, high in zip(self.low, self.high, strict=True)]
+        flat = [self.turned(point) for point in fitted]
         (left, down, _), (right, up, _) = _bounds(flat)
         self.middle = (left + right) / 2.0, (down + up) / 2.0
         room = [max(pixels - 2.0 * size.margin, 0.2 * pixels) for pixels in size[:2]]
@@ -340,8 +346,8 @@ class Projection:
             0.4 * min(size[:2]) / (AXIS_PART * usual),  # one frame alone is not blown up
         )
         self.origins = {name: self.at(pose[:3]) for name, pose in self.poses.items()}
-        least, most = (pixels / self.scale for pixels in size.axes)
-        self.axis = min(max(AXIS_PART * usual, least), most)
+        shortest, longest = (pixels / self.scale for pixels in size.axes)
+        self.axis = min(max(AXIS_PART * usual, shortest), longest)
 
     def _points(self) -> Iterator[Point]:
         for x, y, z, *_ in self.poses.values():
@@ -349,6 +355,21 @@ class Projection:
         for trail in self.trails:
             for stretch in trail.stretches:
                 yield from stretch
+
+    def _together(self) -> list[Point]:
+        """Return the places of the frames that are not far from most, or all points where none is."""
+        places = [pose[:3] for pose in self.poses.values()]
+        middle = [sorted(column)[len(places) // 2] for column in zip(*places, strict=True)]
+        away = sorted(math.dist(place, middle) for place in places)
+        reach = REACH * away[int(NEAR_PART * (len(away) - 1))] if len(away) >= FEWEST else 0.0
+        if reach > 0.0 and away[-1] > VERY_FAR * reach:
+            return [(x, y, z) for x, y, z in places if math.dist((x, y, z), middle) <= reach]
+        return [*self._points()]
+
+    def outside(self) -> list[str]:
+        """Return the frames beyond the edges of the picture."""
+        return [name for name, (x, y, _) in self.origins.items()
+                if not (0.0 <= x < self.size.width and 0.0 <= y < self.size.height)]  # fmt: skip
 
     def turned(self, point: Sequence[float]) -> Point:
         """Return metres to the right, up, and toward the eye."""

@@ -92,8 +92,10 @@ class Canvas:
 
 LINK, TRAIL, AXIS = range(3)  # ranks of dots
 AXES = ("red", "green", "blue")
+ARROWS = "→↗↑↖←↙↓↘"
 LEAST_LINES, LEAST_COLUMNS = 4, 20
 SAME = 3.0  # dots within which frames share a name
+MOST_OUTSIDE = 12  # frames that are pointed to
 
 
 class TerminalPicture:
@@ -103,10 +105,13 @@ class TerminalPicture:
         """Draw it."""
         self._canvas = Canvas(max(lines, LEAST_LINES) - 1, max(columns, LEAST_COLUMNS))
         wide, high = 2.0 * self._canvas.columns, 4.0 * self._canvas.lines
-        self._flat = Projection(scene, Size(wide, high, min(14.0, wide / 8.0, high / 8.0), (6.0, 14.0)), eye)
+        self._flat = Projection(scene, Size(wide, high, min(14.0, wide / 8.0, high / 8.0), (6.0, 14.0)), eye, most=True)
         self._names: dict[Spot, Run] = {}  # letter by letter
         self._draw()
-        hidden = sum(not self._place(place, names) for place, names in self._flat.groups(SAME))
+        outside = self._flat.outside()
+        pointed = sum(map(self._point_to, outside[:MOST_OUTSIDE]))
+        groups = [(place, [name for name in names if name not in outside]) for place, names in self._flat.groups(SAME)]
+        hidden = len(outside) - pointed + sum(bool(names) and not self._place(place, names) for place, names in groups)
         self._scale = self._scale_line(eye, hidden)
 
     def lines(self) -> Iterator[list[Run]]:
@@ -135,12 +140,22 @@ class TerminalPicture:
                 self._line(flat.origins[name], tips[axis], AXES[axis], AXIS)
 
     def _line(self, begin: Flat, end: Flat, colour: str, rank: int, gap: int = 1) -> None:
-        """Set every dot, or every second, third, .. between two places."""
-        count = max(1, math.ceil(max(abs(end.x - begin.x), abs(end.y - begin.y))))
+        """Set every dot, or every second, third, .. between two places; of what leaves the picture only its begin."""
+        if not self._is_inside(begin):
+            begin, end = end, begin
+        if not self._is_inside(begin):
+            return
+        far = max(abs(end.x - begin.x), abs(end.y - begin.y))
+        part = min(1.0, 4.0 * (self._canvas.columns + self._canvas.lines) / max(far, 1.0))
+        end = Flat(begin.x + part * (end.x - begin.x), begin.y + part * (end.y - begin.y), 0.0)
+        count = max(1, math.ceil(part * far))
         for number in range(0, count + 1, gap):
             part = number / count
             across, down = (a + (b - a) * part for a, b in zip(begin[:2], end[:2], strict=True))
             self._canvas.mark(math.floor(across), math.floor(down), colour, rank)
+
+    def _is_inside(self, place: Flat) -> bool:
+        return 0.0 <= place.x < 2.0 * self._canvas.columns and 0.0 <= place.y < 4.0 * self._canvas.lines
 
     def _place(self, place: Flat, names: list[str]) -> bool:
         """Write a name where it covers no other and, if that can be, no axis; False where there is no room."""
@@ -151,6 +166,25 @@ class TerminalPicture:
             found = best_spot(spots, self._is_taken, self._is_on_axes)
             if found:
                 self._names |= zip(found[1:-1], ((letter, "bold") for letter in letters), strict=True)
+                return True
+        return False
+
+    def _point_to(self, name: str) -> bool:
+        """Point at the edge to a frame beyond it, with its distance; False where there is no room."""
+        x, y, _ = self._flat.origins[name]
+        across, down = x - self._canvas.columns, y - 2.0 * self._canvas.lines
+        arrow = ARROWS[round(math.atan2(-down, across) / (math.pi / 4.0)) % 8]
+        away = math.dist(self._flat.poses[name][:3], self._flat.centre)
+        said = f"{words_of([name])} {away:.0f} m" if away >= 10.0 else f"{words_of([name])} {away:.2g} m"
+        letters = list(_cells(f"{said} {arrow}" if across > 0.0 else f"{arrow} {said}"))
+        part = min(self._canvas.columns / max(abs(across), 1e-9), 2.0 * self._canvas.lines / max(abs(down), 1e-9))
+        middle = round(self._canvas.columns / 2.0 + across * part / 2.0 - (len(letters) if across > 0.0 else 0.0))
+        column = min(max(middle, 0), self._canvas.columns - len(letters))
+        line = round(self._canvas.lines / 2.0 + down * part / 4.0)
+        for near in sorted(range(self._canvas.lines), key=lambda each: abs(each - line))[:MOST_OUTSIDE]:
+            cells = [(near, column + offset) for offset in range(-1, len(letters) + 1)]
+            if not self._is_taken(cells):
+                self._names |= zip(cells[1:-1], ((letter, "dim") for letter in letters), strict=True)
                 return True
         return False
 
@@ -215,7 +249,6 @@ def _around(line: int, column: int, wide: int) -> Iterator[Spot]:
 
 
 SCREEN_FRAME = 1.0 / 20.0  # seconds
-ARROWS = "→↗↑↖←↙↓↘"
 BACKGROUND = "on rgb(69,86,255)"  # turtlesim's
 TALK = 3  # lines of messages below the turtles
 

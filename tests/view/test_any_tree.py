@@ -8,7 +8,9 @@ import random
 import re
 
 import pytest
+from console import ROOT
 
+import frametool
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.frames.buffer import TransformBuffer
 from frametool.geometry.transform import Transform
@@ -71,3 +73,12 @@ def test_any_tree_is_drawn_in_every_form_or_says_that_nothing_is_left(seed: int)
 def test_a_choice_that_leaves_nothing_says_so() -> None:
     with pytest.raises(ValueInvalid, match="nothing matches"):
         FrameScene(random_tree(random.Random(1)), only="no such frame")  # noqa: S311
+
+
+def test_a_terminal_begins_where_most_frames_are_and_points_to_the_others() -> None:
+    """As the page does; where no frame is far away all of them are inside."""
+    tree = frametool.load(ROOT / "examples" / "robot.yaml")
+    text = TerminalPicture(FrameScene(tree), 100, 30).text()
+    assert re.findall(r"(?m)^([←-⇿]) (\w+) ([\d.]+) m", text) == [("↖", "map", "14"), ("←", "charging_dock", "7.4"), ("←", "odom", "2.4")]
+    assert "0.2 m  in map" in text.splitlines()[-1]
+    assert not re.search("[←-⇿]", TerminalPicture(FrameScene(tree, below="base_link"), 100, 30).text())
