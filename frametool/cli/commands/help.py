@@ -64,10 +64,15 @@ def questions() -> dict[str, str]:
 
 
 def finder(words: Iterable[str]) -> Callable[[str], bool]:
-    """Return what tells whether a text holds all these words, in any case and number."""
-    found = re.findall(r"\w+", " ".join(words).lower())
-    stems = [re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", each)) if len(each) > 3 else each for each in found]
-    return lambda text: bool(stems) and all(re.search(rf"\b{each}", text.lower()) for each in stems)
+    """Return what tells whether a text holds all these words, in any case and number; `y-up` is one word."""
+    found = re.findall(r"\w+(?:-\w+)*", " ".join(words).lower())
+    stems = [r"\b" + r"\W?".join(map(_stem, each.split("-"))) for each in found]
+    return lambda text: bool(stems) and all(re.search(each, text.lower()) for each in stems)
+
+
+def _stem(word: str) -> str:
+    """Return the pattern of a word in any number; a short one must be a whole word."""
+    return re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", word)) if len(word) > 3 else rf"{word}s?\b"  # noqa: PLR2004
 
 
 def _listed(rows: dict[str, str]) -> str:
@@ -127,6 +132,8 @@ def _search(ctx: click.Context, name: str) -> str:
     calls = [each for each, one in _commands(ctx).items() if each != "help" and any(map(holds, _texts(one, ctx)))]
     forms = [each for each, row in FORMATS.items() if holds(f"{each} {row.summary}")]
     titles = sorted((each for each in asked if holds(f"{each} {asked[each]}")), key=lambda each: not holds(each))
+    if about and not (about[1:] or calls or forms or titles):
+        return topic(about[0])
     if not (about or calls or forms or titles):
         hint = any_near(name.lower(), [*known, *MADE, *COMMANDS], "`frametool help` lists all topics")
         raise click.UsageError(f"no topic, command or text has {shown(name)}{hint}")
