@@ -72,7 +72,7 @@ def finder(words: Iterable[str]) -> Callable[[str], bool]:
 
 def _stem(word: str) -> str:
     """Return the pattern of a word in any number; a short one must be a whole word."""
-    return re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", word)) if len(word) > 3 else rf"{word}s?\b"  # noqa: PLR2004
+    return re.sub(r"s$", "", re.sub(r"(ies|y)$", "(?:ie|y)", word)) if len(word) > 3 else rf"{word}s?\b"
 
 
 def _listed(rows: dict[str, str]) -> str:
