@@ -12,7 +12,8 @@ import click
 from frametool.cli.command import inputs, misuse, refuse
 from frametool.cli.stderr import say
 from frametool.documents.source import Source
-from frametool.errors import FormatError
+from frametool.errors import FormatError, warn
+from frametool.geometry.conventions import world_of
 from frametool.geometry.place import UTM, Earth, Origin, Place, kernels
 from frametool.geometry.representations import POSITIONS, Notation
 from frametool.geometry.transverse_mercator import zone_number
@@ -74,6 +75,8 @@ def _tell(place: Vector) -> None:
     lat, lon, alt = place
     if not inputs().quiet:
         say(f"origin: lat {lat!r}, lon {lon!r}, alt {alt!r}, the first position")
+    if lat == lon == 0.0:
+        warn("the first position is lat 0, lon 0, as receivers write that have no fix; --origin PLACE names another")
 
 
 def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Place | None]:
@@ -83,7 +86,8 @@ def places_of(notations: Sequence[Notation]) -> tuple[tuple[Notation, ...], Plac
     place = Place.written(names, earth()) if names else None
     if inputs().peek("origin") == FIRST and not (place and place.is_local):
         raise click.UsageError("--origin first has no effect here: it is where --to enu, or ned, begins")
-    return rest, place
+    world = place.axes if place else world_of(inputs().peek("world") or inputs().peek("all_axes") or "")
+    return tuple(each.in_world(world) for each in rest), place
 
 
 def mapping_of(texts: Sequence[str], name: str) -> str:

@@ -18,7 +18,7 @@ from frametool.cli.stderr import as_json, say, say_error, tell
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
-from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, notations
+from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -72,6 +72,7 @@ class Notations(Text):
         spec = begun.partition(":")[0]
         if spec in names and REPRESENTATIONS[spec.removesuffix("_deg")].axes == NAMED_AXES:
             names += [f"{spec}:{axes}" for axes in ("all", *AXES)]
+        names += [f"heading_deg:{axes}" for axes in WORLDS]
         return dict.fromkeys((done + comma + name for name in names), "")
 
 

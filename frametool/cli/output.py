@@ -63,7 +63,7 @@ class Output:
             refuse_suffix(self.path)
         self.told = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
-        if inputs.peek("origin") is not None or any(each.representation.is_place for each in notations):
+        if inputs.peek("origin") is not None or any(each.representation.on_earth for each in notations):
             from frametool.cli.earth import places_of
 
             notations, place = places_of(notations)

@@ -46,7 +46,7 @@ class Frames:
     cameras: Mapping[str, Camera] = MappingProxyType({})  # by frame, from `camera:` entries
     read_cameras: Callable[[], dict[str, Callable[..., Camera]]] = staticmethod(dict)  # from files of other formats
 
-    robots: Sequence[tuple[Any, Any]] = ()  # of files with joints, their values and the links that they move
+    robots: Sequence[tuple[Any, Any, list[str]]] = ()  # of files with joints: values, links, joints without a value
 
     def __init__(self, name: str) -> None:
         """Create an empty set of frames; `name` is that of their source, for error messages."""

@@ -11,6 +11,7 @@ from math import sqrt
 
 from frametool.errors import ValueInvalid, nearest, shown
 from frametool.geometry import euler, floats, matrix, quaternion
+from frametool.geometry.representations import WORLDS
 from frametool.geometry.rotation import Rotation
 
 TYPE_CHECKING = False
@@ -150,6 +151,13 @@ def sides_of(text: str) -> tuple[str, str]:
     if not joint:
         raise ValueInvalid(f"{shown(text)} is one end of a change; give A_from_B, as {text}_from_ros")
     return f"{world}_from_{from_world}", f"{from_body}_from_{body}"
+
+
+def world_of(change: str) -> str:
+    """Return `enu` or `ned` where a change of a world's axes, `A_from_B`, ends in one of them; else ""."""
+    name, joint, _ = change.partition("_from_")
+    world = SYSTEMS.get(name, (name,))[0]
+    return world if joint and world in WORLDS else ""
 
 
 def _system(name: str) -> tuple[str, str]:

@@ -6,7 +6,7 @@ kernels this calls, nowhere else. Knows no file syntax.
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import inf, isfinite, tau
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
 from frametool.geometry import euler, floats, matrix, quaternion, vectors
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LIST, MAP, NAMED, ROWS = "list", "map", "named", "rows"  # how documents hold the numbers of a rotation
 NAMED_AXES = "AXES"
+WORLDS = ("enu", "ned")  # of a heading: how the axes of the frame lie in which it is seen
+OF_WORLD = "enu|ned"
 
 
 class Whole:
@@ -84,21 +86,22 @@ class Representation:
     summary, label: a line of help; its name in text for people
     names: short names of its numbers, for people and as keys of a map
     shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or a dict of
-    the
-        keys of a map with the number of values of each
-    axes: Euler axes: "" none, NAMED_AXES if the user names them, else the fixed ones
+        the keys of a map with the number of values of each
+    axes: Euler axes: "" none, NAMED_AXES if the user names them, else the fixed ones; OF_WORLD: one of WORLDS
     whole: how it holds the position too, if it can; searched: whether headers are searched for its columns
     alone: columns that suffice for the last number if the others are missing and 0
     batch: how many rows are checked at once; without it rows are refused whose quaternion is not finite
     in_degrees: whether its angles are degrees if their name states no unit
     overview: the units in which an overview shows it ("" for no unit)
     is_place: it is a position on the Earth and not a rotation: a row of POSITIONS
+    on_earth: it is such a position, or a heading
     kernels: for a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
     __slots__ = (
         "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "in_degrees",
-        "is_place", "kernels", "label", "name", "names", "overview", "searched", "shape", "summary", "whole",
+        "is_place", "kernels", "label", "name", "names", "on_earth", "overview", "searched", "shape", "summary",
+        "whole",
     )  # fmt: skip
 
     def __init__(
@@ -134,6 +137,7 @@ class Representation:
         self._kept = kept
         self.batch = batch
         self.is_place = forward is _no_rotation
+        self.on_earth = self.is_place or axes == OF_WORLD
         self.kernels = kernels
 
     def __repr__(self) -> str:
@@ -148,7 +152,7 @@ class Representation:
     @property
     def spelling(self) -> str:
         """Return the name as help shows it."""
-        return f"{self.name}:{NAMED_AXES}" if self.axes == NAMED_AXES else self.name
+        return f"{self.name}:{self.axes}" if self.axes in (NAMED_AXES, OF_WORLD) else self.name
 
     def to_quaternion(
         self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
@@ -224,6 +228,22 @@ def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
 def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of w, x, y, z made from a function of x, y, z, w."""
     return lambda w, x, y, z, xp: kernel(x, y, z, w, xp)
+
+
+def _of_heading(components: Components, xp: Namespace, degrees: bool, axes: str) -> Quaternion:  # noqa: FBT001 - all do
+    """Return the level rotation with a heading: a turn about down, or of 90 degrees - it where z is up."""
+    axes = checked_world(axes.replace("sxyz", ""))
+    sine, cosine = (floats.half_sincos_deg if degrees else floats.half_sincos)(components[0], xp)
+    zero = 0.0 * sine
+    if axes == "enu":
+        return quaternion.settled(zero, zero, floats.SQRT_HALF * (cosine - sine), floats.SQRT_HALF * (cosine + sine))
+    return zero, zero, sine, cosine
+
+
+def _heading(rotation: Quaternion, xp: Namespace, degrees: bool, axes: str) -> Components:  # noqa: FBT001 - all do
+    """Return where x points: yaw, or 90 degrees - yaw where z is up, from 0 to less than a turn."""
+    yaw, turn = euler.from_quaternion(*rotation, "sxyz", xp, degrees=degrees)[2], 360.0 if degrees else tau
+    return ((turn / 4.0 - yaw if axes == "enu" else yaw) % turn % turn,)  # -1e-17 % 360 is 360
 
 
 def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
@@ -334,9 +354,13 @@ POSITIONS = {
     "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down",
                           kernels=f"{PLACE}:LOCAL_KERNELS"),
 }  # fmt: skip
-EARTH_FRAMES = ("ecef", "earth")  # names of one frame, in which positions on the Earth are expressed
+HEADING = Representation(
+    "heading", (0,), "where x points, clockwise from north, whatever the tilt; axes of the frame it is seen from",
+    axes=OF_WORLD, searched=False, forward=_of_heading, backward=_heading,
+)
+EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
 ROTATIONS = {**REPRESENTATIONS}
-REPRESENTATIONS |= POSITIONS
+REPRESENTATIONS |= {"heading": HEADING, **POSITIONS}
 for _name, _row in REPRESENTATIONS.items():
     _row.name = _name
 
@@ -380,7 +404,7 @@ class Notation:
     def euler_axes(self) -> str | None:
         """Return the Euler axes, fixed or named; None for a notation without."""
         fixed = self.representation.axes
-        return self.axes if fixed == NAMED_AXES else fixed or None
+        return self.axes if fixed == NAMED_AXES else "sxyz" if fixed == OF_WORLD else fixed or None
 
     @property
     def counts(self) -> tuple[int, ...]:
@@ -429,6 +453,14 @@ class Notation:
             raise ValueInvalid(f"{self.spec} needs its axes: write euler:rzyx (one of {', '.join(sorted(euler.AXES))})")
         return self.axes or "sxyz"
 
+    def in_world(self, axes: str) -> Notation:
+        """Return a heading bound to the axes of its frame, where they are known, other notations as they are."""
+        if self.representation.axes != OF_WORLD:
+            return self
+        if axes and self.axes not in (None, axes):
+            raise ValueInvalid(f"{self.spec}: the result is in axes {axes}")
+        return Notation(self.spec, self.representation, checked_world(axes or self.axes), degrees=self.degrees)
+
 
 def _upper_rows() -> Notation:
     """Return the notation of a pose as the first three rows of its 4x4, as in a KITTI trajectory."""
@@ -442,20 +474,7 @@ def _upper_rows() -> Notation:
     return Notation("matrix", row, None, degrees=None)
 
 
-def _heading_row() -> Representation:
-    """Return the notation of a heading: a level rotation, x pointing so far clockwise of north."""
-
-    def forward(components: Components, xp: Namespace, degrees: bool, _axes: str) -> Quaternion:  # noqa: FBT001 - all do
-        zero = components[0] - components[0]
-        return (zero, zero, *(floats.half_sincos_deg if degrees else floats.half_sincos)(components[0], xp))
-
-    row = Representation("heading", (0,), "clockwise from north", names="heading", forward=forward)
-    row.name = "heading"
-    return row
-
-
-UPPER_ROWS = _upper_rows()  # it has no name: twelve numbers of a file select it
-HEADING = _heading_row()  # no name either: it is read with a position on the Earth, whose axes state which way is up
+UPPER_ROWS = _upper_rows()  # no name spells it: twelve numbers of a file say it
 
 
 def notation(spec: str) -> Notation:
@@ -477,9 +496,9 @@ def notation(spec: str) -> Notation:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
     if degrees is None and row.in_degrees:
         degrees = True
-    if colon and row.axes != NAMED_AXES:
+    if colon and row.axes not in CHECKED:
         raise ValueInvalid(f"{bare} has no axes to name; only euler has: euler:{axes or 'rzyx'}")
-    return Notation(spec, row, checked_axes(axes) if colon else None, degrees=degrees)
+    return Notation(spec, row, CHECKED[row.axes](axes) if colon else None, degrees=degrees)
 
 
 def _near_names(name: str) -> str:
@@ -503,6 +522,18 @@ def checked_axes(axes: str) -> str:
     raise ValueInvalid(
         f"unknown Euler axes {shown(axes)}{near} s (static axes) or r (rotating axes) and three letters, such as rzyx"
     )
+
+
+def checked_world(axes: str | None) -> str:
+    """Return the axes of the frame of a heading back; else raise ValueInvalid with those there are."""
+    if axes in WORLDS:
+        return axes
+    both = "write heading_deg:enu (x east, y north, z up) or heading_deg:ned (x north, y east, z down)"
+    said = f"and not in axes {shown(axes)}" if axes else "which a pose does not say of its frame"
+    raise ValueInvalid(f"a heading is clockwise from north in axes enu or ned, {said}; {both}")
+
+
+CHECKED = {NAMED_AXES: checked_axes, OF_WORLD: checked_world}
 
 
 def _near_axes(axes: str) -> str:

@@ -133,13 +133,13 @@ class Tally:
         axes: frame -> the axes of a camera frame, `optical` or `opengl`
         drawn: of a file without poses, child -> the rate of its edge
         projected: the largest deviation of a matrix from a rotation, in formats that round them
-        robot: of a file with joints, the values of the fixed ones and the links that they move
+        robot: of a file with joints, the values of the fixed ones, the links that they move, and those without a value
         unknown_joints: the passed ones that it does not have, each with its error, because another file may have them
         """
         self.assumed = ""
         self.axes: dict[str, str] = {}
         self.drawn: dict[str, str] = {}
-        self.robot: tuple[Mapping[str, Any], list[Any]] | None = None
+        self.robot: tuple[Mapping[str, Any], list[Any], list[str]] | None = None
         self.unknown_joints: dict[str, FormatError] = {}
         self.names = Names()
         self.noise: list[tuple[int, str]] = []

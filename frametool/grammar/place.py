@@ -338,11 +338,9 @@ def _heading(own: dict[str, Any], axes: str) -> Quaternion | None:
     except ValueInvalid as error:
         raise Misfit(str(error), (key,)) from None
     degrees = HEADINGS[key] if unit is None else unit == "deg"
-    turn = HEADING.to_quaternion((angle,), floats, degrees=degrees)
     if not axes:
         raise Misfit(UNSAID)
-    x, y, z, w = Place(LLA, ("lat", "lon"), axes, level=True).levelled(turn)
-    return x, y, z, w
+    return HEADING.to_quaternion((angle,), floats, degrees=degrees, axes=NED if axes == NED else ENU)
 
 
 def _refuse_not_read(own: dict[str, Any]) -> None:

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from frametool.errors import ValueInvalid, bare, overheard, shown
 from frametool.geometry import floats, quaternion
-from frametool.geometry.representations import LIST, MAP, NAMED, NAMED_AXES, ROTATIONS, ROWS, Notation, axes_name
+from frametool.geometry.representations import (
+    LIST,
+    MAP,
+    NAMED,
+    NAMED_AXES,
+    OF_WORLD,
+    ROTATIONS,
+    ROWS,
+    Notation,
+    axes_name,
+)
 from frametool.geometry.representations import notation as parse_notation
 from frametool.grammar.readers import INDICES, Misfit, NotARotation, Reading, kind, places_in, read_texts, within
 from frametool.text.numbers import NotFinite, half_unit, parse_angle, parse_number
@@ -194,21 +204,28 @@ def read_components(
         return _read_one_by_one(notation, texts, places, angles, degrees=degrees)
     if notation.degrees is None and not degrees and notation.representation.angles:
         _note_degrees(notation, numbers, places, reading)
-    return as_meant(notation, numbers, texts), degrees
+    return as_meant(notation, numbers, texts, reading), degrees
 
 
-def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str]) -> list[float]:
-    """Return the nearest rotation to numbers written with few digits, if rounding alone makes them invalid."""
+FEW_DIGITS = "a rotation that is off by {:.2g}, as its few digits explain, was normalised"
+
+
+def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], reading: Reading) -> list[float]:
+    """Return the nearest rotation to numbers written with few digits, if rounding alone makes them invalid.
+
+    Beyond 1e-3 this is a note all the same.
+    """
     row, rule = notation.representation, notation.representation.batch
     if rule is None or rule.explained is None:
         return numbers
     is_whole = row.whole is not None and len(numbers) == len(row.whole.columns)
     at = list(row.whole.split(range(len(numbers)))[1]) if row.whole and is_whole else list(range(len(numbers)))
     own = [numbers[index] for index in at]
-    if len(own) != len(row.columns) or not rule.deviation(*own, floats) > quaternion.SILENT:
+    off = rule.deviation(*own, floats) if len(own) == len(row.columns) else 0.0
+    if not (off > quaternion.SILENT and rule.explained(own, [half_unit(texts[index]) for index in at], floats)):
         return numbers
-    if not rule.explained(own, [half_unit(texts[index]) for index in at], floats):
-        return numbers
+    if off > quaternion.TOLERATED and not reading.normalize:
+        reading.note(FEW_DIGITS.format(off), rule="rounded")
     meant = dict(zip(at, rule.repair(*own, floats), strict=True))
     return [meant.get(index, number) for index, number in enumerate(numbers)]
 
@@ -355,6 +372,6 @@ def spelled(notation: Notation, numbers: Sequence[float]) -> Any:
             first += count
         return entry
     if row.shape == ROWS:
-        size = math.isqrt(len(numbers))
-        return [list(numbers[first : first + size]) for first in range(0, len(numbers), size)]
-    return list(numbers) if row.shape == LIST else dict(zip(notation.names, numbers, strict=True))
+        return list(map(list, zip(*[iter(numbers)] * math.isqrt(len(numbers)), strict=True)))
+    found: Any = list(numbers) if row.shape == LIST else dict(zip(notation.names, numbers, strict=True))
+    return numbers[0] if row.axes == OF_WORLD else found

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, Misused, ValueInvalid, shown, warn
 from frametool.geometry.earth import AXES as AXES_AT
-from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, UNSAID, UTM, ZONE, Earth, Place, kernels
+from frametool.geometry.place import AXES, ECEF, ENU, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Earth, Place, kernels
 from frametool.geometry.representations import HEADING, POSITIONS, Notation
 from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 from frametool.geometry.transverse_mercator import zone_number
@@ -181,7 +181,7 @@ def _heading(spots: dict[str, NamedColumn], position: Columns) -> Columns | None
     if spot is None or spot.unit == "" or position.unit is None:
         return None
     radians = _in_radians(spot)
-    notation = Notation(f"heading_{'rad' if radians else 'deg'}", HEADING, None, degrees=not radians)
+    notation = Notation(f"heading_{'rad' if radians else 'deg'}", HEADING, NED, degrees=not radians)
     return Columns((spot.place,), (spot.name,), notation=notation, degrees=(not radians,))
 
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from frametool.errors import FrametoolError, ValueInvalid
-from frametool.geometry import arrays, floats, uncertainty
+from frametool.geometry import arrays, floats, quaternion, uncertainty
 from frametool.geometry.batch_validation import read_rotations
 from frametool.grammar.names import in_nanoseconds
+from frametool.grammar.rotation_spelling import FEW_DIGITS
 from frametool.stream.faults import DEGREES, NULL, STOP, Fault, RowNote
 from frametool.stream.layout import Const, In, Instead, Out, Word
 from frametool.stream.request import PAIR, START, thing_pose
@@ -372,6 +373,12 @@ class Run:
         own = [column[rows] for column in given]
         halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
         meant = rule.explained is not None and rule.explained(own, halves, arrays)
+        off = rule.deviation(*own, arrays)
+        far = np.flatnonzero(meant & (off > quaternion.TOLERATED) & (not self.plan.normalize))
+        self.mended += rows[far].tolist()
+        for at in far[: not self.rounded].tolist():
+            line, column = self._place(int(rows[at]), places[0])
+            self.rounded.append(RowNote(line, "rounded", FEW_DIGITS.format(off[at]), column))
         for at, numbers in enumerate(rule.repair(*own, arrays)):
             given[at] = given[at].copy()
             given[at][rows] = np.where(meant, numbers, own[at])

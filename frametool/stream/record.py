@@ -692,7 +692,7 @@ def _with_flat_rotation(
     for at, name in enumerate(names):
         numbers.append(_number(value, name, shape.in_degrees(own + at)))
     if shape.notation is not None:
-        numbers = as_meant(shape.notation, numbers, [value[name] for name in names])
+        numbers = as_meant(shape.notation, numbers, [value[name] for name in names], reading)
     values = (*(() if shape.whole else record.values), *numbers)
     _check(shape, values, names, reading)
     paths = (*(() if shape.whole else record.numbers), *((*record.path, name) for name in names))

@@ -260,7 +260,7 @@ def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
     moved: list[dict[str, Any]] = []
     places: dict[str, int] = {}
     mimics: list[tuple[dict[str, Any], Mimic]] = []
-    for values, links in scene.tree.robots:
+    for values, links, _ in scene.tree.robots:
         for link in links:
             known = [values.get(joint.name) for joint in link.joints]
             if not known or link.child not in index or not all(isinstance(value, JointValue) for value in known):

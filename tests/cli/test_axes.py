@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -197,6 +198,33 @@ def test_a_hint_about_euler_axes_names_both_readings(run: Run, name: str, both: 
 
 def test_a_hint_about_an_order_names_both_orders(run: Run) -> None:
     assert "did you mean 'xyzw' or 'wxyz'?" in run("convert", "--from", "xwyz", "1", "0", "0", "0").err
+
+
+@pytest.mark.parametrize("yaw", [-180.0, -90.0, -1e-15, 0.0, 30.0, 90.0, 180.0])
+def test_a_heading_is_clockwise_from_north(run: Run, yaw: float) -> None:
+    forward = (math.cos(math.radians(yaw)), math.sin(math.radians(yaw)))
+    for axes, (north, east) in {"enu": forward[::-1], "ned": forward}.items():
+        there = run("convert", f"{{rpy_deg: [9, 20, {yaw!r}]}}", "--to", f"heading_deg:{axes},heading:{axes}", "-f", "json")
+        found = json.loads(there.out)
+        assert 0.0 <= found["heading_deg"] < 360.0
+        assert math.radians(found["heading_deg"]) == pytest.approx(found["heading"], abs=1e-12)
+        assert (math.cos(found["heading"]), math.sin(found["heading"])) == pytest.approx((north, east), abs=1e-12)
+        back = run("convert", "--from", f"heading:{axes}", repr(found["heading"]), "--to", f"heading:{axes}", "-f", "json")
+        assert json.loads(back.out)["heading"] == pytest.approx(found["heading"], abs=1e-12)
+
+
+def test_the_axes_of_a_heading_are_stated_once_and_alike_everywhere(run: Run) -> None:
+    pose, to = "{rpy_deg: [0, 0, 30]}", ("--to", "heading_deg", "-f", "json")
+    assert "heading_deg:enu (x east, y north, z up) or heading_deg:ned" in run("convert", pose, *to).err
+    for change in (["--world-axes", "ned_from_enu"], ["--all-axes", "aircraft_from_ros"]):
+        assert json.loads(run("convert", pose, *change, *to).out) == pytest.approx({"heading_deg": 60.0})
+        assert run("convert", pose, *change, "--to", "heading_deg:enu").status == 1
+    place = "{lat: 48, lon: 11, alt: 0, axes: ned, rpy_deg: [0, 0, 33]}"
+    assert json.loads(run("convert", place, "--to", "lla,heading_deg", "-f", "json").out)["heading_deg"] == pytest.approx(33.0)
+    assert "and not in axes 'grid'" in run("convert", place, "--to", "utm,heading_deg").err
+    rows, names = "1,2,3,0,0,1\n" * 99, "x,y,z,{}\n"
+    done = run("convert", "--to", "heading:enu", stdin=names.format("roll,pitch,yaw") + rows)
+    assert done.out == names.format("heading") + rows.replace("0,0,1", repr(math.pi / 2 - 1))
 
 
 LOG = "stamp,x,y,z,qx,qy,qz,qw,{}\n1,1,2,-3,0,0,0,1,4,5,6\n"

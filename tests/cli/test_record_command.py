@@ -101,7 +101,7 @@ def test_a_link_to_the_recording_is_not_written_over(link: Callable[[str, str], 
 
 
 def test_without_the_extra_one_line_says_what_to_install(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
     done = run("record", str(folder / "run.bag"), "--with", TREE, "-o", "new.bag")
     said = "bags are read with an extra; install it: pip install 'frametool[bag]'"
     assert (done.status, done.err) == (5, f"frametool: {folder / 'run.bag'}: {said}\n")
@@ -188,3 +188,16 @@ def test_the_example_is_what_its_script_makes(tmp_path: Path) -> None:
     made, kept = (read(path) for path in (write(tmp_path / "run", "mcap", make_recording.messages()), make_trajectories.FOLDER / "run.mcap"))
     assert [(each.topic, each.kind, each.log_ns, len(each.data)) for each in made] == [(each.topic, each.kind, each.log_ns, len(each.data)) for each in kept]
     assert (make_trajectories.FOLDER / "run.mcap").stat().st_size < 100_000
+
+
+def test_joints_without_a_value_are_not_made_static(folder: Path, run: Run) -> None:
+    (folder / "arm.urdf").write_text(
+        '<robot name="a"><link name="base"/><link name="arm"/><joint name="lift" type="prismatic"><parent link="base"/>'
+        '<child link="arm"/><axis xyz="0 0 1"/><limit lower="0" upper="1"/></joint></robot>'
+    )
+    copy = ("record", f"{folder}/run.mcap", "--with", f"{folder}/arm.urdf", "-o", f"{folder}/new.mcap")
+    said = run(*copy)
+    assert said.status == 2
+    assert said.err.endswith("\nframetool: joints without a value would be static: lift; --joint NAME=VALUE gives it\n")
+    assert run(*copy, "-j", "lift=0.5").status == 0
+    assert "base -> arm" in run("record", f"{folder}/new.mcap", "--with", f"{folder}/arm.urdf", "-j", "lift=0", "-o", f"{folder}/x.mcap").err

@@ -454,7 +454,7 @@ def test_extrinsics_of_apollo_have_a_name(run: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("suffix", ["bag", "mcap", "db3"])
 def test_an_empty_recording_is_empty_whatever_is_installed(run: Callable[..., Any], suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
     done = run("tree", f"a.{suffix}", files={f"a.{suffix}": b""})
     assert (done.status, done.err) == (1, f"frametool: a.{suffix}: nothing in it: an empty file is not a bag\n")
 

@@ -125,6 +125,12 @@ def test_what_was_assumed_is_told_and_changed_by_frames(run: Run) -> None:
     assert run("lookup", "e.yaml", "chassis", "cam", "--frames", "chassis").err == "frametool: e.yaml: topic left out\n"
 
 
+def test_frames_that_change_nothing_are_told(run: Run) -> None:
+    files = {"e.yaml": "a: {parent: w, xyz: [0, 0, 1], yaw: 0}\nb: {parent: w, xyz: [0, 0, 2], yaw: 0}\n"}
+    said = "--frames map changes nothing: each pose names its parent"
+    assert said in run("tree", "e.yaml", "--frames", "map", files=files).err
+
+
 def test_a_key_that_names_two_frames_asks_for_the_direction(run: Run) -> None:
     text = "base_to_left: {x: 1, y: 0, z: 0, ax: 0, ay: 0, az: 1, theta: 90deg}\n"
     done = run("tree", "e.yaml", files={"e.yaml": text})

@@ -242,7 +242,7 @@ def test_a_bag_gives_its_samples_with_the_time_they_were_received(kind: str, fil
 def test_without_the_extra_a_bag_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "run.bag"
     path.write_bytes(b"#ROSBAG V2.0\n")
-    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
     with pytest.raises(FileProblem, match=r"frametool\[bag\]"):
         list(FrameFile(path).edges())
 

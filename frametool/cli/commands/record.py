@@ -12,7 +12,7 @@ from frametool.cli.output import opened_place
 from frametool.cli.recording import copied_as, folder_of, refuse_input
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import FRAME, load_tree, tree_file
-from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
+from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, listing, shown, warn
 from frametool.formats.load import FrameFile, Rules
 from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.frames.stamps import parse_time
@@ -84,6 +84,8 @@ def command(inputs: Inputs) -> int:
     copy, place = copied_as(form, path, inputs.output, inputs.format_name)
     refuse_input(place, (path, *map(tree_file, more)))
     tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
+    if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
+        raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
     if edges is not None and edges.covariances:
         warn(f"{copy}: covariances left out")
     if more or into:

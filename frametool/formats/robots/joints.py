@@ -86,7 +86,7 @@ class JointState:
         self.given = frozenset((*self.still, *self.moving))
         self.told = set(self.given)
         self._follow(fail)
-        options.tally.robot = self.still, []
+        options.tally.robot = self.still, [], [name for name in self.joints if name not in self.told]
         options.tally.assumed = options.tally.assumed or self._about()
 
     @classmethod
@@ -99,7 +99,7 @@ class JointState:
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
         """Yield an edge a link: for good, or a sample at each time at which one of its joints has a value."""
         links = [*links]
-        self._options.tally.robot = self.still, links
+        self._options.tally.robot = self.still, links, [name for name in self.joints if name not in self.told]
         for link in links:
             for stamp_ns, values in self.values(*(joint.name for joint in link.joints)):
                 yield Edge(link.parent, link.child, link.pose(values), stamp_ns, link.line)

@@ -46,10 +46,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield an edge a name."""
     frames = options.answers.frames
     base = options.answers.names("base")[0]
-    count, told, left = 0, False, dict[str, None]()
+    count, told, said, left = 0, False, True, dict[str, None]()
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
-        nonlocal count, told
+        nonlocal count, told, said
         reading.bare_numbers = False
         top: dict[Any, Any] = as_mapping(value, "poses by the names of frames")
         path: Path = ()
@@ -64,6 +64,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             try:
                 pose, ends = _entry(name, entry, reading, options, left)
                 told |= ends is None
+                said &= type(entry) is dict and not {*PARENTS}.isdisjoint(entry)
                 target, source, child = ends or (base, str(name), str(name))
                 if child != source:
                     pose = rigid.inverse(*pose)
@@ -73,6 +74,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
                 reading.refuse(misfit.below(*here))
 
     yield from document_edges(file, options, take)
+    if frames and said:
+        options.tally.note(f"--frames {','.join(frames)} changes nothing: each pose names its parent", 1)
     count_of = f"{count} {'pose' if count == 1 else 'poses'}"
     assumed = f"{count_of} in {bare(base)} (--frames says another)" if told and not frames else ""
     others = f"{', '.join(map(bare, left))} left out" if left else ""
