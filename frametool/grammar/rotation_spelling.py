@@ -200,8 +200,7 @@ def read_components(
     try:
         numbers = list(map(parse_number, texts))
     except (ValueInvalid, TypeError):
-        angles = () if reading.bare_numbers else notation.representation.angles
-        return _read_one_by_one(notation, texts, places, angles, degrees=degrees)
+        return _read_one_by_one(notation, texts, places, degrees=degrees, bare=reading.bare_numbers)
     if notation.degrees is None and not degrees and notation.representation.angles:
         _note_degrees(notation, numbers, places, reading)
     return as_meant(notation, numbers, texts, reading), degrees
@@ -231,10 +230,10 @@ def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], rea
 
 
 def _read_one_by_one(
-    notation: Notation, texts: Sequence[Any], places: Sequence[Path], angles: Sequence[int], *, degrees: bool
+    notation: Notation, texts: Sequence[Any], places: Sequence[Path], *, degrees: bool, bare: bool
 ) -> tuple[list[float], bool]:
     """Read components if an angle has its own unit or one is not a number: then the error states where."""
-    numbers, units = [], []
+    numbers, units, angles = [], [], () if bare else notation.representation.angles
     for index, text in enumerate(texts):
         try:
             if type(text) is not str:
