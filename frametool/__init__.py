@@ -112,6 +112,13 @@ def __getattr__(name: str) -> object:
     return value
 
 
+def html_of(value: object) -> str | None:
+    """Return what a notebook shows of a value; the rooms below call it, which do not know how."""
+    from frametool.view import notebook
+
+    return notebook.html_of(value)
+
+
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
     return sorted(__all__)

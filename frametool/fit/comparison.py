@@ -141,6 +141,12 @@ class Comparison(NamedTuple):
     segments: SegmentErrors | None
     hints: list[str]
 
+    def _repr_html_(self) -> str | None:
+        """Show it in a notebook as a terminal does."""
+        import frametool
+
+        return frametool.html_of(self)
+
     def as_dict(self) -> dict[str, Any]:
         """Return every setting and number, as `frametool compare -f json` prints them."""
         from frametool.fit.numbers import numbers

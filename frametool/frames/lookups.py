@@ -73,6 +73,12 @@ class Frames:
 
     # --- contents ---
 
+    def _repr_html_(self) -> str | None:
+        """Show it in a notebook as a terminal does."""
+        import frametool
+
+        return frametool.html_of(self)
+
     @property
     def frames(self) -> tuple[str, ...]:
         """Return all frames, in the order of first mention."""

@@ -34,6 +34,12 @@ class Trajectory(NamedTuple):
     body: str = BODY
     lines: Any = None
 
+    def _repr_html_(self) -> str | None:
+        """Show it in a notebook as a terminal does."""
+        import frametool
+
+        return frametool.html_of(self)
+
     @property
     def size(self) -> int:
         """The number of poses."""

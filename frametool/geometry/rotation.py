@@ -337,6 +337,12 @@ class Rotation(Batched):
         moment = validation.second_moment(self._components, validation.masses(weights, self.shape))
         return Rotation.of(*quaternion.largest_eigenvector(moment, floats)).canonical()
 
+    def _repr_html_(self) -> str | None:
+        """Show it in a notebook as a terminal does."""
+        import frametool
+
+        return frametool.html_of(self)
+
     def __repr__(self) -> str:
         """Show one rotation's quaternion, or the shape of many."""
         if self.shape:

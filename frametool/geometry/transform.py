@@ -227,6 +227,12 @@ class Transform(Batched):
         whole = validation.total(mass.copy())
         return Transform.of(x / whole, y / whole, z / whole, *self.rotation.mean(weights).components)
 
+    def _repr_html_(self) -> str | None:
+        """Show it in a notebook as a terminal does."""
+        import frametool
+
+        return frametool.html_of(self)
+
     def __repr__(self) -> str:
         """Show one transform's numbers, or the shape of many."""
         if self.shape:

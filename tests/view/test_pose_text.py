@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import json
 import math
 import random
+import re
 from typing import TYPE_CHECKING, Protocol
 
 import pytest
+from console import ROOT
 
+import frametool
 from frametool.errors import ValueInvalid
 from frametool.geometry import euler, floats
 from frametool.geometry.conventions import find_euler
@@ -107,3 +111,18 @@ def test_the_command_shows_the_conventions_it_found(run: Run) -> None:
 def test_drawings_show_no_noise(run: Run) -> None:
     tree = "frames: {a: {b: {xyz: [1e-16, 9.999999999999998, 2e-5], rpy_deg: [0, -1e-14, 90]}}}"
     assert "b  xyz 0 10 2.0e-05  rpy_deg 0 0 90\n" in run("tree", "-", "-f", "text", stdin=tree).out
+
+
+def test_notebooks_show_what_a_terminal_shows() -> None:
+    pose = frametool.Transform.from_parts(xyz=[1, 2, 3], rpy_deg=[0, 0, 90])
+    for value in (pose, pose.rotation):
+        text = value._repr_html_() or ""
+        assert re.search("quaternion +x 0.000000 +y 0.000000 +z 0.707107 +w 0.707107\n", re.sub(" +", " ", text))
+        assert ("translation" in text) == (value is pose)
+    assert frametool.Transform.from_arrays([[1, 2, 3]], [[0, 0, 0, 1]])._repr_html_() is None
+    tree = frametool.load(ROOT / "examples" / "robot.yaml")
+    assert base64.b64decode((tree._repr_html_() or "").partition("base64,")[2][:-2]).startswith(b"<svg ")
+    assert frametool.FrameTree()._repr_html_() is None
+    ref, est = (frametool.load_trajectory(ROOT / "examples" / f"{name}.tum") for name in ("truth", "odometry"))
+    assert re.fullmatch(r"<pre>600 poses of \w+ in \w+, [\d.]+ s, [\d.]+ m of path</pre>", ref._repr_html_() or "")
+    assert (frametool.compare(ref, est)._repr_html_() or "").startswith("<pre>ref ")

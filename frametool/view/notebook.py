@@ -1,0 +1,40 @@
+"""What notebooks show of values: the text that a terminal shows, of a tree its picture."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from html import escape
+from typing import Any
+
+from frametool.frames.lookups import Frames
+from frametool.geometry.transform import Transform
+
+
+def html_of(value: Any) -> str | None:
+    """Return what a notebook shows of a transform, rotation, tree, trajectory or comparison; None for its repr."""
+    if isinstance(value, Frames) and value.frames:
+        from frametool.view.pictures import still_picture, write_svg
+        from frametool.view.scene import FrameScene
+
+        # a picture of its own, for the style of an SVG element would count in the whole notebook
+        svg = b64encode(write_svg(still_picture(FrameScene(value), title=value.name).picture).encode()).decode()
+        return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
+    if hasattr(value, "as_dict"):
+        from frametool.view.fit_text import write_comparison
+
+        return f"<pre>{escape(write_comparison(value.as_dict()))}</pre>"
+    if hasattr(value, "stamps_ns"):
+        from frametool.frames.trajectory import way
+
+        stamps = value.stamps_ns
+        span = f", {(stamps[-1] - stamps[0]) / 1e9:.3f} s" if stamps is not None and len(stamps) else ""
+        said = f"{value.size} poses of {value.body} in {value.world}{span}, {way(value.xyz)[-1]:.3f} m of path"
+        return f"<pre>{escape(said)}</pre>"
+    if isinstance(value, Frames) or value.shape:
+        return None
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result, Style
+    from frametool.view.pose_text import write_poses
+
+    pose = Pose.of(value.components) if isinstance(value, Transform) else Pose(rotation=value.components)
+    return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"
