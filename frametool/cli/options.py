@@ -160,6 +160,30 @@ def _names_in(path: str) -> list[str]:
         return []  # nothing to offer, and a completion must not print
 
 
+def tree_on_the_line(ctx: click.Context) -> str | None:
+    """Return the first file of frames; behind an option click has not come to the arguments."""
+    named = ctx.params.get("files") or ctx.params.get("arguments") or ctx.args
+    return ctx.params.get("tree") or next(iter(named), None)
+
+
+class JointSetting(Text):
+    """A joint of a robot and its value."""
+
+    def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
+        """Offer the joints of the URDF on the line with their limits; behind the = the limits."""
+        from frametool.formats.robots.urdf import load_robot
+
+        try:
+            joints = load_robot(tree_on_the_line(ctx) or "").joints.values()
+        except (FrametoolError, OSError):
+            return {}  # as for columns
+        ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
+        name, equals, _ = incomplete.partition("=")
+        if equals:
+            return dict(zip((f"{name}={end}" for end in ends.get(name, ())), ("lower limit", "upper limit"), strict=False))
+        return {f"{each}=": " .. ".join(both) for each, both in ends.items()}
+
+
 UTF8 = Utf8()
 
 
@@ -183,7 +207,7 @@ _ORDER = _of_forms("--from", "order of quaternions in lists of numbers", ORDERS,
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
     _of_forms("-j --joint NAME=VALUE", "value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; "
-              "may be repeated", name="joints", multiple=True),
+              "may be repeated", JointSetting(), name="joints", multiple=True),
     _of_forms("--joints FILE", "values of joints: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
               multiple=True),
     _of_forms("--frames WORLD,BODY", "names of frames that a form does not name; may be repeated, "

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.command import Text, inputs, refuse
-from frametool.cli.options import input_forms
+from frametool.cli.options import input_forms, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import ReadCache
@@ -263,8 +263,7 @@ class Frame(Text):
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:  # noqa: ARG002
         """Offer the frames of the tree, or files where none is named yet."""
-        # behind an option that wants a frame click has not come to the arguments
-        named = ctx.params.get("tree") or next(iter(ctx.params.get("arguments") or ctx.args), None)
+        named = tree_on_the_line(ctx)
         if named is None and "arguments" in ctx.params:
             return None
         try:

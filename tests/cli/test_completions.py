@@ -20,6 +20,13 @@ SCRIPTS = console.ROOT / "frametool" / "cli" / "completions"
 READY = "ready>"
 FILES = {
     "a.csv": "id,x,y,z\n1,2,3,4\n", "a.tum": "# t x y z qx qy qz qw\n0 1 2 3 0 0 0 1\n", "a.jsonl": '{"t": 1, "point": {"x": 1}}\n', "a.bin": "\x00\x01",
+    "arm.urdf": '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>' + "".join(
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><axis xyz="0 0 1"/>{limit}</joint>'
+        for name, kind, parent, child, limit in (
+            ("shoulder", "revolute", "a", "b", '<limit lower="-2" upper="1.5" effort="1" velocity="1"/>'),
+            ("slide", "prismatic", "b", "c", '<limit lower="0" upper="0.25" effort="1" velocity="1"/>'), ("wrist", "continuous", "c", "d", ""),
+        )
+    ) + "</robot>",
     "tree.yaml": "frames: {base: {my frame: {xyz: [1, 2, 3]}, 'arm:left': {xyz: [1, 2, 3]}, 'arm:right': {xyz: [1, 2, 3]}, tool=x: {xyz: [1, 2, 3]}, $c*: {xyz: [1, 2, 3]}, \"t\\tb\": {xyz: [1, 2, 3]}}}",
 }  # fmt: skip
 
@@ -71,6 +78,13 @@ def answered(run: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPa
         ("lookup ~/tree.yaml 'my f", ["my frame"]),
         ("lookup tree.yaml my\\ f", ["my frame"]),
         ("compose '{xyz: [1, 2, 3]}' --outp", ["--output"]),
+        ("lookup arm.urdf a b -j ", ["shoulder=", "slide=", "wrist="]),
+        ("lookup arm.urdf -j s", ["shoulder=", "slide="]),
+        ("fk arm.urdf a b --joint=sl", ["--joint=slide="]),
+        ("lookup arm.urdf a b -j slide=", ["slide=0.0", "slide=0.25"]),
+        ("lookup arm.urdf a b -j wrist=", []),
+        ("lookup tree.yaml a b -j ", []),
+        ("lookup a b -j ", []),
         ("convert -i none.csv --columns x", []),
         ("convert -i a.bin --columns x", []),
         ("convert --columns x", []),
@@ -116,6 +130,8 @@ TYPED = {
     "frametool convert --to euler_deg:sxyz,mat": ["convert", "--to", "euler_deg:sxyz,matrix"],
     "frametool convert --to=euler:sxyz,qua": ["convert", "--to=euler:sxyz,quaternion"],
     "frametool convert -i a.t": ["convert", "-i", "a.tum"],
+    "frametool lookup arm.urdf a b -j wri": ["lookup", "arm.urdf", "a", "b", "-j", "wrist="],
+    "frametool lookup arm.urdf a b -j slide=0.2": ["lookup", "arm.urdf", "a", "b", "-j", "slide=0.25"],
     "frametool convert -i tree.yaml --output=a.t": ["convert", "-i", "tree.yaml", "--output=a.tum"],
 }
 
