@@ -180,7 +180,7 @@ class JointSetting(Text):
         ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
         name, equals, _ = incomplete.partition("=")
         if equals:
-            return dict(zip((f"{name}={end}" for end in ends.get(name, ())), ("lower limit", "upper limit"), strict=False))
+            return {f"{name}={end}": "a limit" for end in ends.get(name, ())}
         return {f"{each}=": " .. ".join(both) for each, both in ends.items()}
 
 
