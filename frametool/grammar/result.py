@@ -146,8 +146,6 @@ class Result:
         for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
             _add(entry, key, value)
-        if any(is_locked(pose, each) for each in style.notations):
-            entry["gimbal_lock"] = True
         return entry | extras
 
     def said(self, style: Style) -> dict[str, Any]:

@@ -9,9 +9,9 @@ import numpy as np
 from frametool.formats.rows.csv import cell
 from frametool.stream.record_rows import LEAF, NAME, PARENT, STAMP_NS, Filling, plain_texts
 from frametool.stream.row_poses import spans_of
-from frametool.stream.rows import number_spans, texts_as_rows, written
+from frametool.stream.rows import constant, number_spans, texts_as_rows, written
 from frametool.text.csv_line import quoted
-from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.spans import Spans
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -49,9 +49,9 @@ def _rows(batch: RecordBatch, cells: Mapping[str, Any], columns: Sequence[str], 
             made = Spans(numbers.data, numbers.starts[:, at], numbers.ends[:, at] - 1)
         else:
             made = _cells(batch, value, style)
-        parts += [_constant(waiting, size), made] if waiting else [made]
+        parts += [constant(waiting, size), made] if waiting else [made]
         waiting = b","
-    return [*parts, _constant(b"\n", size)]
+    return [*parts, constant(b"\n", size)]
 
 
 def _cells(batch: RecordBatch, value: Any, style: Style) -> Spans:
@@ -84,9 +84,4 @@ def _is_split(cells: Spans) -> Flags:
 def _words(values: Sequence[Any], size: int) -> Spans:
     """Return plain values as cells, one a row or one for all."""
     known = {value: quoted("" if value is None else str(value)).encode() for value in values}
-    return spans_of([known[value] for value in values]) if len(values) == size else _constant(known[values[0]], size)
-
-
-def _constant(text: bytes, size: int) -> Spans:
-    starts = np.full(size, MARGIN, np.int64)
-    return Spans(framed(text), starts, starts + len(text))
+    return spans_of([known[value] for value in values]) if len(values) == size else constant(known[values[0]], size)

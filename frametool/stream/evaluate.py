@@ -138,7 +138,7 @@ class Run:
         with np.errstate(all="ignore"):
             moved = self._compute(self.columns, movers, state)
             self._doubt_turns(moved)
-            self.results, self.locked = self._results(moved)
+            self.results = self._results(moved)
         self.rows = np.arange(self.count)
         weights = weights_of(self.block, plan, self._blame) if plan.gathered and plan.beside else None
         if self.outside:
@@ -412,17 +412,14 @@ class Run:
         for row in wrong:
             self._blame(row, names[first], wrong_tail(tail, [number[row] for number in numbers[first:]]))
 
-    def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
-        """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
+    def _results(self, moved: list[Components]) -> Floats:
+        """Return the results as rows of numbers; what is not finite is bad."""
         numbers: list[Floats] = []
-        locked = np.zeros(self.count, np.int64)
         for target, parts in zip(self.plan.targets, moved, strict=True):
             numbers += target.written(parts, arrays)
             for name, number in target.left_out(parts, arrays):
                 for row in np.flatnonzero(abs(number) > FLAT).tolist():
                     self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
-            if (flags := target.locked(parts)) is not None:
-                locked |= flags
         results = np.empty((self.count, len(numbers)))
         for column, number in enumerate(numbers):
             results[:, column] = number
@@ -431,7 +428,7 @@ class Run:
             for row in np.flatnonzero(self._is_wrong(results)).tolist():
                 if row not in self.reasons:
                     self._blame(row, *self._why_not_finite(row, moved))
-        return results, locked
+        return results
 
     def _is_wrong(self, results: Floats) -> Any:
         """Return which rows have numbers that are none; nan may be one of a formula's."""
@@ -459,7 +456,7 @@ class Run:
         return "", "the result is not finite: the numbers are too large"
 
     def _keep(self, kept: Flags) -> None:
-        self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
+        self.rows, self.results = self.rows[kept], self.results[kept]
 
     def refuse(self, rows: Sequence[int], reason: str) -> None:
         """Take results back: these rows are bad."""
@@ -491,7 +488,7 @@ class Run:
             write = partial(numbers_or_null, plan.pieces, plan.null) if plan.operation.shown else number_spans
             values = write(self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml)
         parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked, self.results))]
+        return [(self.block.places[rows], assemble(plan.pieces, parts, len(rows), values, self.results))]
 
     def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
         plan = self.plan
@@ -500,7 +497,7 @@ class Run:
         rows = np.array(sorted(self.reasons), np.int64)
         pieces = [_without_result(piece, plan.null) for piece in plan.pieces]
         parts = [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
+        return [(self.block.places[rows], assemble(pieces, parts, len(rows)))]
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""

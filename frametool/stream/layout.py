@@ -71,13 +71,7 @@ class Const(NamedTuple):
     text: bytes
 
 
-class IfLocked(NamedTuple):
-    """Text that stands only in rows whose angles are not unique."""
-
-    text: bytes
-
-
-Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word | Renamed
+Piece: TypeAlias = In | Out | Const | Instead | Word | Renamed
 
 
 Stretch: TypeAlias = tuple[int, int, str, str]

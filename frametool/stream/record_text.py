@@ -44,9 +44,8 @@ def rendered(template: Template, request: Request, line: int, column: int) -> Re
         numbers = [number for each in answers for number in written(each)]
     except FrametoolError as error:
         return Fault.of(line + template.line, getattr(error, "column_name", ""), error)
-    locked = any(each.entry.target.locked(each.parts) for each in answers)
     write = number_writer(request.precision, yaml=not template.json)
-    text = template.with_numbers([write(number) for number in numbers], locked=locked)
+    text = template.with_numbers([write(number) for number in numbers])
     mended = sum(each.mended for each in answers)
     notes = _notes(template, line, column)
     if (place := answers[0].entry.target.place if answers else None) is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.geometry import euler, floats, quaternion, rigid
+from frametool.geometry import floats, quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -289,14 +289,6 @@ class Target(NamedTuple):
             for place, period in found
             if place not in self.absent
         ]
-
-    def locked(self, parts: Components) -> Any:
-        """Tell whether Euler angles among the notations are not unique; None where there are none."""
-        axes = next((axes for notation, _ in self.notations if (axes := notation.euler_axes)), None)
-        if axes is None or len(parts) < 7:
-            return None
-        x, y, z, w = parts[3:7]
-        return euler.locked(x, y, z, w, axes)
 
 
 def place_of(unit: Unit | None) -> Place | None:

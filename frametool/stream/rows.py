@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Word
+from frametool.stream.layout import Const, In, Instead, Out, Word
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, shortest_spans
 
@@ -115,15 +115,13 @@ def separators(pieces: Iterable[Piece], count: int) -> bytes:
 
 
 def assemble(
-    pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints, results: Floats | None = None
+    pieces: Sequence[Piece], parts: Sequence[Spans], size: int, values: Spans | None = None,
+    results: Floats | None = None,
 ) -> list[Spans]:
-    """Return the spans, in order, that make up the rows.
-
-    values: the texts of the results; locked: (n,) 1 where angles are not unique
-    """
+    """Return the spans, in order, that make up so many rows; values: the texts of the results."""
     return [
         worded(results[:, piece.number], piece) if isinstance(piece, Word) and results is not None
-        else _spans(piece, parts, values, locked)
+        else _spans(piece, parts, values, size)
         for piece in pieces
     ]  # fmt: skip
 
@@ -144,17 +142,20 @@ def worded(numbers: Floats, piece: Word) -> Spans:
     return Spans(framed(b"".join(texts)), starts[of_row], ends[of_row])
 
 
-def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:
+def constant(text: bytes, size: int) -> Spans:
+    """Return one text for so many rows."""
+    starts = np.full(size, MARGIN, np.int64)
+    return Spans(framed(text), starts, starts + len(text))
+
+
+def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, size: int) -> Spans:
     if isinstance(piece, (In, Instead)):
         return parts[piece.part if isinstance(piece, In) else piece.new]
     if isinstance(piece, Out) and values is not None:
         ends = values.ends[:, piece.first : piece.last].copy()
         ends[:, -1] -= 1
         return Spans(values.data, values.starts[:, piece.first : piece.last], ends)
-    text = piece.text if isinstance(piece, (Const, IfLocked)) else b""
-    data = framed(text)
-    starts = np.full(len(locked), MARGIN, np.int64)
-    return Spans(data, starts, starts + (locked * len(text) if isinstance(piece, IfLocked) else len(text)))
+    return constant(piece.text if isinstance(piece, Const) else b"", size)
 
 
 def chosen(spans: Spans, rows: Ints) -> Spans:

@@ -20,7 +20,7 @@ from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
 from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
-from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word
+from frametool.stream.layout import Const, In, Out, Renamed, Word
 from frametool.stream.record import POINT_KEYS, STALE
 from frametool.stream.row_layout import PARTS, POSE
 from frametool.stream.splice import OURS, Splicer
@@ -233,9 +233,9 @@ class Template:
             found += [] if each is None else [each]
         return found
 
-    def with_numbers(self, numbers: Sequence[str], *, locked: bool) -> str:
+    def with_numbers(self, numbers: Sequence[str]) -> str:
         """Return the text of the result."""
-        return filled(self.pieces, self.segments(), numbers, locked=locked)
+        return filled(self.pieces, self.segments(), numbers)
 
     def named(self, at: int, names: Names) -> NamedFrames | None:
         """Return the frames of the result of an entry that names these frames; None where that is to be read anew."""
@@ -474,7 +474,7 @@ def cut(
     return stretches, [piece for piece in pieces if not isinstance(piece, Out) or piece.last > piece.first]
 
 
-def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str], *, locked: bool = False) -> str:
+def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str]) -> str:
     """Put pieces together with the stretches of one text and the numbers of its result."""
     shown = []
     for piece in pieces:
@@ -484,7 +484,7 @@ def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str]
             shown.append(numbers[piece.first])
         elif isinstance(piece, Word):
             shown.append(piece.text(float(numbers[piece.number])).decode())
-        elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
+        elif isinstance(piece, (Const, Renamed)):
             shown.append(piece.text.decode())
     return "".join(shown)
 

@@ -50,9 +50,9 @@ from frametool.stream.row_poses import (
     spelled,
     texts_of,
 )
-from frametool.stream.rows import number_spans
+from frametool.stream.rows import constant, number_spans
 from frametool.text.csv_line import quoted
-from frametool.text.spans import MARGIN, Spans, framed, join
+from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -191,10 +191,10 @@ class TextWriter:
             np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.form == "yaml"
         )
         size, first = len(values), 0
-        parts = [_constant(form.between, size)] if form.between else []
+        parts = [constant(form.between, size)] if form.between else []
         for piece in form.row:
             if isinstance(piece, bytes):
-                parts.append(_constant(piece, size))
+                parts.append(constant(piece, size))
             elif isinstance(piece, Numbers):
                 parts += _numbers(numbers, first, piece)
                 first += piece.size
@@ -242,7 +242,7 @@ class TextWriter:
     # --- forms whose rows depend on what is written ---
 
     def _free(self, block: RowPoses, *, is_null: bool) -> bytes:
-        """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
+        """Write a block as the form was seen to write poses; one by one where it was not."""
         if is_null:
             return self._one_by_one(block)
         if not self.looked:
@@ -250,11 +250,7 @@ class TextWriter:
             self._learn(block)
             if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
                 self.rows = None
-        columns = self._own(tuple(block.numbers.T))
-        locked = self.target.locked(columns[:7])
-        if self.rows is None or (locked is not None and bool(np.any(locked))):
-            return self._one_by_one(block)
-        return self._filled(self.rows, block)
+        return self._one_by_one(block) if self.rows is None else self._filled(self.rows, block)
 
     def _own(self, columns: Components) -> Components:
         """Return seven components and what comes beside them; a pose without a position is at 0."""
@@ -359,11 +355,6 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
     return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
 
 
-def _constant(text: bytes, size: int) -> Spans:
-    starts = np.full(size, MARGIN, np.int64)
-    return Spans(framed(text), starts, starts + len(text))
-
-
 def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
     """Return the spans of neighbouring numbers, with what stands between them."""
     last = first + piece.size
@@ -373,7 +364,7 @@ def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
         return [Spans(numbers.data, numbers.starts[:, first:last], ends)]
     ends -= 1
     each = [Spans(numbers.data, numbers.starts[:, at], ends[:, at - first]) for at in range(first, last)]
-    between = _constant(piece.between, len(ends))
+    between = constant(piece.between, len(ends))
     return list(chain(*([part, between] for part in each)))[:-1]
 
 
