@@ -13,7 +13,7 @@ from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import floats
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, Reading, within
-from frametool.stream.record import find_records, lost_name, placed, value_at
+from frametool.stream.record import find_records, lost_name, placed
 from frametool.stream.row_layout import FLAT, LEAVES_PLANE, checked_rotation
 from frametool.stream.splice import target_of
 from frametool.stream.stamp_source import key_path, read_header_stamp, read_stamp, stamp_keys
@@ -130,11 +130,6 @@ def _path_beside(document: Document, record: Record, name: str) -> tuple[Path, .
 def _beside(find: Callable[..., Path], document: Document, record: Record, *name: str) -> Path:
     """Find a scalar around a record; raises Misfit."""
     return (document.index, *within((document.index,), find, document.value, record.path[1:], *name))
-
-
-def texts_of_stamp(document: Document, entry: Entry) -> list[str]:
-    """Return the texts of an entry's stamp."""
-    return [str(value_at(document.value, path[1:])) for path in entry.stamp]
 
 
 def answer(

@@ -11,10 +11,11 @@ from frametool.stream.evaluate import Plan
 from frametool.stream.faults import NULL, SKIP, Fault
 from frametool.stream.layout import In, Renamed
 from frametool.stream.record import KEYS_REMEDY
-from frametool.stream.record_text import attempt, column_in
+from frametool.stream.record_text import RecordText, attempt, column_in
 from frametool.stream.rows import Block
 from frametool.stream.splice import quoted_name
 from frametool.stream.splitter import DOCUMENTS, LINES, Part
+from frametool.stream.template import Template
 from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from frametool.stream.request import Request
     from frametool.stream.splitter import Splitter
-    from frametool.stream.template import Names, Template
+    from frametool.stream.template import Names
     from frametool.text.spans import Bytes, Ints
 
     Places: TypeAlias = Sequence[tuple[int, int]]
@@ -44,6 +45,11 @@ class Cut(NamedTuple):
     template: Template
     starts: Ints
     ends: Ints
+
+    def part(self, row: int) -> Part:
+        """Return where a record stands."""
+        ends = self.ends[row].tolist()
+        return Part(int(self.starts[row, -1]), int(self.starts[row, 0]), int(self.starts[row, -2]), ends[-2])
 
 
 class FoundRecords:
@@ -86,7 +92,7 @@ class RecordCutter:
         self.source = source
         self.templates: list[Template] = []
         self.closed = False
-        self._long: tuple[bytes, Template] | None = None  # the last record that was too long to be looked for again
+        self._long: tuple[bytes, RecordText] | None = None  # the last record that was too long to be looked for again
 
     def cut(self, text: bytes) -> tuple[FoundRecords, list[tuple[int, int]]]:
         """Return the records of a block that templates find, and what is left between them."""
@@ -111,11 +117,11 @@ class RecordCutter:
             if not parts or parts[0].problem:
                 return rest
             record = looked[parts[0].start : parts[0].end]
-            known = len(self.templates)
             if self.match(record, 0, len(record)) is None:
-                self.learn(looked, parts[0])
-                if len(self.templates) == known:
+                known = self.read(looked, parts[0])
+                if isinstance(known, Fault) or known.is_long or not known.entries:
                     return rest
+                self.learn(known)
             rest = self._cut(text, rest, self.templates[-1:], cuts)
         return rest
 
@@ -156,16 +162,14 @@ class RecordCutter:
             else:
                 yield part, None if part.problem else self.match(text, first, last)
 
-    def own_places(self, learned: Template, text: bytes, part: Part) -> tuple[Template, Places] | None:
-        """Return where the stretches of the record stand from which a template was learned."""
-        if not learned.is_long:
-            return self.match(text, part.start, part.end)
-        return learned, [(begin + part.start, end + part.start) for begin, end in learned.places()]
-
-    def learned(self, text: bytes, part: Part) -> tuple[Template, Places] | None:
+    def learned(self, known: RecordText | Fault, text: bytes, part: Part) -> tuple[Template, Places] | None:
         """Learn from a record; return the template, and where its stretches stand in it."""
-        found = self.learn(text, part)
-        return None if isinstance(found, (Fault, bytes)) else self.own_places(found, text, part)
+        if isinstance(known, Fault) or not known.entries:
+            return None
+        template = self.learn(known)
+        if not known.is_long:
+            return self.match(text, part.start, part.end)
+        return template, [(begin + part.start, end + part.start) for begin, end in template.places()]
 
     def match(self, text: bytes, begin: int, stop: int) -> tuple[Template, Places] | None:
         """Find the template that a record follows."""
@@ -177,19 +181,22 @@ class RecordCutter:
                 return template, found.regs[1:]
         return None
 
-    def learn(self, text: bytes, part: Part, line: int = 0) -> Fault | bytes | Template:
-        """Return the template of a record, or why it has none; keep it in mind unless it is long, not too many."""
+    def read(self, text: bytes, part: Part, line: int = 0) -> RecordText | Fault:
+        """Read a record, or say what is wrong with it; line: where it begins, counted from 0."""
         record = text[part.start : part.end]
         if self._long is not None and self._long[0] == record:
             return self._long[1]
-        learned = attempt(text, part, self.form, self.request, self.source, line)
-        if isinstance(learned, (Fault, bytes)):
-            return learned
-        if learned.is_long:
-            self._long = record, learned
-        else:
-            self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], learned]
-        return learned
+        known = attempt(text, part, self.form, self.request, self.source, line)
+        if isinstance(known, RecordText) and known.is_long:
+            self._long = record, known
+        return known
+
+    def learn(self, known: RecordText) -> Template:
+        """Make a template of a record; keep it in mind unless it is long, not too many."""
+        template = Template(known)
+        if not known.is_long:
+            self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
+        return template
 
 
 def block_of(cut: Cut, data: Bytes, text: bytes) -> Block:

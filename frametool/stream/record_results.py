@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool import sizes
 from frametool.documents.document import parse_nodes
-from frametool.documents.source import Source, decode
 from frametool.errors import FormatError, FrametoolError
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import NoResult
 from frametool.stream.faults import NULL, STOP, Fault, tell_of_rounding
-from frametool.stream.record_text import column_in, without_noise
-from frametool.stream.record_values import ROUNDED, Teller, plain, results
+from frametool.stream.record_text import attempt, fault_at, nulled
+from frametool.stream.record_values import ROUNDED, Teller, plain, values_of_text
 from frametool.stream.request import Memory
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
-from frametool.stream.template import nulled
 from frametool.text.lines import read_blocks
 
 if TYPE_CHECKING:
@@ -61,7 +59,7 @@ class BlockResults(NamedTuple):
 def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows) -> Iterator[BlockResults]:
     """Yield the results of a stream of records, block by block; bad ones are reported as rows are."""
     splitter = Splitter(form)
-    operation = request.operation
+    operation, request = request.operation, request._replace(canonical=True)
     depends = operation.formula is not None or operation.velocity or request.in_order or request.place
     alike: RecordRows | None = None
     line, rows = 1, 0
@@ -81,23 +79,16 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
             rows += 1
             line, at = line + block.count(b"\n", at, part.start), part.start
             before = bad.count
-            fault: Fault | None = None
-            source = Source(bad.source, "", line)
-            try:
-                if part.problem:
-                    fault = Fault(line, "", part.problem, final=part.final)
-                else:
-                    text = decode(block[part.start : part.end], bad.source)
-                    plain_text = without_noise(text) if form == "yaml" else text
-                    source = Source(bad.source, plain_text, line, column_in(block, part.start))
-                    found = results(source, request, style, memory, teller, json=form == "json")
-                    values += zip(count(part.start), found, strict=False)
-            except FormatError as error:
-                below, column = source.place(max(error.line, 1), error.column)
-                named = getattr(error, "column_name", "") or (str(column) if error.column else "")
-                fault = Fault(below, named, error.message, kind=error.kind)
-            except FrametoolError as error:
-                fault = Fault.of(line, "", error)
+            known = attempt(block, part, form, request, bad.source, line - 1, teller.tell)
+            fault = known if isinstance(known, Fault) else None
+            if not isinstance(known, Fault):
+                try:
+                    values += zip(count(part.start), values_of_text(known, style, memory, teller), strict=False)
+                except FormatError as error:
+                    fault = fault_at(known.source, error)
+                except FrametoolError as error:
+                    fault = Fault.of(line - 1, "", error)
+            fault = fault and fault._replace(line=fault.line + 1)
             if fault is not None and (fault.final or bad.on_error == STOP):
                 yield BlockResults([each.take((each.places < part.start).nonzero()[0]) for each in batches], values)
             bad.take([fault] if fault else [])

@@ -14,7 +14,6 @@ import numpy as np
 
 from frametool import sizes
 from frametool.documents.document import Node, parse_nodes
-from frametool.documents.source import Source
 from frametool.errors import FrametoolError, ValueInvalid
 from frametool.geometry import floats
 from frametool.geometry.representations import notation
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
 
     from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan
+    from frametool.stream.record_text import RecordText
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
@@ -127,7 +127,7 @@ class RecordRows:
                 hit = known
                 if hit is None and self.left and not part.problem:
                     self.left -= 1
-                    hit = self.cutter.learned(text, part)
+                    hit = self.cutter.learned(self.cutter.read(text, part), text, part)
                 if hit is None:
                     alone.append(part)
                 else:
@@ -243,7 +243,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)
-        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style, _Unmarked())
+        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style, _Unmarked(template.known))
     except (FrametoolError, ValueError):
         return None
     numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
@@ -276,7 +276,9 @@ def _stamped(value: Value, numbers: Mapping[str, int], *, is_spelled: bool) -> M
 class _Unmarked:
     """Stands for the text of a record with results in it, which shows no marks."""
 
-    source = Source("", "")
+    def __init__(self, known: RecordText) -> None:
+        """Take the record."""
+        self.known = known
 
     def at(self, _path: object) -> Any:
         """Refuse to say what stands at a path."""

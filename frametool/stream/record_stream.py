@@ -1,9 +1,13 @@
-"""JSON and YAML records as streams: each keeps its spelling and all its other keys, byte for byte."""
+"""JSON and YAML records as streams: each keeps its spelling and all its other keys, byte for byte.
+
+Few records of a whole stream are computed one by one, without numpy; of more those written alike are moved as arrays.
+"""
 
 from __future__ import annotations
 
 import re
 from contextlib import suppress
+from functools import cached_property
 from io import BufferedReader
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -12,32 +16,34 @@ from frametool import sizes
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream import stamp_source
 from frametool.stream.answers import Outside
-from frametool.stream.faults import SKIP, STOP, Fault, Outcome, RowNote
-from frametool.stream.record_text import Rendered, attempt, column_in, null_of, rendered
-from frametool.stream.splitter import ARRAY, NO_END, Splitter
+from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote
+from frametool.stream.record_text import RecordText, attempt, column_in, null_of
+from frametool.stream.splitter import ARRAY, NO_END, Part, Splitter
 from frametool.text.lines import Pieces, read_blocks
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterable, Iterator
+    from collections.abc import Generator, Iterable, Iterator, Sequence
 
+    from frametool.stream.evaluate import Run, State
+    from frametool.stream.record_cuts import Cut, FoundRecords, Places, RecordCutter
     from frametool.stream.request import Request
-    from frametool.stream.splitter import Part
+    from frametool.stream.template import Template
     from frametool.text.lines import ByteStream
 
+    Hit = tuple[Template, Places]
+
 _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
+MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
 
 
 def run_records(stream: ByteStream, form: str, request: Request, *, source: str) -> Generator[Outcome]:
     """Yield the outcomes of a stream of records."""
-    splitter = Splitter(form)
-    outcomes = _outcomes(stream, splitter, form, request, source=source)
+    outcomes = _outcomes(stream, RecordBlocks(form, request, source))
     yield from _as_array(outcomes, request.on_error) if form == "json" else outcomes
 
 
-def _outcomes(
-    stream: ByteStream, splitter: Splitter, form: str, request: Request, *, source: str
-) -> Generator[Outcome]:
-    blocks = read_blocks(stream, whole=splitter.whole)
+def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
+    blocks = read_blocks(stream, whole=work.splitter.whole)
     first = next(blocks, None)
     if first is None:
         return
@@ -47,16 +53,12 @@ def _outcomes(
             second = next(blocks, None)
         except FormatError as error:  # comes behind the results of what is whole
             blocks = _raising(error)
-    few = second is None and not request.in_order
-    if few and len((found := splitter.parts(first)).parts) <= sizes.FEW:
-        outcome = _singly(first, found.parts, form, request, source)
-        yield outcome._replace(is_open=None if splitter.layout != ARRAY else not found.closed)
+    few = second is None and not work.request.in_order
+    if few and len((found := work.splitter.parts(first)).parts) <= sizes.FEW:
+        yield work.few(first, found.parts, closed=found.closed)
         return
-    from frametool.stream.record_blocks import RecordBlocks
-
-    process = RecordBlocks(splitter, form, request, source)
     begun = [first, second] if second else [first]
-    yield from map(process, chain(begun, blocks))
+    yield from map(work.many, chain(begun, blocks))
 
 
 def _raising(error: FormatError) -> Iterator[bytes]:
@@ -118,35 +120,143 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
         yield Outcome(b"" if on_error == STOP else b"]\n", (fault,))
 
 
-def _singly(text: bytes, parts: list[Part], form: str, request: Request, source: str) -> Outcome:
-    """Return the outcome of the few records of a whole stream."""
-    out: list[bytes] = []
-    faults: list[Fault] = []
-    notes: list[RowNote] = []
-    at = mended = kept = 0
-    for part in parts:
-        out.append(text[at : part.begin])
-        at = part.after
-        line = text.count(b"\n", 0, part.start)
-        template = attempt(text, part, form, request, source, line)
-        made = template if isinstance(template, (Fault, bytes)) else rendered(
-            template, request, line, column_in(text, part.start)
+class Found:
+    """What one block holds beside the records that templates find: texts and faults by place, warnings, counts."""
+
+    def __init__(self) -> None:
+        """Create an empty one."""
+        self.texts: list[tuple[int, bytes]] = []
+        self.faults: list[tuple[int, Fault]] = []
+        self.notes: list[RowNote] = []
+        self.alone = self.mended = self.nulls = 0  # records that were rendered one by one, and rotations in them
+
+
+class RecordBlocks:
+    """Process one block of records after the other."""
+
+    def __init__(self, form: str, request: Request, source: str) -> None:
+        """Start without templates."""
+        self.form, self.request, self.source = form, request, source
+        self.splitter = Splitter(form)
+
+    def few(self, text: bytes, parts: Sequence[Part], *, closed: bool) -> Outcome:
+        """Return the outcome of the few records of a whole stream."""
+        found = Found()
+        self._take(text, 0, len(text), ((part, None) for part in parts), found)
+        return self._outcome(text, [], found, closed=closed)
+
+    @cached_property
+    def _bulk(self) -> tuple[RecordCutter, State]:
+        from frametool.stream.evaluate import State
+        from frametool.stream.record_cuts import RecordCutter
+
+        return RecordCutter(self.splitter, self.form, self.request, self.source), State()
+
+    def many(self, text: bytes) -> Outcome:
+        """Return the outcome of a block."""
+        from frametool.stream.record_cuts import in_order
+
+        cutter, _ = self._bulk
+        found = Found()
+        records, rest = cutter.cut(text)
+        for start, end in rest:
+            self._take(text, start, end, cutter.singly(text, start, end), found, records)
+        cuts = records.by_template()
+        return self._outcome(text, in_order(cuts) if self.request.in_order else cuts, found, closed=cutter.closed)
+
+    def _take(
+        self, text: bytes, start: int, end: int, parts: Iterable[tuple[Part, Hit | None]], found: Found,
+        records: FoundRecords | None = None,
+    ) -> None:  # fmt: skip
+        """Take records one by one, learning new templates if there are many; what stands between them passes."""
+        at, line, counted = start, 0, 0
+        for part, known in parts:
+            if part.begin > at:
+                found.texts.append((at, text[at : part.begin]))
+            at = part.after
+            line, counted = line + text.count(b"\n", counted, part.start), part.start
+            if records is not None and (hit := known or self._learned(text, part, line, found)) is not None:
+                records.add(part, *hit)
+            elif records is None:
+                self._alone(text, part, attempt(text, part, self.form, self.request, self.source, line), line, found)
+            if found.faults and self.request.on_error == STOP:
+                return
+        if at < end:
+            found.texts.append((at, text[at:end]))
+
+    def _learned(self, text: bytes, part: Part, line: int, found: Found) -> Hit | None:
+        """Return a template that is learned from a record; None for one that is taken alone."""
+        cutter, _ = self._bulk
+        made = cutter.read(text, part, line)
+        is_alone = isinstance(made, Fault) or (made.is_long and not self.request.in_order)
+        hit = None if is_alone else cutter.learned(made, text, part)
+        if hit is None:
+            self._alone(text, part, made, line, found)
+        return hit
+
+    def _alone(self, text: bytes, part: Part, made: RecordText | Fault, line: int, found: Found) -> None:
+        """Take what a record becomes, itself where nothing is in it, or why it becomes nothing."""
+        row = text[part.start : part.end]
+        done = made.rendered(line, column_in(text, part.start)) if isinstance(made, RecordText) else made
+        if not isinstance(done, Fault):
+            found.notes += done.notes
+            found.mended += done.mended
+            found.alone += 1
+            row = done.text or row
+        elif done.kind == Outside.kind:
+            return
+        else:
+            found.faults.append((part.begin, done))
+            if self.request.on_error != NULL or done.final:
+                return
+            found.nulls += 1
+            row = null_of(row, json=self.form == "json")
+        found.texts.append((part.begin, text[part.begin : part.start] + row + text[part.end : part.after]))
+
+    def _outcome(self, text: bytes, cuts: Sequence[Cut], found: Found, *, closed: bool) -> Outcome:
+        """Run every template's records, and put all of it in order."""
+        rows = sum(len(cut.starts) for cut in cuts) + len(found.faults) + found.alone
+        runs = self._runs(text, cuts, found) if cuts else []
+        stops = self.request.on_error == STOP and found.faults
+        end = min(place for place, _ in found.faults) if stops else len(text) + 1
+        texts = sorted(each for each in found.texts if each[0] < end)
+        if runs:
+            from frametool.stream.rows import texts_as_rows, written
+
+            groups = [group for run in runs for group in run.groups(end)]
+            out = written([*groups, texts_as_rows(texts)] if texts else groups)
+        else:
+            out = b"".join(piece for _, piece in texts)
+        return Outcome(
+            out,
+            [fault for _, fault in sorted(found.faults)],
+            rows,
+            text.count(b"\n"),
+            sum(len(run.mended) for run in runs) + found.mended,
+            sorted(found.notes),
+            len(text),
+            sum(len(run.rows) for run in runs) + found.alone + found.nulls,
+            None if self.splitter.layout != ARRAY else not closed,
         )
-        if isinstance(made, Rendered):
-            mended += made.mended
-            notes += made.notes
-            made = made.text
-        if isinstance(made, Fault) and made.kind == Outside.kind:
-            continue
-        if isinstance(made, Fault):
-            faults.append(made)
-            if request.on_error == STOP:
-                at = len(text)
-                break
-            if request.on_error == SKIP or made.final:
-                continue
-            made = null_of(text[part.start : part.end], json=form == "json")
-        kept += 1
-        out += [text[part.begin : part.start], made, text[part.end : part.after]]
-    out.append(text[at:])
-    return Outcome(b"".join(out), faults, len(parts), text.count(b"\n"), mended, notes, len(text), kept)
+
+    def _runs(self, text: bytes, cuts: Sequence[Cut], found: Found) -> list[Run]:
+        """Run the records of all templates; one that is bad is taken alone, which says where it is wrong."""
+        from frametool.stream.evaluate import Run
+        from frametool.stream.record_cuts import block_of, plan_of
+        from frametool.text.spans import framed
+
+        _, state = self._bulk
+        data, runs = framed(text), []
+        for cut in cuts:
+            run = Run(plan_of(cut.template, self.request, yaml=self.form == "yaml"), block_of(cut, data, text), state)
+            runs.append(run)
+            for at, row in enumerate(run.reasons):
+                fault = Fault.of(run.block.line_of(row), *run.reasons[row])
+                part = cut.part(row)
+                line = text.count(b"\n", 0, part.start) if at < MOST_EXACT else 0
+                made = attempt(text, part, self.form, self.request, self.source, line) if at < MOST_EXACT else fault
+                self._alone(text, part, made if isinstance(made, Fault) else fault, line, found)
+            found.notes += [run.note_of_degrees(*each) for each in run.doubted[:1]] + run.rounded
+            own = [*cut.template.notes, *cut.template.of_places]
+            found.notes += [each._replace(line=run.block.line_of(0)) for each in own if len(cut.starts)]
+        return runs

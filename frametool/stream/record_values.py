@@ -12,7 +12,7 @@ from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
-from frametool.documents.json import JSON_NUMBER, strict_json
+from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import Finding, FormatError, ValueInvalid, shown, warn
 from frametool.formats.table import has_no_text, is_recording
@@ -21,14 +21,13 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.answers import Outside, answer, read_entries, texts_of_stamp, written
-from frametool.stream.layout import Const, Word
-from frametool.stream.record import placed, value_at
+from frametool.stream.answers import Outside, read_entries, written
+from frametool.stream.record import STALE, placed, value_at
+from frametool.stream.record_text import RecordText
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
 from frametool.stream.splice import refuse_member, target_of
 from frametool.stream.stamp_source import read_stamp
-from frametool.stream.template import cut, edits_of, filled, json_documents, rest_of, used_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 SIX_BY_SIX = 36  # entries of the covariance of a pose
+NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
 LOST = "lost"  # rule of frames that results cannot name
 MOST_TOLD = 3  # of what is odd by one rule in one text
@@ -65,14 +65,14 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     )
     poses: list[Pose] = []
     beside: set[str] = set()
-    nodes: list[Node] = []
+    nodes: Node | None = None
     for document, records in documents(source, request):
         for record in records:
             poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(document, record, source)))
             unit = unit_of(record, document.value)
-            if not _says_no_more(record, document, unit):
-                nodes = nodes or parse_nodes(source.text)
-                beside.update(_header_stamp(record), _rest(_at(nodes, unit), unit, record))
+            if not _says_no_more(record, {document.index: document.value}, unit):
+                nodes = nodes or Node(0, 0, parse_nodes(source.text))
+                beside.update(_header_stamp(record), _rest(nodes.at(unit), unit, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses, beside
@@ -146,40 +146,37 @@ def documents(source: Source, request: Request) -> Iterator[tuple[Document, list
     teller.end(source.name)
 
 
-def results(
-    source: Source, request: Request, style: Style, memory: Memory | None = None, teller: Teller | None = None,
-    *, json: bool = False,
-) -> Iterator[Value]:  # fmt: skip
+def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     """Yield the results of every record of a text in a form: poses with what else their records say, or messages.
 
-    memory: of the records before this text; teller: of what was told before; json: the text is strict JSON.
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
-    own, memory, request = teller or Teller(), memory or Memory(), request._replace(canonical=True)
-    nodes: list[Node] = []
-    spliced = _Spliced(source, request)
-    units: dict[Path, tuple[Document, list[Answer]]] = {}
-    documents = json_documents(source) if json else parse_documents(source.text, source.name)
-    for document in documents:
-        entries = read_entries(document, request, source, partial(own.tell, source))
-        found = (_answer(document, entry, request, source, memory, own) for entry in entries)
-        answers = [each for each in found if each is not None]
-        for each in answers:
-            units.setdefault(unit_of(each.entry.record, document.value), (document, []))[1].append(each)
-        spliced.add(entries, answers)
-    for unit, (document, ours) in units.items():
-        if all(_says_no_more(each.entry.record, document, unit) for each in ours):
-            yield from values_of_unit(NOTHING, unit, ours, request, style, spliced)
-            continue
-        nodes = nodes or parse_nodes(source.text)
+    own = Teller()
+    known = RecordText(source, request._replace(canonical=True), json=False, note=partial(own.tell, source))
+    yield from values_of_text(known, style, Memory(), own)
+    own.end(source.name)
+
+
+def values_of_text(known: RecordText, style: Style, memory: Memory, own: Teller) -> Iterator[Value]:
+    """Yield the results of the records of a text.
+
+    memory: of the records before; own: tells what is odd.  Raises FormatError for a record without a result.
+    """
+    made = [each for entry in known.entries if (each := _answer(known, entry, memory, own)) is not None]
+    units: dict[Path, list[Answer]] = {}
+    for each in made:
+        record = each.entry.record
+        units.setdefault(unit_of(record, value_at(known.values, record.path[:1])), []).append(each)
+    written_back = _WrittenBack(known, made)
+    for unit, ours in units.items():
+        alone = all(_says_no_more(each.entry.record, known.values, unit) for each in ours)
+        node = NOTHING if alone else known.root.at(unit)
         try:
-            yield from values_of_unit(_at(nodes, unit), unit, ours, request, style, spliced)
+            yield from values_of_unit(node, unit, ours, known.request, style, written_back)
         except Aliased as error:
-            raise error.in_text(source.text) from None
-    if teller is None:
-        own.end(source.name)
-    if not documents:
-        raise FormatError("nothing in it", source=source.name)
+            raise error.in_text(known.text) from None
+    if not known.values:
+        raise FormatError("nothing in it", source=known.source.name)
 
 
 def unit_of(record: Record, document: Any) -> Path:
@@ -187,17 +184,14 @@ def unit_of(record: Record, document: Any) -> Path:
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
 
 
-def _answer(
-    document: Document, entry: Entry, request: Request, source: Source, memory: Memory, own: Teller
-) -> Answer | None:
+def _answer(known: RecordText, entry: Entry, memory: Memory, own: Teller) -> Answer | None:
     """Apply the operation to one record; the first of all has no velocity and so no result."""
-    record = entry.record
+    record, source = entry.record, known.source
     own.counts[LOST] += bool(entry.lost)
     if entry.lost and own.counts[LOST] == 1:
         warn(f"{source.name}: frame {shown(entry.lost)} is left out: the frames of the result are not known")
     try:
-        asked = request.for_kind(record.shape.kind)
-        found = answer(entry, record.values, texts_of_stamp(document, entry), asked, memory)
+        found = known.answer(entry, memory)
     except Outside:
         return None
     except Misfit as misfit:
@@ -205,8 +199,8 @@ def _answer(
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
         raise placed(bad, source) from bad
-    is_told = asked.operation.uncertain  # of what moves others that is told elsewhere
-    if found is not None and not is_told and len(asked.operation.carried(record.shape)) == SIX_BY_SIX:
+    operation = known.request.operation  # of what is uncertain and moves others that is told elsewhere
+    if found is not None and not operation.uncertain and len(operation.carried(record.shape)) == SIX_BY_SIX:
         from frametool.geometry.uncertainty import WIDE_RULE, doubt
 
         if not own.counts[WIDE_RULE] and (told := doubt(found.parts[-SIX_BY_SIX:])):
@@ -214,56 +208,37 @@ def _answer(
     return found
 
 
-class _Spliced:
+class _WrittenBack:
     """The text with the results in the place of what they come from, read again: records as streams write them."""
 
-    def __init__(self, source: Source, request: Request) -> None:
+    def __init__(self, known: RecordText, answers: Sequence[Answer]) -> None:
         """Keep what is needed; nothing is done before something is asked for."""
-        self.source = source
-        self.entries: list[Entry] = []
-        self.answers: dict[tuple[Path | None, ...], Answer] = {}
-        is_usual = [form.spec for form in request.notations] == ["quaternion"]
-        self.request = request._replace(notations=()) if is_usual else request
+        self.known, self.answers = known, answers
         # our numbers are written as numbers that nothing else in the text is, and found again by their ends
-        self.mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in source.text)
+        self.mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in known.text)
         self.numbers: list[float] = []
-
-    def add(self, entries: Sequence[Entry], answers: Sequence[Answer]) -> None:
-        """Add the records of a document, and what became of them."""
-        self.entries += entries
-        self.answers |= {each.entry.record.numbers: each for each in answers}
 
     def at(self, path: Path) -> Any:
         """Return what stands at a path as a plain value, its numbers as floats."""
-        return plain(_at(self._nodes, path), self._number)
+        return plain(self._root.at(path), self._number)
 
     def _number(self, text: str) -> float | None:
         return self.numbers[int(text.removesuffix(self.mark))] if text.endswith(self.mark) else None
 
     @cached_property
-    def _nodes(self) -> list[Node]:
-        entries = [each._replace(target=target_of(each.record, self.request)) for each in self.entries]
+    def _root(self) -> Node:
+        known, request = self.known, self.known.request
+        if [form.spec for form in request.notations] == ["quaternion"]:  # the usual one
+            request = request._replace(notations=())
+        entries = [each._replace(target=target_of(each.record, request)) for each in known.entries]
+        made = {each.entry.record.numbers: each for each in self.answers}
         for entry in entries:
-            each = self.answers.get(entry.record.numbers)
-            size = self.request.result_size(entry.record.shape, entry.target)
+            size = request.result_size(entry.record.shape, entry.target)
+            each = made.get(entry.record.numbers)
             self.numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
-        text = self.source.text
-        root = Node(0, len(text), parse_nodes(text))
-        edits = edits_of(text, entries, root, self.request, json=_is_json(self.source))
-        stretches, pieces = cut(len(text), (), edits)
-        pieces = [
-            Const(each.text(self.numbers[each.number])) if isinstance(each, Word) else each for each in pieces
-        ]
         marked = [f"{at}{self.mark}" for at in range(len(self.numbers))]
-        return parse_nodes(filled(pieces, [text[slice(*each)] for each in stretches], marked))
-
-
-def _is_json(source: Source) -> bool:
-    """Tell whether a text is strict JSON, whose members have quotes."""
-    try:
-        return bool(strict_json(source))
-    except FormatError:
-        return False
+        text = known.with_numbers(known.edits_for(entries, request), marked, self.numbers)
+        return Node(0, len(text), parse_nodes(text))
 
 
 def values_of_unit(
@@ -289,7 +264,7 @@ def values_of_unit(
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif is_list or not _stays(node, kind, style):
-            yield _flat(node, unit, each, request, style.form, spliced.source)
+            yield _flat(node, unit, each, request, style.form, spliced.known.source)
         else:
             yield spliced.at(unit)
 
@@ -384,9 +359,36 @@ def _read_stamp(key: str, value: Any) -> int:
     return read_stamp(str(value), in_ns=in_nanoseconds(key))
 
 
-def _says_no_more(record: Record, document: Document, unit: Path) -> bool:
+def used_keys(record: Record) -> set[str]:
+    """Return the keys of a record that say its pose, or what is no longer true of the result."""
+    halves = PARTS.get(record.shape.kind, ())
+    own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
+    return {*own, *halves, *NOT_PLAIN}
+
+
+def rest_of(node: Node, unit: Path, record: Record) -> dict[str, Node]:
+    """Return what a record and the mappings around it say beside the pose, its frames and its stamp, by key.
+
+    node: the thing that the record's result is; unit: the path of that
+    """
+    used = used_keys(record)
+    names = {path for each in (record.name, record.parent) for path in each.paths}
+    rest: dict[str, Node] = {}
+    for depth in range(len(unit), len(record.path) + 1):
+        path = record.path[:depth]
+        holder = node.at(path[len(unit) :])
+        if type(holder.value) is not dict:
+            continue
+        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
+        for key, (_, value) in holder.value.items():
+            if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
+                rest.setdefault(key, value)
+    return rest
+
+
+def _says_no_more(record: Record, documents: dict[int, Any], unit: Path) -> bool:
     """Tell whether a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
-    value = value_at(document.value, unit[1:])
+    value = value_at(documents, unit)
     if record.path != unit or record.shape.kind != POSE or type(value) is not dict:
         return False
     names = {path[-1] for each in (record.name, record.parent) for path in each.paths if path[:-1] == unit}
@@ -432,7 +434,7 @@ def _place_as_read(node: Node, record: Record, source: Source) -> list[float]:
     return [*place.lla(numbers)]
 
 
-def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _Spliced) -> dict[str, Any]:
+def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _WrittenBack) -> dict[str, Any]:
     """Return a message of several things as a mapping without levels, a key for each of their numbers."""
     first = answers[0].entry
     found = {"frame": first.parent} | _header_stamp(first.record) | _rest(node, unit, first.record)
@@ -474,8 +476,3 @@ def plain_scalar(text: str) -> str | Verbatim | None:
     if text in ("null", "~", ""):
         return None
     return Verbatim(text) if text in ("true", "false") or re.fullmatch(JSON_NUMBER, text) else text
-
-
-def _at(nodes: list[Node], path: Path) -> Node:
-    """Return the node at a path that begins with the index of its document."""
-    return nodes[int(path[0])].at(path[1:])

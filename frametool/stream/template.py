@@ -8,34 +8,30 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from itertools import accumulate, chain, count, islice
+from itertools import accumulate, chain, count
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from frametool.documents.document import Aliased, Document, Node, parse_documents, parse_nodes
-from frametool.documents.json import JSON_NUMBER, strict_json
-from frametool.documents.source import Source, check_text
-from frametool.errors import FormatError, FrametoolError
+from frametool.documents.json import JSON_NUMBER
+from frametool.errors import FrametoolError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
-from frametool.stream.answers import answer, read_entries
 from frametool.stream.faults import RowNote
-from frametool.stream.layout import Const, In, Out, Renamed, Word
-from frametool.stream.record import POINT_KEYS, STALE
-from frametool.stream.row_layout import PARTS, POSE
-from frametool.stream.splice import OURS, Splicer
+from frametool.stream.layout import Const, Renamed
+from frametool.stream.record import POINT_KEYS
+from frametool.stream.record_text import cut
+from frametool.stream.row_layout import POSE
+from frametool.stream.splice import OURS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
-    from frametool.errors import Finding
+    from frametool.documents.document import Node
     from frametool.grammar.readers import Path
-    from frametool.stream.answers import Answer, Entry
-    from frametool.stream.layout import Piece
     from frametool.stream.record import Record
+    from frametool.stream.record_text import RecordText
     from frametool.stream.request import Request
     from frametool.stream.row_layout import Shape
-    from frametool.stream.splice import Edit
     from frametool.stream.stamp_source import Timed
 
     Names: TypeAlias = tuple[str | None, str | None]
@@ -70,10 +66,7 @@ _WORDS = frozenset(
 )  # fmt: skip
 COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
 TOLD = DESCRIPTIVE - {"frame"}  # whatever a number under these is, it tells of a result; null may be another record
-NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 MOST_NAMES = 1 << 16  # of frames, kept in mind
-MOST_LEAVES = 2000
-"""Scalars of a record that is learned for others: an expression for more takes longer than they are worth."""
 
 
 class NamedFrames(NamedTuple):
@@ -96,28 +89,19 @@ class Template:
     leaves: of what is written anew, the scalars that decide nothing: the stretch of each, and where it was learned
     """
 
-    def __init__(
-        self,
-        text: str,
-        entries: Sequence[Entry],
-        root: Node,
-        edits: Sequence[Edit],
-        request: Request,
-        notes: Sequence[Finding] = (),
-        *,
-        json: bool,
-    ) -> None:
+    def __init__(self, known: RecordText) -> None:
         """Cut the text where numbers, stamps and edits are."""
-        self.text = text
-        self.entries = tuple(entries)
-        self.json = json
-        self.notes = list(_notes(entries))
-        self.own_notes = notes
-        self.of_places = [RowNote(0, each.rule, each.message) for each in notes if each.rule in OF_PLACES]
-        self._root = root
-        self._request = request
+        self.known = known
+        self.text = text = known.text
+        self.entries = tuple(known.entries)
+        self.json, self.is_long = known.json, known.is_long
+        self.notes = list(known.row_notes())
+        self.own_notes = known.notes
+        self.of_places = [RowNote(0, each.rule, each.message) for each in known.notes if each.rule in OF_PLACES]
+        self._root = known.root
+        self._request = known.request
         cuts, patterns = self._cuts()
-        self.stretches, pieces = cut(len(text), sorted(cuts), edits)
+        self.stretches, pieces = cut(len(text), sorted(cuts), known.edits)
         self._frames_at: dict[int, tuple[int, int, Node]] = {}
         for number, nodes in enumerate(self._frame_nodes):
             for role, node in enumerate(nodes):
@@ -207,35 +191,11 @@ class Template:
             return request.timed
         return request.timed._replace(name=str(found))
 
-    @cached_property
-    def is_long(self) -> bool:
-        """Tell whether the record has so many scalars that no other one is looked for that is written alike."""
-        leaves = _leaves(self._root, ())
-        return next(islice(leaves, MOST_LEAVES, None), None) is not None
-
     def places(self) -> list[tuple[int, int]]:
         """Return where each stretch stands in the record that was learned, in bytes."""
-        sizes = [len(segment.encode()) for segment in self.segments()]
+        sizes = [len(self.text[start:end].encode()) for start, end in self.stretches]
         ends = list(accumulate(sizes))
         return list(zip([0, *ends[:-1]], ends, strict=True))
-
-    def segments(self) -> list[str]:
-        """Return the text of each stretch."""
-        return [self.text[start:end] for start, end in self.stretches]
-
-    def answers(self, request: Request) -> list[Answer]:
-        """Return what becomes of the records of the text that was learned from."""
-        texts, values = self.segments(), iter(self.values)
-        found = []
-        for entry, stamp in zip(self.entries, self.stamps, strict=True):
-            own = list(islice(values, entry.record.shape.size))
-            each = answer(entry, own, [texts[index] for index in stamp], request)
-            found += [] if each is None else [each]
-        return found
-
-    def with_numbers(self, numbers: Sequence[str]) -> str:
-        """Return the text of the result."""
-        return filled(self.pieces, self.segments(), numbers)
 
     def named(self, at: int, names: Names) -> NamedFrames | None:
         """Return the frames of the result of an entry that names these frames; None where that is to be read anew."""
@@ -368,42 +328,6 @@ class Template:
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
 
 
-def used_keys(record: Record) -> set[str]:
-    """Return the keys of a record that say its pose, or what is no longer true of the result."""
-    halves = PARTS.get(record.shape.kind, ())
-    own = record.key, record.rotation, *record.others, *record.flat, *record.members, *record.placed
-    return {*own, *halves, *NOT_PLAIN}
-
-
-def rest_of(node: Node, unit: Path, record: Record) -> dict[str, Node]:
-    """Return what a record and the mappings around it say beside the pose, its frames and its stamp, by key.
-
-    node: the thing that the record's result is; unit: the path of that
-    """
-    used = used_keys(record)
-    names = {path for each in (record.name, record.parent) for path in each.paths}
-    rest: dict[str, Node] = {}
-    for depth in range(len(unit), len(record.path) + 1):
-        path = record.path[:depth]
-        holder = node.at(path[len(unit) :])
-        if type(holder.value) is not dict:
-            continue
-        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
-        for key, (_, value) in holder.value.items():
-            if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
-                rest.setdefault(key, value)
-    return rest
-
-
-def _notes(entries: Sequence[Entry]) -> Iterator[RowNote]:
-    """Yield what is worth telling about the records of a text."""
-    for entry in entries:
-        if entry.lost:
-            yield RowNote.of_lost_name(0, entry.lost)
-        if not entry.record.values and entry.record.shape.kind:
-            yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
-
-
 def _stem(key: str) -> str:
     """Return a key without its unit: beside our numbers its scalar may be one of them or change what they mean."""
     return re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0]
@@ -443,105 +367,3 @@ def _as_frame(node: Node | None, *, json: bool) -> Node | None:
 def _text_of(node: Node) -> Span:
     """Return where the text of a scalar stands, without its quotes."""
     return node.start + bool(node.quote), node.end - bool(node.quote)
-
-
-def cut(
-    length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
-) -> tuple[list[tuple[int, int]], list[Piece]]:
-    """Cut a text into stretches, each number one of its own; return them with the pieces of the result."""
-    stretches: list[tuple[int, int]] = []
-    pieces: list[Piece] = []
-    slots = list(reversed(cuts))
-
-    def walk(start: int, end: int, *, shown: bool) -> None:
-        """Add the stretches from start to end; they are pieces of the result if they are shown."""
-        while start < end:
-            slot = slots[-1] if slots and slots[-1][1] <= end else None
-            stop = end if slot is None else slot[0] if slot[0] > start else slots.pop()[1]
-            stretches.append((start, stop))
-            if shown:
-                pieces.append(In(len(stretches) - 1))
-            start = stop
-
-    at = 0
-    for edit in sorted(edits, key=lambda each: (each.start, each.end)):
-        start = max(edit.start, at)
-        walk(at, start, shown=True)
-        pieces += edit.pieces
-        walk(start, max(edit.end, start), shown=False)
-        at = max(edit.end, start)
-    walk(at, length, shown=True)
-    return stretches, [piece for piece in pieces if not isinstance(piece, Out) or piece.last > piece.first]
-
-
-def filled(pieces: Sequence[Piece], texts: Sequence[str], numbers: Sequence[str]) -> str:
-    """Put pieces together with the stretches of one text and the numbers of its result."""
-    shown = []
-    for piece in pieces:
-        if isinstance(piece, In):
-            shown.append(texts[piece.part])
-        elif isinstance(piece, Out):
-            shown.append(numbers[piece.first])
-        elif isinstance(piece, Word):
-            shown.append(piece.text(float(numbers[piece.number])).decode())
-        elif isinstance(piece, (Const, Renamed)):
-            shown.append(piece.text.decode())
-    return "".join(shown)
-
-
-def learn(text: str, request: Request, *, json: bool, source: str, line: int) -> Template | None:
-    """Learn from the text of one record; None if there is nothing in it.
-
-    line: of the record's first character, from 1.  Raises FormatError with the place.
-    """
-    here = Source(source, text)
-    notes: list[Finding] = []
-    try:
-        documents = json_documents(here) if json else parse_documents(text, source)
-        entries = [entry for document in documents for entry in read_entries(document, request, here, notes.extend)]
-    except FormatError as error:
-        error.line += line - 1
-        raise
-    if not entries:
-        return None
-    root = Node(0, len(text), parse_nodes(text))
-    try:
-        edits = [] if request.canonical else edits_of(text, entries, root, request, json=json)
-        return Template(text, entries, root, edits, request, notes, json=json)
-    except Aliased as error:
-        error.in_text(text).line += line - 1
-        raise
-
-
-def nulled(text: str, *, json: bool) -> str | None:
-    """Return the text of a record with null in the place of our numbers; None if it has none that can be found."""
-    from frametool.stream.splice import null_edits
-
-    try:
-        json_documents(Source("", text)) if json else parse_documents(text, "")
-        edits = null_edits(Node(0, len(text), parse_nodes(text)))
-    except FormatError:
-        return None
-    if not edits:
-        return None
-    segments, pieces = cut(len(text), (), edits)
-    shown = (text[slice(*segments[each.part])] if isinstance(each, In) else "null" for each in pieces)
-    return "".join(shown)
-
-
-def json_documents(source: Source) -> list[Document]:
-    """Read strict JSON: what only YAML would take is a fault of the record."""
-    check_text(source)
-    values = strict_json(source)
-    return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
-
-
-def edits_of(text: str, entries: Sequence[Entry], root: Node, request: Request, *, json: bool) -> list[Edit]:
-    """Return what changes in a text; a name that several records share changes once."""
-    edits: list[Edit] = []
-    first = 0
-    for entry in entries:
-        shape = entry.record.shape
-        edits += Splicer(text, root, entry, request, json=json, first=first).run()
-        first += request.result_size(shape, entry.target)
-    return list(dict.fromkeys(edits))
