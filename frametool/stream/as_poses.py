@@ -25,10 +25,10 @@ from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote, notes_of
 from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
-from frametool.stream.row_poses import RowPoses, TablePoses, kept, spans_of
+from frametool.stream.row_poses import RowPoses, kept, spans_of
 from frametool.stream.rows import Block
 from frametool.stream.table import rename_of
-from frametool.stream.table_stream import begin_table, moves_in_time, settle_stamps
+from frametool.stream.table_stream import TablePoses, begin_table
 from frametool.stream.writers import LEARNED
 from frametool.text.spans import Spans, framed
 
@@ -142,27 +142,17 @@ class FormatConverter:
         """Yield the rows of a table."""
         form, request = FORMATS[self.form].poses, self.request
         begun = begin_table(stream, self.form, request, source=self.source, header=header)
-        request, unasked = settle_stamps(begun.table, request, self.source)
-        rows = TablePoses(begun, self.form, request, self.source)
+        rows = TablePoses(begun.table, request, self.source)
         self._settle(rows.shape, rows.plan, rows.columns, line=1)
-        count = before = mended = 0
+        count = 0
         yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
-        for block, _, text in rows.blocks(begun):
+        for block, _, outcome in rows.blocks(begun):
             poses = self._with_place(block, lambda size: [*rows.given[:size]])
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            stamps = self._stamps(poses, form, count)
+            poses = poses._replace(stamps_ns=self._stamps(poses, form, count))
             count += len(poses.numbers)
-            if unasked is not None and len(poses.numbers) and moves_in_time(unasked, {*poses.given} or {None}):
-                rows.notes.insert(0, RowNote.of_latest(int(poses.lines[0]), unasked.name))
-                unasked = None
-            yield Step(
-                poses._replace(stamps_ns=stamps),
-                Outcome(
-                    b"", rows.faults, rows.rows - before, text.count(b"\n"), rows.mended - mended, rows.notes, len(text)
-                ),
-            )
-            before, mended = rows.rows, rows.mended
+            yield Step(poses, outcome)
         if self.stamps:
             self.stamps.finish(count, self.source)
         if is_trajectory(self.form):
@@ -202,9 +192,7 @@ class FormatConverter:
                 there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
                 self.without += len(poses.numbers) - len(there)
                 poses = kept(poses, there)
-            yield Step(
-                poses, Outcome(b"", rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read)
-            )
+            yield Step(poses, rows.outcome(batch))
         if self.without:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
             warn(f"{self.source}: {count} without numbers left out: {self.style.form} has no place for them")
@@ -269,11 +257,9 @@ def _plan(request: Request) -> Plan:
     shape = Shape(POSE, 1.0, QUATERNION)
     target = Target(1.0, ((QUATERNION, False),), keep_sign=True)
     edge = request.pose_from_frame if request.operation.moves and request.timed is not None else None
-    return Plan(
-        (shape,), (target,), request.operation, (), ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge,
-        normalize=request.normalize, on_error=request.on_error, gathered=request.gathered,
-        timed=request.timed if request.timed is not None and request.timed.name else None, window=request.window,
-    )  # fmt: skip
+    timed = request.timed if request.timed is not None and request.timed.name else None
+    request = request._replace(timed=timed, extra_column=None, unwrap=False)
+    return Plan((shape,), (target,), request, ("x", "y", "z", "qx", "qy", "qz", "qw"), edge_of=edge)
 
 
 def _block(poses: PoseBlock) -> Block:

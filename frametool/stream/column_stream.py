@@ -25,16 +25,14 @@ from frametool.formats.rows.column_file import (
 from frametool.formats.table import FORMATS
 from frametool.grammar.names import NORMALS, in_nanoseconds, stamp_column
 from frametool.stream.array_writer import ColumnsWriter
-from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, SKIP, STOP, Fault, Outcome, RowNote, notes_of
+from frametool.stream.faults import NULL, SKIP, STOP, Outcome
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_layout import POSE, Shape
 from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
-from frametool.stream.table import Naming, Table, unnamed
-from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
-from frametool.stream.table_stream import moves_in_time, settle_stamps
+from frametool.stream.table import Table, unnamed
+from frametool.stream.table_plan import has_vectors, with_vectors
+from frametool.stream.table_stream import PlannedRows
 from frametool.text.cells import Cells
 from frametool.text.spans import Spans, framed
 
@@ -45,6 +43,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.result import Style
     from frametool.recordings.messages import PointCloud
+    from frametool.stream.evaluate import Run
+    from frametool.stream.faults import Fault, RowNote
     from frametool.stream.table import BlockNames
     from frametool.text.spans import Flags, Floats, Ints
 
@@ -69,7 +69,7 @@ class RowResults(NamedTuple):
     given: Sequence[str | None]
 
 
-class ColumnRows:
+class ColumnRows(PlannedRows):
     """Turn the rows of one batch after the other into results; the bad ones are listed in `faults`.
 
     faults, notes: of the last batch, rows from 0
@@ -80,30 +80,19 @@ class ColumnRows:
         self.file = file
         self.source = source
         names = file.names
-        self.table = Table(b",", names, file.width, header=tuple(quoted(name, b",") for name in names or ()))
-        request = with_vectors(file.names, request, file.vectors)
+        table = Table(b",", names, file.width, header=tuple(quoted(name, b",") for name in names or ()))
         try:
-            self.request, self.unasked = settle_stamps(self.table, request, source)
-            self.plan, self.layout = plan_table(self.table, self.request, source)
+            super().__init__(table, with_vectors(names, request, file.vectors), source)
         except FormatError as error:
             error.line = 0  # the names of columns stand in no line here
             raise
         for at, place in enumerate(self.layout.places):
             if file.kind(place) is None and at not in self.plan.words:
-                raise Misused(f"column {self.table.name(place)} holds no numbers", source=source)
-        self.plan = self.plan._replace(pieces=())
-        self.naming = Naming(self.table, self.layout, self.request.for_kind(self.shape.kind))
-        self.state = State()
+                raise Misused(f"column {table.name(place)} holds no numbers", source=source)
         self.faults: list[Fault] = []
         self.notes: list[RowNote] = []
-        self.mended = 0
         self.narrow = {} if request.all_numbers else self._narrow()  # all of them are written as doubles
         self.numbers = sum(isinstance(column, New) for column in self.layout.columns)
-
-    @property
-    def shape(self) -> Shape:
-        """Return what a row is, the first of several."""
-        return self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
 
     def columns(self) -> list[OutColumn]:
         """Return the columns of the output; what is read as float32 is written so, what is new is a double."""
@@ -174,12 +163,16 @@ class ColumnRows:
             bad={**late, **names.bad, **bad}, frames=names.frames, lost=names.lost, values=values, times=times,
             weights=weights,
         )  # fmt: skip
-        run = Run(self.plan, block if present is None else _chosen(block, present), self.state)
+        run = self.ran(block if present is None else _chosen(block, present))
         self._round(run)
         self.faults = run.faults()
-        self.notes = self._noted(run, block)
-        self.mended += len(run.mended)
+        self.notes = self.notes_of(run, block.frames)
         return self._settled(run, size, present, absent, names)
+
+    def outcome(self, batch: Batch, text: bytes = b"") -> Outcome:
+        """Return what is written of the last batch, and what is said of it."""
+        mended, self.mended = self.mended, 0
+        return Outcome(text, self.faults, batch.size, batch.size, mended, self.notes, batch.bytes_read)
 
     def poses(self, batch: Batch) -> RowPoses:
         """Return the results of a batch for another form, with what else its rows hold."""
@@ -251,8 +244,9 @@ class ColumnRows:
     def _without_pose(self, absent: Sequence[Flags | None]) -> Flags | None:
         """Return which rows cannot be computed: 0 is a point, but no rotation."""
         gone: Flags | None = None
+        request = self.request
         for shape, flags in zip(self.plan.shapes, absent, strict=False):
-            if shape.notation is not None or self.plan.operation.formula is not None or self.plan.gathered is not None:
+            if shape.notation is not None or request.operation.formula is not None or request.gathered is not None:
                 gone = _either(gone, flags)
         return gone
 
@@ -282,13 +276,13 @@ class ColumnRows:
 
     @property
     def _weighs(self) -> bool:
-        return self.plan.gathered is not None and bool(self.plan.beside)
+        return self.request.gathered is not None and bool(self.request.extra_column)
 
     def _weights(self, batch: Batch, bad: dict[int, tuple[str, str]]) -> Floats | None:
         """Read the weights of rows; those that are none are bad."""
         if self.layout.time is None or not self._weighs:
             return None
-        if self.plan.gathered is not None and self.plan.gathered.labelled:
+        if self.request.gathered is not None and self.request.gathered.labelled:
             return np.array(batch.texts(self.layout.time), object)
         weights, nulls = batch.numbers(self.layout.time)
         odd = _either(nulls, not_finite(weights))
@@ -308,13 +302,6 @@ class ColumnRows:
             if beyond.any():
                 run.refuse(run.rows[beyond].tolist(), f"the result is too large for {kind}")
 
-    def _noted(self, run: Run, block: Block) -> list[RowNote]:
-        notes = notes_of(run, run.block)
-        if self.unasked is not None and len(block.places) and moves_in_time(self.unasked, set(block.frames) or {None}):
-            notes.append(RowNote.of_latest(0, self.unasked.name))
-            self.unasked = None
-        return sorted(notes)
-
     def _settled(
         self, run: Run, size: int, present: Ints | None, absent: Sequence[Flags | None], names: BlockNames
     ) -> RowResults:
@@ -324,9 +311,9 @@ class ColumnRows:
         written = np.ones(size, np.bool_)
         if run.lone is not None:
             written[run.block.line_of(run.lone)] = False
-        if self.plan.on_error == STOP and len(bad):
+        if self.request.on_error == STOP and len(bad):
             written[int(bad.min()) :] = False
-        elif self.plan.on_error == NULL and len(bad):
+        elif self.request.on_error == NULL and len(bad):
             absent = [_either(flags, np.isin(np.arange(size), bad)) for flags in absent]
         else:
             written[bad] = False
@@ -422,10 +409,7 @@ def run_columns(
             text = other.of_columns(len(results.numbers), _in_other_form(columns, rows, batch, results))
         elif writer is not None:
             text = writer.of_rows(batch, results.rows, made_of(columns, rows, results))
-        yield Outcome(
-            text, rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read,
-        )  # fmt: skip
-        rows.mended = 0
+        yield rows.outcome(batch, text)
     if other is not None and not other.begun:
         empty = file.nothing()
         other.of_columns(0, _in_other_form(columns, rows, empty, rows.of_batch(empty)))
@@ -469,8 +453,7 @@ class MergedClouds:
                 for name, kind in self.kinds.items()
             }
             text = self.writer.of_columns(len(results.numbers), typed)
-            yield Outcome(text, rows.faults, batch.size, batch.size, rows.mended, rows.notes, batch.bytes_read)
-            rows.mended = 0
+            yield rows.outcome(batch, text)
 
 
 def _in_other_form(

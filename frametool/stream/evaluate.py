@@ -46,12 +46,10 @@ if TYPE_CHECKING:
 
     from frametool.geometry.representations import BatchRule
     from frametool.geometry.types import Components, Rigid
-    from frametool.stream.gathering import Gathered
     from frametool.stream.layout import Piece
-    from frametool.stream.request import Operation
+    from frametool.stream.request import Request
     from frametool.stream.row_layout import Target
     from frametool.stream.rows import Block
-    from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Flags, Floats, Ints
 
 
@@ -61,41 +59,30 @@ COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 
 
 class Plan(NamedTuple):
-    """What is done to every row of one layout.
+    """What is done to every row of one layout, as a request asks.
 
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
     pieces: the text of a result; null: what stands for each number of a row without one
     edge_of: the pose that moves a row, or one of its shapes, by the name of the frame it is given in
-    words: reads the numbers that are words of a table, by column: zones; marked: angles that are no plain number
-    beside: the name of what is read beside the numbers, a stamp or a weight; gathered: takes the poses
-    timed: those that do so in time; source: the frame that rows are given in, whatever they name
+    source: the frame that rows are given in, whatever they name; frame_column: the name of the column that names frames
     remedies: for each shape, what to do where its angles are degrees
-    offset_ns: what is added to the stamps of rows; window: the first and the last that are left
-    yaml: numbers need a point before the exponent; frame_column: the name of the column that names frames
+    words: reads the numbers that are words of a table, by column: zones; marked: angles that are no plain number
+    yaml: numbers need a point before the exponent
     """
 
     shapes: tuple[Shape, ...]
     targets: tuple[Target, ...]
-    operation: Operation
-    pieces: tuple[Piece, ...]
+    request: Request
     names: tuple[str, ...]
+    pieces: tuple[Piece, ...] = ()
     null: bytes = b""
     edge_of: Callable[..., Rigid] | None = None
-    normalize: bool = False
-    precision: int | None = None
-    on_error: str = STOP
-    unwrap: bool = False
-    yaml: bool = False
-    timed: Timed | None = None
     source: str = ""
     frame_column: str = ""
-    beside: str = ""
-    gathered: Gathered | None = None
     remedies: tuple[str, ...] = ()
     words: Mapping[int, Callable[[str], float]] = MappingProxyType({})
     marked: Mapping[int, Callable[[str], float]] = MappingProxyType({})
-    offset_ns: int = 0
-    window: tuple[int, int] | None = None
+    yaml: bool = False
 
 
 class State:
@@ -122,6 +109,7 @@ class Run:
     def __init__(self, plan: Plan, block: Block, state: State) -> None:
         """Read, transform and check every row of the block."""
         self.plan = plan
+        self.request, self.operation = plan.request, plan.request.operation
         self.block = block
         self.reasons: dict[int, tuple[str, str | FrametoolError]] = dict(block.bad)
         self.mended: list[int] = []
@@ -131,7 +119,7 @@ class Run:
         self.count = len(block.places)
         numbers = self._read()
         self._check_covariances(numbers)
-        self.outside = self._outside() if plan.window and self.count else set[int]()
+        self.outside = self._outside() if self.request.window and self.count else set[int]()
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -140,7 +128,8 @@ class Run:
             self._doubt_turns(moved)
             self.results = self._results(moved)
         self.rows = np.arange(self.count)
-        weights = weights_of(self.block, plan, self._blame) if plan.gathered and plan.beside else None
+        weighs = self.request.gathered and self.request.extra_column
+        weights = weights_of(self.block, self.request, self._blame) if weighs else None
         if self.outside:
             self.reasons = {row: why for row, why in self.reasons.items() if row not in self.outside}
             self.mended = [row for row in self.mended if row not in self.outside]
@@ -149,10 +138,10 @@ class Run:
             self._keep(np.array([row not in gone for row in range(self.count)], np.bool_))
         if plan.shapes and (plan.shapes[0].place or (plan.targets and plan.targets[0].place)):
             self._note_zones()
-        if plan.gathered:
+        if self.request.gathered:
             kept = np.isin(np.arange(self.count), self.rows)
-            plan.gathered.take(plan.shapes[0], moved[0], kept, weights, self.block.line_of)
-        if plan.unwrap and len(self.rows):
+            self.request.gathered.take(plan.shapes[0], moved[0], kept, weights, self.block.line_of)
+        if self.request.unwrap and len(self.rows):
             _unwrap(self.results, plan.targets[0].angle_columns(), state)
 
     def _blame(self, row: int, column: str, reason: str | FrametoolError) -> None:
@@ -218,7 +207,7 @@ class Run:
 
     def _doubt_turns(self, moved: Sequence[Components]) -> None:
         """Tell of the first row whose turn is too uncertain for the first order."""
-        operation = self.plan.operation
+        operation = self.operation
         for shape, parts in zip(self.plan.shapes or (Shape(POSE),), moved, strict=False):
             if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
                 continue
@@ -238,16 +227,16 @@ class Run:
     def _movers(self) -> list[Rigid | None]:
         """Return the pose that moves each point or pose of the rows: of its own frame, at its own time, or none."""
         plan, block, shapes = self.plan, self.block, max(len(self.plan.shapes), 1)
-        if plan.operation.formula is not None and not plan.operation.shown:
+        if self.operation.formula is not None and not self.operation.shown:
             return [None] * shapes
         sources = [[plan.source]] if plan.source else block.sources
         edges = list(map(self._edge, sources)) or [None] * shapes
-        if plan.timed is not None and self.count:
+        if self.request.timed is not None and self.count:
             frames = sources or [block.frames or [None]]
             if block.times is not None:
-                return [by_time(plan.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
+                return [by_time(self.request.timed, block.times, frames[0], self._blame, plan.frame_column)] * shapes
             movers = [  # the rows of a table have one stamp for all their points
-                by_time(plan.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
+                by_time(self.request.timed, stamps, names, self._blame, plan.frame_column) if stamps else edge
                 for stamps, names, edge in zip(block.stamps, frames, edges[: len(block.stamps)], strict=True)
             ]
             return movers * (shapes // len(movers))
@@ -264,7 +253,7 @@ class Run:
 
     def _compute(self, columns: list[Floats], movers: Sequence[Rigid | None], state: State) -> list[Components]:
         """Apply the operation to each point or pose of the rows."""
-        shapes, operation = self.plan.shapes, self.plan.operation
+        shapes, operation = self.plan.shapes, self.operation
         if operation.of == PAIR or not shapes:
             poses = [thing_pose(shape, own[: shape.own_size], turn) for shape, own, turn in self._things(columns)]
             return [operation.pose(poses or [NOWHERE], movers[0], arrays)]
@@ -293,7 +282,7 @@ class Run:
         """Read the stamps of the rows."""
         if self.block.times is not None:
             return self.block.times
-        timed, beside = self.plan.timed, self.plan.beside
+        timed, beside = self.request.timed, self.request.extra_column or ""
         stamps, column = self.block.stamps[at], timed.column if timed else beside
         in_ns = timed.in_ns if timed else len(stamps) == 1 and in_nanoseconds(beside)
         times, reasons = read_stamps(stamps, in_ns=in_ns)
@@ -303,7 +292,7 @@ class Run:
 
     def _why_no_value(self, row: int) -> str | FrametoolError:
         """Evaluate an expression for one row alone, which says why it has no value there."""
-        operation = self.plan.operation
+        operation = self.operation
         for at, (shape, columns, _) in enumerate(self._things(self.columns)):
             own = tuple(float(column[row]) for column in columns)
             times = int(self._times(at)[row]) if operation.formula and operation.formula.needs_time else None
@@ -321,18 +310,18 @@ class Run:
 
     def _outside(self) -> set[int]:
         """Return the rows before the first or after the last of the times that are wanted."""
-        times, (first, last) = self._times(0), self.plan.window or (0, 0)
+        times, (first, last) = self._times(0), self.request.window or (0, 0)
         return {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
 
     def _with_before(self, pose: Rigid, state: State) -> list[Rigid]:
-        if not self.plan.operation.looks_back:
+        if not self.operation.looks_back:
             return [pose]
-        with_before = _with_first if self.plan.operation.of == START else _with_previous
+        with_before = _with_first if self.operation.of == START else _with_previous
         return with_before(pose, self._good(), state, self.count)
 
     def _seconds(self, state: State) -> Floats:
         """Return the time since the good row before each; the very first row has no velocity and no result."""
-        name = self.plan.beside
+        name = self.request.extra_column or ""
         stamps = stamps_of(self.block, name, self._blame)
         good = self._good()
         seconds = seconds_before(stamps, good, state.stamp_ns, name, self._blame)
@@ -349,17 +338,17 @@ class Run:
         names = self.plan.names[first : first + shape.size]
         if shape.joined:
             self._check_tail(numbers, names, shape.joined.tail)
-        found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
+        found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.request.normalize)
         rule = shape.notation.representation.batch
         if rule and rule.explained and self.block.values is None and (found.mended.size or found.reasons):
             self._take_as_meant(rule, given, [first + at for at in shape.rotation_at], {*found.mended, *found.reasons})
-            found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.plan.normalize)
+            found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.request.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
         if found.mended.size and not self.rounded:
             row = int(found.mended[0])
             own = [float(column[row]) for column in numbers]
-            _, warned = checked_rotation(shape, own, normalize=self.plan.normalize)
+            _, warned = checked_rotation(shape, own, normalize=self.request.normalize)
             place = self._place(row, first + shape.rotation_at[0])
             self.rounded += [RowNote(place[0], rule, sentence, place[1]) for rule, sentence in warned]
         self.mended += found.mended.tolist()
@@ -432,12 +421,12 @@ class Run:
 
     def _is_wrong(self, results: Floats) -> Any:
         """Return which rows have numbers that are none; nan may be one of a formula's."""
-        wrong = np.isinf(results) if self.plan.operation.shown else ~np.isfinite(results)
+        wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)
         return wrong.any(axis=1)
 
     def _why_not_finite(self, row: int, moved: Sequence[Components]) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""
-        if self.plan.operation.formula:
+        if self.operation.formula:
             return "", self._why_no_value(row)
         first = 0
         for shape, columns, _ in self._things(self.columns):
@@ -466,7 +455,7 @@ class Run:
 
     def first_fault(self) -> int | None:
         """Return the place of the first bad row, if the run stops there."""
-        if self.plan.on_error != STOP or not (self.reasons or self.block.broken):
+        if self.request.on_error != STOP or not (self.reasons or self.block.broken):
             return None
         return int(min([*self.block.places[[*self.reasons]].tolist(), *(each.place for each in self.block.broken)]))
 
@@ -481,18 +470,19 @@ class Run:
 
     def _written(self) -> list[tuple[Ints, list[Spans]]]:
         plan, rows = self.plan, self.rows
-        if not len(rows) or plan.gathered:
+        if not len(rows) or self.request.gathered:
             return []
         values = None
         if self.results.shape[1]:
-            write = partial(numbers_or_null, plan.pieces, plan.null) if plan.operation.shown else number_spans
-            values = write(self.results, plan.precision, separators(plan.pieces, self.results.shape[1]), yaml=plan.yaml)
+            write = partial(numbers_or_null, plan.pieces, plan.null) if self.operation.shown else number_spans
+            after = separators(plan.pieces, self.results.shape[1])
+            values = write(self.results, self.request.precision, after, yaml=plan.yaml)
         parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
         return [(self.block.places[rows], assemble(plan.pieces, parts, len(rows), values, self.results))]
 
     def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
         plan = self.plan
-        if plan.on_error != NULL or not self.reasons:
+        if self.request.on_error != NULL or not self.reasons:
             return []
         rows = np.array(sorted(self.reasons), np.int64)
         pieces = [_without_result(piece, plan.null) for piece in plan.pieces]

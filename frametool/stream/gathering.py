@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import EARTH_FRAMES, stamp_places
+from frametool.grammar.names import EARTH_FRAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -33,11 +33,6 @@ class Gathered:
         self.frame: str | None = None  # that of the Earth, where what was gathered is placed there
         self._poses: list[Floats] = []
         self._beside: list[Floats] = []
-
-    def of_columns(self, names: Sequence[str] | None) -> Gathered:
-        """Look whether a table that is gathered from has stamps."""
-        self.stamped |= stamp_places(names)[0] is not None
-        return self
 
     def take(
         self, shape: Shape, pose: Components, kept: Flags, beside: Floats | None, line_of: Callable[[int], int]

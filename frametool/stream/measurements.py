@@ -196,20 +196,20 @@ def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
 def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     """Yield the rows of a table."""
     from frametool.geometry.representations import notation
-    from frametool.stream.row_poses import TablePoses, results_of
-    from frametool.stream.table_stream import begin_table
+    from frametool.stream.row_poses import results_of
+    from frametool.stream.table_stream import TablePoses, begin_table
 
     request = request._replace(operation=MOVED, notations=(notation("quaternion"),), keep_sign=True)
     begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
-    rows = TablePoses(begun, file.form, request, file.name)
+    rows = TablePoses(begun.table, request, file.name)
     if rows.shape.notation is None and rows.shape.unit is None:
         raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)
     if rows.shape.notation is None:
         warn(f"{file.name}:1: no rotation among the columns {rows.columns}: each is taken for 0")
     bare = file.tally.names.bare
     has_place = rows.shape.whole or rows.shape.unit is not None
-    for block, line, _ in rows.blocks(begun):
-        for below, column, reason, *_ in rows.faults:
+    for block, line, outcome in rows.blocks(begun):
+        for below, column, reason, *_ in outcome.faults:
             raise FormatError(f"{column}{': ' * bool(column)}{reason}", source=file.name, line=line + below)
         results = results_of(block, columns() if rows.shape.covariance else (), placed=has_place)
         for at, result, given in zip(block.lines.tolist(), results, rows.given.T.tolist(), strict=True):

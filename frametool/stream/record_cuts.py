@@ -265,25 +265,17 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     after = len(template.stretches)
     renamed = count(after + 2)
     pieces = [In(next(renamed)) if isinstance(each, Renamed) else each for each in template.pieces]
-    plan = Plan(
+    on_error = SKIP if request.on_error == NULL else request.on_error  # rows without one are written elsewhere
+    beside = template.beside if request.extra_column is not None else None
+    return Plan(
         template.shapes,
         tuple(entry.target for entry in template.entries),
-        request.operation,
-        (In(after + 1), *pieces, In(after)),
+        request._replace(on_error=on_error, timed=template.timed(request), extra_column=beside, offset_ns=0),
         template.names,
+        (In(after + 1), *pieces, In(after)),
         b"null",
         edge_of=request.pose_from_frame if any(entry.edge is not None for entry in template.entries) else None,
-    )
-    return plan._replace(
-        normalize=request.normalize,
-        precision=request.precision,
-        on_error=SKIP if request.on_error == NULL else request.on_error,
-        unwrap=request.unwrap,
         yaml=yaml,
-        timed=template.timed(request),
-        beside=template.beside if request.extra_column is not None else "",
-        gathered=request.gathered,
-        window=request.window,
         remedies=tuple(
             KEYS_REMEDY if record.flat else f"write {record.rotation}_deg" for record, *_ in template.entries
         ),

@@ -214,31 +214,29 @@ class _WrittenBack:
     def __init__(self, known: RecordText, answers: Sequence[Answer]) -> None:
         """Keep what is needed; nothing is done before something is asked for."""
         self.known, self.answers = known, answers
-        # our numbers are written as numbers that nothing else in the text is, and found again by their ends
-        self.mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in known.text)
-        self.numbers: list[float] = []
 
     def at(self, path: Path) -> Any:
         """Return what stands at a path as a plain value, its numbers as floats."""
-        return plain(self._root.at(path), self._number)
-
-    def _number(self, text: str) -> float | None:
-        return self.numbers[int(text.removesuffix(self.mark))] if text.endswith(self.mark) else None
+        root, numbers, mark = self._read
+        return plain(root.at(path), lambda text: numbers[int(text[: -len(mark)])] if text.endswith(mark) else None)
 
     @cached_property
-    def _root(self) -> Node:
+    def _read(self) -> tuple[Node, list[float], str]:
+        """Return the text, read again, our numbers, and the mark behind the place of each among them in the text."""
         known, request = self.known, self.known.request
         if [form.spec for form in request.notations] == ["quaternion"]:  # the usual one
             request = request._replace(notations=())
         entries = [each._replace(target=target_of(each.record, request)) for each in known.entries]
         made = {each.entry.record.numbers: each for each in self.answers}
+        mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in known.text)
+        numbers: list[float] = []
         for entry in entries:
             size = request.result_size(entry.record.shape, entry.target)
             each = made.get(entry.record.numbers)
-            self.numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
-        marked = [f"{at}{self.mark}" for at in range(len(self.numbers))]
-        text = known.with_numbers(known.edits_for(entries, request), marked, self.numbers)
-        return Node(0, len(text), parse_nodes(text))
+            numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
+        marked = [f"{at}{mark}" for at in range(len(numbers))]
+        text = known.with_numbers(known.edits_for(entries, request), marked, numbers)
+        return Node(0, len(text), parse_nodes(text)), numbers, mark
 
 
 def values_of_unit(
@@ -366,26 +364,6 @@ def used_keys(record: Record) -> set[str]:
     return {*own, *halves, *NOT_PLAIN}
 
 
-def rest_of(node: Node, unit: Path, record: Record) -> dict[str, Node]:
-    """Return what a record and the mappings around it say beside the pose, its frames and its stamp, by key.
-
-    node: the thing that the record's result is; unit: the path of that
-    """
-    used = used_keys(record)
-    names = {path for each in (record.name, record.parent) for path in each.paths}
-    rest: dict[str, Node] = {}
-    for depth in range(len(unit), len(record.path) + 1):
-        path = record.path[:depth]
-        holder = node.at(path[len(unit) :])
-        if type(holder.value) is not dict:
-            continue
-        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
-        for key, (_, value) in holder.value.items():
-            if key not in on_the_way and (*path, key) not in names and not (path == record.path and key in used):
-                rest.setdefault(key, value)
-    return rest
-
-
 def _says_no_more(record: Record, documents: dict[int, Any], unit: Path) -> bool:
     """Tell whether a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
     value = value_at(documents, unit)
@@ -396,8 +374,24 @@ def _says_no_more(record: Record, documents: dict[int, Any], unit: Path) -> bool
 
 
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
-    """Return what a record and the mappings around it say beside the pose, its frames and its stamp."""
-    return {key: plain(value) for key, value in rest_of(node, unit, record).items()}
+    """Return what a record and the mappings around it say beside the pose, its frames and its stamp.
+
+    node: the thing that the record's result is; unit: the path of that
+    """
+    used = used_keys(record)
+    names = {path for each in (record.name, record.parent) for path in each.paths}
+    rest: dict[str, Any] = {}
+    for depth in range(len(unit), len(record.path) + 1):
+        path = record.path[:depth]
+        holder = node.at(path[len(unit) :])
+        if type(holder.value) is not dict:
+            continue
+        on_the_way = {*record.path[depth : depth + 1], "header", *record.covariances}
+        for key, (_, value) in holder.value.items():
+            is_used = key in on_the_way or (*path, key) in names or (path == record.path and key in used)
+            if not is_used and key not in rest:
+                rest[key] = plain(value)
+    return rest
 
 
 def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, source: Source) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from itertools import chain
 from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -16,33 +15,21 @@ import numpy as np
 from frametool.documents.json import JSON_NUMBER, dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid
-from frametool.grammar.names import in_nanoseconds, stamp_places
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.result import NoResult, Result, with_entries
-from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import NULL, Fault, notes_of
-from frametool.stream.header import listed
-from frametool.stream.layout import NAMED, New
-from frametool.stream.row_layout import AS_READ, PARTS, POSE, Shape
-from frametool.stream.rows import chosen
-from frametool.stream.stamp_columns import NOWHERE, read_stamps
-from frametool.stream.table import UNCLOSED, Naming, at_other_times, coded, table_block, unnamed
-from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
-from frametool.text.cells import torn_record, without_quotes
+from frametool.stream.row_layout import AS_READ, PARTS
+from frametool.stream.stamp_columns import NOWHERE
+from frametool.text.cells import without_quotes
 from frametool.text.spans import MARGIN, Spans, framed
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from frametool.geometry.place import Place, Spot
     from frametool.geometry.types import Components
-    from frametool.stream.faults import RowNote
-    from frametool.stream.layout import Layout
-    from frametool.stream.request import Request
-    from frametool.stream.table_stream import Begun
     from frametool.text.spans import Floats, Ints
     Cells: TypeAlias = Spans | NDArray[Any]
 
@@ -87,119 +74,6 @@ class RowPoses(NamedTuple):
 
 def _place() -> Any:
     return import_module("frametool.geometry.place")  # few rows are on the Earth
-
-
-class TablePoses:
-    """Turn one block of a table after the other into poses; the rows that are bad are listed in `faults`.
-
-    faults, notes: of the last block, lines from 0; given: the numbers of its good rows as read, a row a column
-    rows, mended: how many rows there were, and rotations that were normalised; off: how far the worst one was
-    """
-
-    def __init__(self, begun: Begun, form: str, request: Request, source: str) -> None:
-        """Plan the rows; the request's notations say which numbers come out.
-
-        Raises FormatError for a table without a pose, Misused for a request that does not fit.
-        """
-        self.table = begun.table
-        self.form = form
-        request = with_vectors(self.table.names, request)
-        self.plan, layout = plan_table(self.table, request._replace(all_numbers=True), source)
-        self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
-        named = request.for_kind(self.shape.kind)
-        self.naming = Naming(self.table, layout, named)
-        self.unnamed = unnamed(request, self.shape)
-        self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
-        if layout.time is None:
-            time, below = stamp_places(self.table.names)
-            if not self.table.names and not request.columns and min(layout.places, default=0) == 1:
-                time = 0  # what stands before the numbers that --from speaks of
-            layout = layout._replace(time=None if time in layout.frames else time, below=below)
-        self.stamp_at = layout.time
-        used = {layout.time, layout.below, *layout.places, *self.naming.places}
-        self.kept = [place for place in range(self.table.width) if place not in used]
-        self.layout = self._with_stretches(layout)
-        self.state = State()
-        self.faults: list[Fault] = []
-        self.notes: list[RowNote] = []
-        self.rows, self.mended, self.off = 0, 0, 0.0
-
-    def _with_stretches(self, layout: Layout) -> Layout:
-        """Ask for the stamps, the columns that are not ours, one by one, and the names of the results."""
-        stretches = [(place, place, "cell", "cell") for place in self.kept]
-        stretches += [(role, role, NAMED, NAMED) for role in self.roles]
-        return layout._replace(stretches=tuple(stretches), pieces=())
-
-    @property
-    def columns(self) -> str:
-        """List the columns there are."""
-        return listed(self.table.names or ("columns without names",))
-
-    def blocks(self, begun: Begun) -> Iterator[tuple[RowPoses, int, bytes]]:
-        """Yield the poses of all blocks of a table, each with the line, from 1, at which it begins, and its text."""
-        line = 1 + begun.lines
-        for text in chain((begun.rest,) if begun.rest else (), begun.blocks):
-            yield self.of_block(text), line, text
-            line += text.count(b"\n")
-
-    def of_block(self, text: bytes) -> RowPoses:
-        """Return the poses of a block, and leave what is wrong with other rows in `faults`."""
-        torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
-        body = text if torn is None else text[:torn]
-        body = at_other_times(self.table, self.layout, body, self.plan.offset_ns)
-        block = table_block(self.table, self.layout, body, self.naming)
-        stamps, late = self._stamps(block.stamps)
-        run = Run(self.plan, block._replace(bad={**late, **block.bad}), self.state)
-        self.faults = run.faults()
-        if torn is not None:
-            self.faults.append(Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True))
-        self.mended += len(run.mended)
-        self.off = max(self.off, run.off)
-        self.notes = notes_of(run, block)
-        self.rows += len(block.places) + len(block.broken)
-        rows, results = run.rows, run.results
-        if self.plan.on_error == NULL and run.reasons:
-            rows, results = _with_nulls(run)
-        self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
-        same = rows is run.rows and len(rows) == run.count
-        parts = block.parts if same else [chosen(part, rows) for part in block.parts]
-        texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
-        own = self.plan.targets[0].size if has_vectors(self.plan) else results.shape[1]
-        beside = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
-        texts |= {each.name: results[:, each.number] for each in beside}
-        names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
-        for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
-            names[role] = _texts(part)
-        lines = block.places[rows]
-        if b'"' in body:
-            lines = np.array([block.line_of(row) for row in rows.tolist()], np.int64)
-        stamps = None if stamps is None else stamps[rows]
-        return RowPoses(results[:, :own], stamps, lines, names[0], names[1], texts, block.frames)
-
-    def _stamps(self, cells: Sequence[tuple[Spans, ...]]) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
-        """Read the stamps of a block; return them, and which rows have none that can be read."""
-        if self.stamp_at is None or not cells:
-            return None, {}
-        name = self.table.name(self.stamp_at)
-        times, reasons = read_stamps(cells[0], in_ns=in_nanoseconds(name))
-        times[list(reasons)] = NO_STAMP
-        return times, {row: (name, reason) for row, reason in reasons.items()}
-
-
-def _with_nulls(run: Run) -> tuple[Ints, Floats]:
-    """Return the rows with the bad ones among them, which have no numbers."""
-    rows = np.array(sorted({*run.rows.tolist(), *run.reasons}), np.int64)
-    results = np.full((len(rows), run.results.shape[1]), np.nan)
-    results[np.searchsorted(rows, run.rows)] = run.results
-    return rows, results
-
-
-def _texts(part: Spans) -> Sequence[str | None]:
-    """Return names, one for all rows where all are the same."""
-    if not len(part.starts):
-        return [None]
-    texts, codes = coded(part)
-    return [texts[0] or None] if len(texts) == 1 else [texts[code] or None for code in codes.tolist()]
 
 
 def first_of(block: RowPoses) -> RowPoses:

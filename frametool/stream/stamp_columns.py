@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.stream.evaluate import Plan
+    from frametool.stream.request import Request
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Spans, Words
@@ -161,12 +161,12 @@ def seconds_before(stamps: Ints, good: Sequence[int], before_ns: int | None, nam
     return seconds
 
 
-def weights_of(block: Block, plan: Plan, blame: Blame) -> Any:
+def weights_of(block: Block, request: Request, blame: Blame) -> Any:
     """Return the weights of rows, or their labels; a row with none, or a negative weight, is bad."""
     if not len(block.places):
         return np.zeros(0)
-    name = plan.beside
-    if plan.gathered is not None and plan.gathered.labelled:
+    name = request.extra_column or ""
+    if request.gathered is not None and request.gathered.labelled:
         cells = without_quotes(block.stamps[0][0]) if block.weights is None else None
         return block.weights if cells is None else np.array(
             [cells.text(row).decode().strip() for row in range(len(cells.starts))], object

@@ -103,12 +103,9 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     below = None if time is None or not table.names else nanoseconds_beside(table.names, time)
     layout = layout._replace(time=time, below=below, name=name)
     return Plan(
-        shapes, targets, request.operation, layout.pieces, tuple(table.name(place) for place in places), layout.null,
-        edge_of, request.normalize, request.precision, request.on_error, request.unwrap,
-        timed=request.timed, beside=request.extra_column or "", source=EARTH_FRAMES[0] if on_earth else "",
-        gathered=request.gathered and request.gathered.of_columns(table.names),
-        frame_column=table.name(frames[0]) if len(frames) == 1 else "", offset_ns=request.offset_ns,
-        window=request.window, words=words, marked=marked or {},
+        shapes, targets, request, tuple(table.name(place) for place in places), layout.pieces, layout.null, edge_of,
+        source=EARTH_FRAMES[0] if on_earth else "", frame_column=table.name(frames[0]) if len(frames) == 1 else "",
+        words=words, marked=marked or {},
     ), layout  # fmt: skip
 
 

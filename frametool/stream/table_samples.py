@@ -19,8 +19,7 @@ from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
 from frametool.stream.faults import BadRow, Fault
 from frametool.stream.request import Request
-from frametool.stream.row_poses import TablePoses
-from frametool.stream.table_stream import begin_table
+from frametool.stream.table_stream import TablePoses, begin_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -43,12 +42,12 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
         raise FormatError(what, source=file.name)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
     begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
-    rows = TablePoses(begun, file.form, request, file.name)
+    rows = TablePoses(begun.table, request, file.name)
     _check(rows, form, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
     count = 0
-    for block, line, _ in rows.blocks(begun):
-        for fault in rows.faults:
+    for block, line, outcome in rows.blocks(begun):
+        for fault in outcome.faults:
             options.report(BadRow(fault._replace(line=line + fault.line), fault.reason, source=file.name))
         for row, role in _nameless(block, rows.roles).items():
             column = rows.table.name(rows.naming.places[role] or 0)

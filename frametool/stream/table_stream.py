@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing, warn
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMAL_NAMES, RATES, stamp_places
+from frametool.grammar.names import NORMAL_NAMES, RATES, in_nanoseconds, stamp_places
 from frametool.stream.evaluate import Run, State
-from frametool.stream.faults import Fault, Outcome, RowNote, notes_of
-from frametool.stream.rows import written
+from frametool.stream.faults import NULL, Fault, Outcome, RowNote, notes_of
+from frametool.stream.header import listed
+from frametool.stream.layout import NAMED, New
+from frametool.stream.row_layout import POSE, Shape
+from frametool.stream.row_poses import NO_STAMP, RowPoses
+from frametool.stream.rows import chosen, written
+from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.table import (
     BYTE_ORDER_MARK,
     COMMENT,
@@ -21,36 +27,38 @@ from frametool.stream.table import (
     Naming,
     as_trajectory,
     at_other_times,
+    coded,
     open_table,
     table_block,
+    unnamed,
 )
-from frametool.stream.table_plan import plan_table, with_vectors
+from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
 from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Sequence
+    from collections.abc import Generator, Iterator, Sequence
 
-    from frametool.stream.evaluate import Plan
-    from frametool.stream.layout import Layout
     from frametool.stream.request import Request
+    from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
     from frametool.stream.table import Table
     from frametool.text.lines import ByteStream
+    from frametool.text.spans import Ints, Spans
 
 
 def run_table(
     stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
-    table, rest, blocks, taken, lines = begin_table(stream, form, request, source=source, header=header)
-    request = request if NORMAL_NAMES.isdisjoint(table.names or ()) else with_vectors(table.names, request)
-    request, unasked = settle_stamps(table, request, source)
-    plan, layout = plan_table(table, request, source)
-    yield Outcome(table.opening(layout), lines=lines, size=taken)
-    named = request.for_kind(plan.shapes[0].kind) if plan.shapes else request
-    work = TableWork(table, plan, layout, Naming(table, layout, named), unasked)
-    yield from map(work, chain((rest,) if rest else (), blocks))
+    begun = begin_table(stream, form, request, source=source, header=header)
+    names = begun.table.names
+    request = request if NORMAL_NAMES.isdisjoint(names or ()) else with_vectors(names, request)
+    rows = TableRows(begun.table, request, source)
+    yield Outcome(begun.table.opening(rows.layout), lines=begun.lines, size=begun.taken)
+    for text in begun.texts():
+        run, outcome = rows.of_text(text)
+        yield outcome._replace(text=written(run.groups(run.first_fault())))
 
 
 class Begun(NamedTuple):
@@ -62,11 +70,15 @@ class Begun(NamedTuple):
     taken: int
     lines: int
 
+    def texts(self) -> Iterator[bytes]:
+        """Yield the text of the rows, block by block."""
+        return chain((self.rest,) if self.rest else (), self.blocks)
+
 
 def begin_table(stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True) -> Begun:
     """Read the head of a table in a form; raises FormatError."""
-    ends = _record_ends((FORMATS[form].delimiter or "").encode())
-    blocks = read_blocks(stream, whole=ends())
+    delimiter = (FORMATS[form].delimiter or "").encode()
+    blocks = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines)
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
@@ -82,11 +94,6 @@ def _warn_of_vectors(names: Sequence[str], source: str) -> None:
     """Warn of velocities and rates beside poses whose axes change: no name says in which frame they are given."""
     if found := [name for name in names if re.fullmatch(RATES, name)]:
         warn(f"{source}: {listing(found, 9)} keep to the old axes: poses and covariances turn alone")
-
-
-def _record_ends(delimiter: bytes) -> Callable[[], Callable[[bytes], int]]:
-    """Return what makes a finder of the ends of rows; cells in quotes may hold line ends."""
-    return partial(RecordEnds, delimiter) if delimiter else lambda: whole_lines
 
 
 def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
@@ -129,47 +136,138 @@ def _stamp_column(table: Table, source: str, who: str) -> str:
     return table.name(found)
 
 
-class TableWork:
-    """Turn one block of a table after the other into its outcome; keeps what one block leaves for the next."""
+class PlannedRows:
+    """Rows that are planned: what is done with each, what it is called, and what one block leaves for the next.
 
-    def __init__(self, table: Table, plan: Plan, layout: Layout, naming: Naming, unasked: Timed | None) -> None:
-        """Take the plan of a table; `unasked` are the stamps that rows have and nobody asked for."""
+    off: how far the worst rotation was from one; mended: how many were normalised
+    """
+
+    def __init__(self, table: Table, request: Request, source: str) -> None:
+        """Plan the rows of a table; raises FormatError or Misused where they do not fit what is asked for."""
         self.table = table
-        self.plan = plan
-        self.layout = layout
-        self.naming = naming
-        self.unasked = unasked
+        self.request, self.unasked = settle_stamps(table, request, source)
+        self.plan, self.layout = plan_table(table, self.request, source)
+        self.shape = self.plan.shapes[0] if self.plan.shapes else Shape(POSE)
+        self.naming = Naming(table, self.layout, self.request.for_kind(self.shape.kind))
+        if request.gathered is not None:
+            request.gathered.stamped |= stamp_places(table.names)[0] is not None
         self.state = State()
+        self.mended, self.off = 0, 0.0
 
-    def __call__(self, text: bytes) -> Outcome:
-        """Process one block; a quote that is not closed takes all behind it along."""
-        torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
-        if torn is None:
-            return self._done(text)
-        done = self._done(text[:torn]) if torn else Outcome(b"")
-        fault = Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True)
-        return done._replace(faults=[*done.faults, fault])
-
-    def _done(self, text: bytes) -> Outcome:
-        size = len(text)
-        text = at_other_times(self.table, self.layout, text, self.plan.offset_ns)
-        block = table_block(self.table, self.layout, text, self.naming)
+    def ran(self, block: Block) -> Run:
+        """Return what becomes of a block."""
         run = Run(self.plan, block, self.state)
-        faults = run.faults()
-        notes = notes_of(run, block)
-        if self.unasked is not None and len(block.places) and moves_in_time(self.unasked, set(block.frames) or {None}):
-            notes.append(RowNote.of_latest(block.line_of(0), self.unasked.name))
+        self.mended += len(run.mended)
+        self.off = max(self.off, run.off)
+        return run
+
+    def notes_of(self, run: Run, frames: Sequence[str | None]) -> list[RowNote]:
+        """Return warnings about the rows of a block; frames: that they are given in."""
+        notes = notes_of(run, run.block)
+        if self.unasked is not None and run.count and moves_in_time(self.unasked, {*frames} or {None}):
+            notes.append(RowNote.of_latest(run.block.line_of(0), self.unasked.name))
             self.unasked = None
+        return sorted(notes)
+
+
+class TableRows(PlannedRows):
+    """The rows of a table, block by block.
+
+    stamp_at: the column of stamps that are read of each row, whoever needs them; stamps_ns: those of the last block
+    """
+
+    stamp_at: int | None = None
+    stamps_ns: Ints | None = None
+
+    def of_text(self, text: bytes) -> tuple[Run, Outcome]:
+        """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
+        torn = torn_record(text, self.table.delimiter) if self.table.delimiter else None
+        body = at_other_times(self.table, self.layout, text[:torn], self.request.offset_ns)
+        block = table_block(self.table, self.layout, body, self.naming)
+        if self.stamp_at is not None and block.stamps:
+            name = self.table.name(self.stamp_at)
+            self.stamps_ns, reasons = read_stamps(block.stamps[0], in_ns=in_nanoseconds(name))
+            self.stamps_ns[list(reasons)] = NO_STAMP
+            block = block._replace(bad={**{row: (name, reason) for row, reason in reasons.items()}, **block.bad})
+        run = self.ran(block)
+        faults = run.faults()
+        if torn is not None:
+            faults.append(Fault(text.count(b"\n", 0, torn), "", UNCLOSED, final=True))
+        notes = self.notes_of(run, block.frames)
         rows = len(block.places) + len(block.broken)
-        return Outcome(
-            written(run.groups(run.first_fault())),
-            faults,
-            rows,
-            text.count(b"\n"),
-            len(run.mended),
-            sorted(notes),
-            size,
-        )
+        return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), notes, len(text))
+
+
+class TablePoses(TableRows):
+    """Turn one block of a table after the other into poses.
+
+    given: the numbers of the last block's good rows as read, a row a column
+    """
+
+    def __init__(self, table: Table, request: Request, source: str) -> None:
+        """Plan the rows; the request's notations say which numbers come out.
+
+        Raises FormatError for a table without a pose, Misused for a request that does not fit.
+        """
+        super().__init__(table, with_vectors(table.names, request)._replace(all_numbers=True), source)
+        layout = self.layout
+        self.unnamed = unnamed(request, self.shape)
+        self.roles = [role for role, place in enumerate(self.naming.places) if place is not None]
+        if layout.time is None:
+            time, below = stamp_places(table.names)
+            if not table.names and not request.columns and min(layout.places, default=0) == 1:
+                time = 0  # what stands before the numbers that --from speaks of
+            layout = layout._replace(time=None if time in layout.frames else time, below=below)
+        self.stamp_at = layout.time
+        used = {layout.time, layout.below, *layout.places, *self.naming.places}
+        self.kept = [place for place in range(table.width) if place not in used]
+        stretches = [(place, place, "cell", "cell") for place in self.kept]
+        stretches += [(role, role, NAMED, NAMED) for role in self.roles]
+        self.layout = layout._replace(stretches=tuple(stretches), pieces=())
+
+    @property
+    def columns(self) -> str:
+        """List the columns there are."""
+        return listed(self.table.names or ("columns without names",))
+
+    def blocks(self, begun: Begun) -> Iterator[tuple[RowPoses, int, Outcome]]:
+        """Yield the poses of all blocks of a table, each with the line, from 1, at which it begins."""
+        line = 1 + begun.lines
+        for text in begun.texts():
+            poses, outcome = self.of_block(text)
+            yield poses, line, outcome
+            line += outcome.lines
+
+    def of_block(self, text: bytes) -> tuple[RowPoses, Outcome]:
+        """Return the poses of a block, and what is said of it."""
+        run, outcome = self.of_text(text)
+        rows, results, block = run.rows, run.results, run.block
+        if self.request.on_error == NULL and run.reasons:
+            rows = np.array(sorted({*run.rows.tolist(), *run.reasons}), np.int64)
+            results = np.full((len(rows), run.results.shape[1]), np.nan)
+            results[np.searchsorted(rows, run.rows)] = run.results
+        self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
+        parts = block.parts if len(rows) == run.count else [chosen(part, rows) for part in block.parts]
+        texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
+        own = self.plan.targets[0].size if has_vectors(self.plan) else results.shape[1]
+        beside = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
+        texts |= {each.name: results[:, each.number] for each in beside}
+        names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
+        for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
+            names[role] = _texts(part)
+        lines = block.places[rows]
+        if b'"' in text:
+            lines = np.array([block.line_of(row) for row in rows.tolist()], np.int64)
+        stamps = None if self.stamps_ns is None else self.stamps_ns[rows]
+        return RowPoses(results[:, :own], stamps, lines, names[0], names[1], texts, block.frames), outcome
+
+
+def _texts(part: Spans) -> Sequence[str | None]:
+    """Return names, one for all rows where all are the same."""
+    if not len(part.starts):
+        return [None]
+    texts, codes = coded(part)
+    return [texts[0] or None] if len(texts) == 1 else [texts[code] or None for code in codes.tolist()]
 
 
 def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:
