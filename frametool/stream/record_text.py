@@ -11,7 +11,6 @@ from frametool.documents.document import Aliased, Document, Node, locate_many, p
 from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text, decode
 from frametool.errors import FormatError, FrametoolError
-from frametool.ros.message_stream import NOISE
 from frametool.stream.answers import answer, number_writer, read_entries, written
 from frametool.stream.faults import ZONES, Fault, RowNote
 from frametool.stream.layout import Const, In, Out, Renamed, Word
@@ -247,4 +246,6 @@ def fault_at(source: Source, error: FormatError) -> Fault:
 
 def without_noise(text: str) -> str:
     """Blank the lines that the echo tools print between messages."""
+    from frametool.ros.message_stream import NOISE
+
     return "\n".join("" if NOISE(line.rstrip("\r")) else line for line in text.split("\n"))

@@ -12,7 +12,7 @@ from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
-from frametool.documents.json import JSON_NUMBER
+from frametool.documents.json import JSON_NUMBER, parse_json
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import Finding, FormatError, ValueInvalid, shown, warn
 from frametool.formats.table import has_no_text, is_recording
@@ -224,6 +224,7 @@ class _WrittenBack:
     def _read(self) -> tuple[Node, list[float], str]:
         """Return the text, read again, our numbers, and the mark behind the place of each among them in the text."""
         known, request = self.known, self.known.request
+        known.json = known.json or parse_json(known.source) is not None
         if [form.spec for form in request.notations] == ["quaternion"]:  # the usual one
             request = request._replace(notations=())
         entries = [each._replace(target=target_of(each.record, request)) for each in known.entries]
