@@ -10,7 +10,9 @@ import io
 import os
 import warnings
 from base64 import b64encode
+from functools import partial
 from hashlib import sha256
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
@@ -18,7 +20,7 @@ from frametool.errors import FileProblem, printable
 from frametool.view.scene import SLANTED, Projection, Size, axis_tips, nice, place_labels
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.view.scene import FrameScene, Label
@@ -103,24 +105,39 @@ class PictureWords(NamedTuple):
     anchor: str = "start"
     size: float = 12.0
     bold: bool = False
+    halo: str = ""
 
 
-Shape = PictureLine | PictureDot | PictureBox | PictureWords
+class PictureImage(NamedTuple):
+    """A picture in the picture by its left upper corner: the bytes of a file, and whether these are png or jpeg."""
+
+    x: float
+    y: float
+    width: int
+    height: int
+    kind: str
+    data: bytes
+
+
+Shape = PictureImage | PictureLine | PictureDot | PictureBox | PictureWords
 
 
 class Picture(NamedTuple):
-    """Shapes from the back to the front, and the size of the whole."""
+    """Shapes from the back to the front, the size of the whole, its left upper corner, and decimals of a pixel."""
 
     width: float
     height: float
     shapes: Sequence[Shape]
     title: str = ""
+    corner: tuple[float, float] = (0.0, 0.0)
+    decimals: int = 1
 
 
 FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="12" dominant-baseline="central" role="img"'
 SHARED = """\
 path {fill: none; stroke-linecap: round; stroke-linejoin: round}
-text {paint-order: stroke; stroke-width: 3px; stroke-linejoin: round}
+text {paint-order: stroke; stroke-width: .25em; stroke-linejoin: round}
+image {image-orientation: none}
 """
 
 
@@ -137,9 +154,10 @@ def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
 
     before: what stands behind it.  place: attributes that say where it is.
     """
-    size = f'width="{picture.width:g}" height="{picture.height:g}" viewBox="0 0 {picture.width:g} {picture.height:g}"'
+    width, height, (left, top) = f"{picture.width:g}", f"{picture.height:g}", picture.corner
+    size = f'width="{width}" height="{height}" viewBox="{left:g} {top:g} {width} {height}"'
     head = f'<svg xmlns="http://www.w3.org/2000/svg"{place} {size} {FONT}>\n{_title(picture.title)}'
-    return f"{head}{before}{''.join(map(_element, picture.shapes))}</svg>\n"
+    return f"{head}{before}{''.join(_element(each, picture.decimals) for each in picture.shapes)}</svg>\n"
 
 
 def write_html(
@@ -198,10 +216,14 @@ def write_picture(picture: Picture, suffix: str, more: str = "") -> str | bytes:
     return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n{more}</main>\n")
 
 
-def _element(shape: Shape) -> str:
+def _element(shape: Shape, decimals: int) -> str:
+    number = partial(_number, decimals=decimals)
     match shape:
+        case PictureImage(x, y, width, height, kind, data):
+            size = f'x="{x:g}" y="{y:g}" width="{width}" height="{height}"'
+            return f'<image {size} href="data:image/{kind};base64,{b64encode(data).decode()}"/>\n'
         case PictureLine(points, colour, width, alpha, dashes, title):
-            way = "L".join(f"{_number(x)} {_number(y)}" if x == x else "" for x, y in points)  # noqa: PLR0124 - no number
+            way = "L".join(f"{number(x)} {number(y)}" if x == x else "" for x, y in points)  # noqa: PLR0124 - no number
             way = way.replace("LL", "M")
             look = "" if width == 1.0 else f' stroke-width="{width:g}"'
             look += "" if alpha == 1.0 else f' opacity="{alpha:g}"'
@@ -210,17 +232,19 @@ def _element(shape: Shape) -> str:
             end = f">{_title(title)}</path>" if title else "/>"
             return f'<path {stroke}{look} d="M{way}"{end}\n'
         case PictureDot(x, y, radius, colour, title):
-            place = f'cx="{_number(x)}" cy="{_number(y)}" r="{radius:g}"'
-            return f"<circle {_fill(colour)} {place}>{_title(title)}</circle>\n"
+            place = f'cx="{number(x)}" cy="{number(y)}" r="{radius:g}"'
+            end = f">{_title(title)}</circle>" if title else "/>"
+            return f"<circle {place} {_fill(colour)}{end}\n"
         case PictureBox(x, y, width, height, colour):
-            size = f'width="{_number(width)}" height="{_number(height)}"'
-            return f'<rect {_fill(colour)} x="{_number(x)}" y="{_number(y)}" {size}/>\n'
-        case PictureWords(x, y, text, colour, anchor, size_px, bold):
+            size = f'width="{number(width)}" height="{number(height)}"'
+            return f'<rect {_fill(colour)} x="{number(x)}" y="{number(y)}" {size}/>\n'
+        case PictureWords(x, y, text, colour, anchor, size_px, bold, outline):
             look = "" if anchor == "start" else f' text-anchor="{anchor}"'
             look += "" if size_px == 12.0 else f' font-size="{size_px:g}"'
             look += ' font-weight="bold"' if bold else ""
+            look += f' stroke="{outline}"' if outline else ""
             halo = " paper-line" if colour in NAMED else ""
-            return f'<text {_fill(colour, halo)} x="{_number(x)}" y="{_number(y)}"{look}>{_text(text)}</text>\n'
+            return f'<text {_fill(colour, halo)} x="{number(x)}" y="{number(y)}"{look}>{_text(text)}</text>\n'
 
 
 def _fill(colour: str, more: str = "") -> str:
@@ -236,9 +260,9 @@ def _text(text: str) -> str:
     return escape(printable(text))
 
 
-def _number(value: float) -> str:
-    """Write pixels with a tenth's precision."""
-    return f"{round(value, 1) + 0.0:g}" if abs(value) < 1e4 else f"{value:.0f}"
+def _number(value: float, decimals: int = 1) -> str:
+    """Write pixels with some decimals."""
+    return f"{round(value, decimals) + 0.0:.{5 + decimals}g}" if abs(value) < 1e4 else f"{value:.0f}"
 
 
 POINTS = 72 / 100  # of a pixel at 100 dots an inch
@@ -268,10 +292,12 @@ def write_png(picture: Picture) -> bytes:
     figure = Figure(figsize=(picture.width / 100.0, picture.height / 100.0), dpi=100)
     FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xlim=(0.0, picture.width), ylim=(picture.height, 0.0))
     axes.axis("off")
-    for order, shape in enumerate(picture.shapes):
-        _paint(axes, shape, order)
+    for order, (kind, run) in enumerate(groupby(picture.shapes, key=type)):
+        paint = {PictureDot: _paint_dots, PictureImage: _paint_images}.get(kind, _paint)
+        paint(axes, run, order)
+    left, top = picture.corner
+    axes.set(xlim=(left, left + picture.width), ylim=(top + picture.height, top), aspect="auto")
     stream = io.BytesIO()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of letters that matplotlib's font lacks: it draws boxes
@@ -279,22 +305,49 @@ def write_png(picture: Picture) -> bytes:
     return stream.getvalue()
 
 
-def _paint(axes: Any, shape: Shape, order: int) -> None:
-    """Paint one shape over those before it."""
-    look = {"color": NAMED.get(shape.colour, (shape.colour,))[0], "zorder": order}
+def _paint_dots(axes: Any, dots: Iterable[Any], order: int) -> None:
+    """Paint dots over what was painted before."""
+    rows = ((x, y, (2.0 * radius * POINTS) ** 2, _plain(colour)) for x, y, radius, colour, _ in dots)
+    xs, ys, sizes, colours = zip(*rows, strict=True)
+    axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
+
+
+def _paint_images(axes: Any, images: Iterable[Any], order: int) -> None:
+    """Paint pictures, gray ones as they are."""
+    from matplotlib.image import imread
+
+    for x, y, width, height, kind, data in images:
+        pixels = imread(io.BytesIO(data), format=kind)
+        white = 1.0 if pixels.dtype.kind == "f" else 255.0
+        ends = (x, x + width, y + height, y)
+        axes.imshow(pixels, extent=ends, interpolation="none", cmap="gray", vmin=0.0, vmax=white, zorder=order)
+
+
+def _plain(colour: str) -> str:
+    return NAMED.get(colour, (colour,))[0]
+
+
+def _paint(axes: Any, shapes: Iterable[Any], order: int) -> None:
+    """Paint shapes of one kind over those before them."""
+    for shape in shapes:
+        _paint_shape(axes, shape, order)
+
+
+def _paint_shape(axes: Any, shape: Any, order: int) -> None:
+    look = {"color": _plain(shape.colour), "zorder": order}
     match shape:
         case PictureLine(points, _, width, alpha, dashes):
             xs, ys = zip(*points, strict=True)
             style = (0, [each * POINTS for each in dashes]) if dashes else "solid"
             axes.plot(xs, ys, linewidth=width * POINTS, alpha=alpha, linestyle=style, **look)
-        case PictureDot(x, y, radius):
-            axes.plot([x], [y], marker="o", markersize=2.0 * radius * POINTS, markeredgewidth=0.0, **look)
         case PictureBox(x, y, width, height):
             right, bottom = x + width, y + height
             axes.fill([x, right, right, x], [y, y, bottom, bottom], linewidth=0.0, **look)
         case PictureWords(x, y, text, _, anchor, size, bold):
-            place = {"ha": ANCHORS[anchor], "va": "center"}
+            place: dict[str, Any] = {"ha": ANCHORS[anchor], "va": "center"}
             weight = "bold" if bold else "normal"
+            if shape.halo:
+                place["bbox"] = {"color": shape.halo, "alpha": 0.5, "pad": 1.0}
             axes.text(x, y, printable(text).replace("$", r"\$"), fontsize=size * POINTS, weight=weight, **place, **look)
 
 
