@@ -26,7 +26,8 @@ COLUMN_WORDS = {
     **{f"{word}_{axis}": f"q{axis}" for word in ("qvec", "quat", "rot", "q") for axis in "xyzw"},
 }
 NORMALS: tuple[tuple[str, ...], ...] = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
-RATES = r"(?i)[vw][xyz](?:[ _\[(].*)?"  # names such as velocity_x, omega_x resemble a second position and are refused
+# velocities and rates of bodies; names such as velocity_x, twist.linear.x resemble a second position and are refused
+RATES = r"(?i)((?:body[_.])?[vw])[xyz]([ _\[(].*)?"
 NORMAL_NAMES = frozenset(sum(NORMALS, ()))
 STAMP_KEYS = ("stamp_ns", "stamp", "timestamp", "time", "t")
 NANOSECONDS = ("%time", "field.header.stamp")  # names that `rostopic echo -p` writes

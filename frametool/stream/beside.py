@@ -5,9 +5,10 @@ Loaded where one of them is there.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import FormatError, warn
+from frametool.errors import FormatError, listing, warn
 from frametool.geometry.placed import NOT_BOTH
 from frametool.geometry.uncertainty import UNKNOWN
 from frametool.grammar.covariance import (
@@ -20,11 +21,12 @@ from frametool.grammar.covariance import (
     of_sigmas,
     read_covariance,
 )
+from frametool.grammar.names import RATES
 from frametool.grammar.pose import LEFT_OUT, SCALE, read_angle_unit, read_scale, refuse_scale
 from frametool.grammar.readers import Misfit, NotARotation, read_number, within
 from frametool.ros.messages import whole_list
 from frametool.stream.layout import Kept, New
-from frametool.stream.row_layout import PARTS, POINT, POSE, VECTOR
+from frametool.stream.row_layout import PARTS, POINT, POSE, RATE, VECTOR, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from frametool.stream.layout import Column
     from frametool.stream.record import Record, RecordPlace
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Shape
+    from frametool.stream.row_layout import Target
     from frametool.stream.table import Table
 
 PLACED = (POSE, POINT, VECTOR)
@@ -206,3 +208,32 @@ def with_entries_at(beside: Sequence[int], columns: Sequence[Column], count: int
         elif column not in entries:
             found.append(column)
     return found
+
+
+def with_rates(
+    table: Table, request: Request, shapes: Sequence[Shape], targets: Sequence[Target], places: Sequence[int],
+    columns: Sequence[Column], source: str,
+) -> tuple[tuple[Shape, ...], tuple[Target, ...], tuple[int, ...], list[Column]]:  # fmt: skip
+    """Add the velocities and rates in a table's columns, three by three, which turn with the axes of poses.
+
+    Warns of those that are taken to be along the axes of the world, and of those that stay.
+    """
+    names, rates = table.names or (), dict[tuple[str, ...], list[int]]()
+    for name, place in sorted(zip(names, range(table.width), strict=True)):
+        if (match := re.fullmatch(RATES, name)) and place not in places:
+            rates.setdefault(match.groups(""), []).append(place)
+    turned = [] if request.columns or request.operation.mirrors else [each for each in rates.values() if len(each) == 3]
+    stay = [] if request.columns else [names[at] for each in rates.values() if each not in turned for at in each]
+    if stay:
+        warn(f"{source}: {listing(stay, 9)} keep to the old axes: poses and covariances turn alone")
+    kinds = [VECTOR if names[each[0]][0] in "vV" else RATE for each in turned]
+    at_world = [names[at] for each, kind in zip(turned, kinds, strict=True) if kind == VECTOR for at in each]
+    if at_world and request.operation.right:
+        warn(f"{source}: {listing(at_world, 9)} are along the axes of the world; call those of the body body_vx ..")
+    first = 1 + max((each.number for each in columns if isinstance(each, New)), default=-1)
+    number = {place: first + at for at, place in enumerate(place for each in turned for place in each)}
+    more = tuple(map(Shape, kinds))
+    return (*shapes, *more), (*targets, *map(request.target, more)), (*places, *number), [
+        New(number[each.place], names[each.place]) if isinstance(each, Kept) and each.place in number else each
+        for each in columns
+    ]  # fmt: skip

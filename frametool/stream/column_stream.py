@@ -31,7 +31,7 @@ from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
 from frametool.stream.rows import Block
 from frametool.stream.table import Table, unnamed
-from frametool.stream.table_plan import has_vectors, with_vectors
+from frametool.stream.table_plan import own_count, with_vectors
 from frametool.stream.table_stream import PlannedRows
 from frametool.text.cells import Cells
 from frametool.text.spans import Spans, framed
@@ -195,7 +195,7 @@ class ColumnRows(PlannedRows):
         names: list[Sequence[str | None]] = [[name] for name in unnamed(self.request, self.shape)]
         for role, texts in results.names.items():
             names[role] = [text or None for text in texts]
-        own = self.plan.targets[0].size if has_vectors(self.plan) else results.numbers.shape[1]
+        own = own_count(self.plan, results.numbers.shape[1])
         for column in self.layout.columns:
             if isinstance(column, New) and column.number >= own:
                 extras[column.name] = results.numbers[:, column.number]

@@ -14,7 +14,7 @@ from frametool.geometry.representations import HEADING, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
 from frametool.grammar.pose import SCALE, VELOCITY
 from frametool.stream.faults import STOP
-from frametool.stream.row_layout import MOVERS, POINT, POSE, SIX, TURNED, VECTOR, Shape, Target, pose_of
+from frametool.stream.row_layout import MOVERS, POINT, POSE, RATE, SIX, TURNED, VECTOR, Shape, Target, pose_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -219,9 +219,14 @@ class Operation(NamedTuple):
         """Tell whether positions stay as they are written."""
         return self.changes_nothing or (self.turns and self.left is None and not (self.mirrors or self.inverse))
 
+    @property
+    def _of_body(self) -> Components | None:
+        """Return what turns a vector along the axes of the body."""
+        return rigid.inverse(*self.right[0]) if self.right else None
+
     def move(self, shape: Shape, own: Components, beside: Components, edge: Components | None) -> Components:
         """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes beside it stays."""
-        mover = edge or self.left
+        mover = self._of_body if shape.kind == RATE else edge or self.left
         if self.mirrors:
             own = (own[0], -own[1], *own[2:])
         if mover is not None and len(mover) == EXACT and not shape.covariance:

@@ -32,7 +32,7 @@ from frametool.stream.header import (
 )
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, lay_out, refuse_repeated
 from frametool.stream.request import PLAIN
-from frametool.stream.row_layout import POINT, POSE, SIX, VECTOR, Shape, place_of, six_names
+from frametool.stream.row_layout import POINT, POSE, RATE, SIX, VECTOR, Shape, place_of, six_names
 from frametool.stream.table import rename_of
 from frametool.text.numbers import number_or_none
 
@@ -79,9 +79,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
     places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
-    frames = () if on_earth else _frame_columns(table, request, source)
-    if on_earth and PARENT_KEYS[0] in (table.names or ()):
-        frames = ((table.names or ()).index(PARENT_KEYS[0]),)
+    frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
     edge_of = request.pose_from_frame if on_earth else request.pose_of_row_frame
@@ -96,6 +94,10 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         from frametool.stream.beside import with_entries_at
 
         columns = with_entries_at(beside, columns, len(request.operation.carried(shapes[0])))
+    if request.operation.turns and table.names and poses and poses[0].rotation:
+        from frametool.stream.beside import with_rates
+
+        shapes, targets, places, columns = with_rates(table, request, shapes, targets, places, columns, source)
     if table.header:
         refuse_repeated(columns, table.names or ())
     layout = lay_out(columns, places, frames, table.width, table.delimiter)
@@ -187,9 +189,9 @@ def with_vectors(
     return request._replace(columns=columns, kinds=kinds, poses=len(columns), notations=())
 
 
-def has_vectors(plan: Plan) -> bool:
-    """Return True if vectors turn with the points of each row."""
-    return len(plan.shapes) > 1 and plan.shapes[-1].kind == VECTOR
+def own_count(plan: Plan, width: int) -> int:
+    """Return how many of the numbers of a row's result are not those of vectors that turn along."""
+    return width - len(XYZ) * sum(shape.kind in (VECTOR, RATE) for shape in plan.shapes[1:])
 
 
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
@@ -252,9 +254,11 @@ def _written(pose: PoseColumns) -> PoseColumns:
     return pose._replace(position=position._replace(places=position.places[: -position.staying]))
 
 
-def _frame_columns(table: Table, request: Request, source: str) -> tuple[int, ...]:
+def _frame_columns(table: Table, request: Request, source: str, *, on_earth: bool) -> tuple[int, ...]:
     """Find the columns that name frames: for look-ups those named, else the one a row is given in."""
     names = table.names or ()
+    if on_earth:
+        return tuple(place for place, name in enumerate(names) if name == PARENT_KEYS[0])[:1]
     if not (request.poses or request.frames):
         return ()
     if request.frames and request.frames != ("",):

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import FormatError, FrametoolError, Misused, listing, warn
+from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
-from frametool.grammar.names import NORMAL_NAMES, RATES, in_nanoseconds, stamp_places
+from frametool.grammar.names import NORMAL_NAMES, in_nanoseconds, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Outcome, RowNote, notes_of
 from frametool.stream.header import listed
@@ -32,7 +31,7 @@ from frametool.stream.table import (
     table_block,
     unnamed,
 )
-from frametool.stream.table_plan import has_vectors, plan_table, with_vectors
+from frametool.stream.table_plan import own_count, plan_table, with_vectors
 from frametool.text.cells import RecordEnds, torn_record
 from frametool.text.lines import read_blocks, whole_lines
 
@@ -84,16 +83,8 @@ def begin_table(stream: ByteStream, form: str, request: Request, *, source: str,
         raise FormatError("nothing in it", source=source)
     table, rest = open_table(first, form, header=header, source=source)
     table = as_trajectory(table, form, request, source)
-    if request.operation.turns and not request.columns:
-        _warn_of_vectors(table.names or (), source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
-
-
-def _warn_of_vectors(names: Sequence[str], source: str) -> None:
-    """Warn of velocities and rates beside poses whose axes change: no name says in which frame they are given."""
-    if found := [name for name in names if re.fullmatch(RATES, name)]:
-        warn(f"{source}: {listing(found, 9)} keep to the old axes: poses and covariances turn alone")
 
 
 def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
@@ -249,7 +240,7 @@ class TablePoses(TableRows):
         self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         parts = block.parts if len(rows) == run.count else [chosen(part, rows) for part in block.parts]
         texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
-        own = self.plan.targets[0].size if has_vectors(self.plan) else results.shape[1]
+        own = own_count(self.plan, results.shape[1])
         beside = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
         texts |= {each.name: results[:, each.number] for each in beside}
         names: list[Sequence[str | None]] = [[name] for name in self.unnamed]

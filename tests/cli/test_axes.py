@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from conftest import Outcome
 
@@ -230,12 +231,43 @@ def test_the_axes_of_a_heading_are_stated_once_and_alike_everywhere(run: Run) ->
 LOG = "stamp,x,y,z,qx,qy,qz,qw,{}\n1,1,2,-3,0,0,0,1,4,5,6\n"
 
 
-@pytest.mark.parametrize("names", ["vx,vy,vz", "wx,wy,wz", "vx [m/s],vy [m/s],vz [m/s]", "vx_mps,vy_mps,vz_mps"])
-@pytest.mark.parametrize("form", ["csv", "json"])
-def test_velocities_beside_poses_whose_axes_change_are_told_to_stay(run: Any, names: str, form: str) -> None:
+ENU, FLU = [5.0, 4.0, -6.0], [4.0, -5.0, -6.0]  # of 4, 5, 6 in ned and in frd
+NAMES = {
+    "vx,vy,vz": ENU, "vx [m/s],vy [m/s],vz [m/s]": ENU, "vx_mps,vy_mps,vz_mps": ENU,
+    "wx,wy,wz": FLU, "body_vx,body_vy,body_vz": FLU, "Body.wx (rad/s),Body.wy (rad/s),Body.wz (rad/s)": FLU,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("names", NAMES)
+@pytest.mark.parametrize("form", ["csv", "json", "npy"])
+def test_velocities_turn_with_the_world_and_rates_with_the_body(run: Any, tmp_path: Path, names: str, form: str) -> None:
+    text, changes = LOG.format(names), (["--world-axes", "enu_from_ned"], ["--axes", "frd_from_flu"])
+    done = run("convert", *changes[0], *changes[1], "-o", str(tmp_path / f"a.{form}"), stdin=text)
+    assert (done.status, done.err.count("are along the axes of the world")) == (0, NAMES[names] is ENU)
+    found = run("convert", "-i", str(tmp_path / f"a.{form}"), "--to", "quaternion", "-f", "json").out
+    assert [json.loads(found)[name] for name in names.split(",")] == NAMES[names]
+    one_side = run("convert", *changes[NAMES[names] is ENU], stdin=text)
+    assert one_side.out.splitlines()[1].rsplit(",", 3)[1:] == ["4.0", "5.0", "6.0"]
+
+
+@pytest.mark.parametrize(("names", "change"), [("vx,vy,speed", "ros_from_aircraft"), ("vx,vy,vz", "unity_from_ros")])
+def test_velocities_that_cannot_turn_are_told_to_stay(run: Any, names: str, change: str) -> None:
     text = LOG.format(names)
-    done = run("convert", "--all-axes", "ros_from_aircraft", "-f", form, stdin=text)
+    done = run("convert", "--all-axes", change, stdin=text)
     assert (done.status, done.err.count("keep to the old axes: poses and covariances turn alone")) == (0, 1)
-    assert names.split(",", maxsplit=1)[0] in done.err
-    assert "old axes" not in run("convert", "--to", "rpy", "-f", form, stdin=text).err
+    assert done.out.splitlines()[1].endswith(",4,5,6")
+    assert "old axes" not in run("convert", "--to", "rpy", stdin=text).err
     assert "old axes" not in run("convert", "--all-axes", "ros_from_aircraft", stdin=LOG.format("a,b,c")).err
+
+
+def test_a_whole_log_turns_in_one_command(run: Any) -> None:
+    entries = [f"c{row}{column}" for row in range(1, 7) for column in range(1, 7)]
+    variances = [1e-4 * (row + 1) * (row == column) for row in range(6) for column in range(6)]
+    header, row = LOG.format("vx,vy,vz").splitlines()
+    text = f"{header},{','.join(entries)},wx,wy,wz,mode\n{row},{','.join(map(repr, variances))},7,8,9,auto\n"
+    done = run("convert", "--all-axes", "ros_from_aircraft", "--to", "rpy_deg", "-f", "csv", stdin=text)
+    found = dict(zip(*(line.split(",") for line in done.out.splitlines()), strict=True))
+    numbers: dict[str, float] = {"x": 2, "y": 1, "z": 3, "yaw_deg": 90, "vx": 5, "vy": 4, "vz": -6, "wx": 7, "wy": -8, "wz": -9}
+    numbers |= {"c11": 2e-4, "c22": 1e-4, "c33": 3e-4, "c44": 5e-4, "c55": 4e-4, "c66": 6e-4, "c12": 0, "roll_deg": 0, "pitch_deg": 0}
+    assert {name: float(found[name]) for name in numbers} == pytest.approx(numbers)
+    assert found["mode"] == "auto"
