@@ -191,7 +191,8 @@ def with_vectors(
 
 def own_count(plan: Plan, width: int) -> int:
     """Return how many of the numbers of a row's result are not those of vectors that turn along."""
-    return width - len(XYZ) * sum(shape.kind in (VECTOR, RATE) for shape in plan.shapes[1:])
+    has_vectors = plan.shapes and plan.shapes[-1].kind in (VECTOR, RATE)
+    return width - len(XYZ) * (len(plan.targets) - 1) if has_vectors else width
 
 
 def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColumns]:
