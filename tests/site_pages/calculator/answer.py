@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from typing import Any
 
 from frametool import run
@@ -15,7 +16,7 @@ os.environ["TERM"] = "xterm-256color"
 def examples_for(text: str, found: dict[str, bytes]) -> dict[str, bytes]:
     """Return the examples that a text names, and those that they name, as `robot.yaml` and `examples/robot.yaml`."""
     for name, content in EXAMPLES.items():
-        if name in text and name not in found:
+        if name not in found and re.search(rf"(?<!-o ){re.escape(name)}", text):  # not where a result is written
             found |= {name: content, f"examples/{name}": content}
             examples_for(content.decode(errors="replace"), found)
     return found
