@@ -39,7 +39,7 @@ def main(words: list[str]) -> None:
     version = version_of((folder / "frametool" / "__init__.py").read_text("utf-8"))
     check_version(version, (folder / "CHANGELOG.md").read_text("utf-8"), tag)
     project.write_text(with_addresses(project.read_text("utf-8"), address, tag or "HEAD"), "utf-8")
-    readme.write_text(with_whole_links(readme.read_text("utf-8"), address, tag or "HEAD"), "utf-8")
+    readme.write_text(with_whole_links(with_setup(readme.read_text("utf-8")), address, tag or "HEAD"), "utf-8")
 
 
 def version_of(text: str) -> str:
@@ -77,6 +77,15 @@ def with_addresses(project: str, address: str, ref: str) -> str:
         raise Refused("pyproject.toml has [project.urls] already; remove it, the release writes it")
     rows = "".join(f'{name} = "{address}{page.format(ref)}"\n' for name, page in PAGES.items())
     return f"{project}\n[project.urls]\n{rows}"
+
+
+def with_setup(readme: str) -> str:
+    """Return README for those who have no clone: their set-up stands first."""
+    rest, count = re.subn(r"(?s)## Set-up\n.*?\n(?=## )", "", readme)
+    if count != 1:
+        raise Refused(f"README.md has {count} sections '## Set-up'; write one")
+    begin, heading, end = rest.partition("## ")
+    return f"{begin}{(Path(__file__).parent / 'setup.md').read_text('utf-8')}\n{heading}{end}"
 
 
 def with_whole_links(text: str, address: str, ref: str) -> str:

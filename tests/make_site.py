@@ -1,8 +1,9 @@
-"""The site out of the tables that the helps are made of: `python tests/make_site.py OUT [--address URL]`.
+"""The site out of the tables that the helps are made of: `python tests/make_site.py OUT [--address URL] [--calculator]`.
 
 It writes Markdown and conf.py into the folder OUT; `python -m sphinx -W -b html OUT OUT/html` makes the pages, with the
 extra `docs`. Nothing is loaded from elsewhere, when it is made or when it is read. With the address at which the site
-will be, llms.txt and the pages name it.
+will be, llms.txt, the pages and the list for search engines name it. With the calculator, whose packages are fetched,
+each command that runs there leads to it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import make_calculator
 from console import ROOT
 from site_pages import commands, example_files, forms, python_names, questions, texts, topics
 from site_pages.markup import Page, Section, bullets, inline, slug
@@ -28,24 +30,31 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 SETTINGS = Path(__file__).parent / "site_pages"
 
 
-def sections() -> list[Section]:
+CALCULATOR = "calculator/index.html"
+NOT_FOUND = "---\norphan: true\n---\n\n# There is no such page\n\nThe [home page](/index.md) leads to all there is; the search finds words in it.\n"
+
+
+def sections(*, calculator: bool = False) -> list[Section]:
     """Return the kinds of pages, in the order of the side bar."""
-    return [each.section() for each in (questions, commands, topics, forms, example_files, python_names)]
+    others = [each.section() for each in (commands, topics, forms, example_files, python_names)]
+    return [questions.section(f"../{CALCULATOR}" if calculator else ""), *others]
 
 
-def files(address: str = "") -> dict[str, str]:
+def files(address: str = "", *, calculator: bool = False) -> dict[str, str]:
     """Return the text of each file of the site by its path; links lead from page to page."""
     address = f"{address.rstrip('/')}/" if address else ""
-    kinds, single = sections(), texts.pages()
+    kinds, single = sections(calculator=calculator), texts.pages()
     lists = [page for kind in kinds for page in _indexes(kind)]
     pages = {page.path: f"# {inline(page.title)}\n\n{page.text}" for page in [*single, *lists, *(each for kind in kinds for each in kind.pages)]}
-    pages["index.md"] = _home(kinds, single)
+    pages |= {"index.md": _home(kinds, single, calculator=calculator), "404.md": NOT_FOUND}
     made = {path: _relative(text, path, pages) for path, text in pages.items()}
     made["llms.txt"] = _llms(kinds, single, address)
-    about = {"release": frametool.__version__, "html_title": f"frametool {frametool.__version__}", "html_baseurl": address}
+    made["robots.txt"] = "User-agent: *\nAllow: /\n" + (f"Sitemap: {address}sitemap.xml\n" if address else "")
+    about: dict[str, object] = {"release": frametool.__version__, "html_title": f"frametool {frametool.__version__}", "html_baseurl": address}
+    about |= {"html_extra_path": ["llms.txt", "robots.txt", "extra"]} if calculator else {}
     settings = "".join(f"{name} = {value!r}\n" for name, value in about.items())
     made["conf.py"] = f"{(SETTINGS / 'conf.py').read_text('utf-8')}\n\n{settings}"
-    made |= {path: (SETTINGS / Path(path).name).read_text("utf-8") for path in ("static/site.css", "scorer.js")}
+    made |= {path: (SETTINGS / Path(path).name).read_text("utf-8") for path in ("static/site.css", "static/mark.svg", "scorer.js")}
     return made
 
 
@@ -78,9 +87,11 @@ def _line(page: Page) -> str:
     return f"[{inline(page.label, linked=False)}](/{page.path})" + (f": {about}" if about else "")
 
 
-def _home(kinds: list[Section], single: list[Page]) -> str:
+def _home(kinds: list[Section], single: list[Page], *, calculator: bool) -> str:
     heads = [Page(f"{kind.folder}/index.md", kind.title, kind.title, "", "") for kind in kinds]
-    return f"{texts.text_of('README.md')}\n\n{_toctree([*heads, *single])}"
+    tried = f'<p class="try"><a href="{CALCULATOR}">Try it in the browser</a>, without an installation.</p>\n\n' if calculator else ""
+    title, _, text = texts.home().partition("\n\n")
+    return f"{title}\n\n{tried}{text}\n\n{_toctree([*heads, *single])}"
 
 
 def _toctree(pages: Iterable[Page]) -> str:
@@ -98,19 +109,22 @@ def _llms(kinds: list[Section], single: list[Page], address: str) -> str:
     return re.sub(r"\]\(/(?=\S+\.md\))", f"]({address}_sources/", "\n\n".join(parts)) + "\n"
 
 
-def write(folder: Path, address: str = "") -> None:
+def write(folder: Path, address: str = "", *, calculator: bool = False) -> None:
     """Write the site into a folder; what it has besides stays."""
-    for name, text in files(address).items():
+    for name, text in files(address, calculator=calculator).items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{text.rstrip()}\n", "utf-8")
     for picture in (ROOT / "examples").glob("*.[sp][vn]g"):
         shutil.copy(picture, folder / "examples")
+    if calculator:
+        make_calculator.write(folder / "extra" / "calculator")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Write the site as Markdown.")
     parser.add_argument("out", type=Path, metavar="OUT", help="the folder that it is written into")
     parser.add_argument("--address", default="", metavar="URL", help="where the site will be, for llms.txt and the pages")
+    parser.add_argument("--calculator", action="store_true", help="with the page that runs commands in the browser")
     arguments = parser.parse_args()
-    write(arguments.out, arguments.address)
+    write(arguments.out, arguments.address, calculator=arguments.calculator)

@@ -119,7 +119,7 @@ def test_the_page_is_useful_before_python_is_there() -> None:
     text = make_calculator.page(1, "3.14.2")
     assert len(make_calculator.QUESTIONS) == 12
     assert text.count("data-line=") == text.count("<pre><b>$ frametool ") == 12
-    assert "yaw 44.99999799924125" in text
+    assert "roll 0.0 pitch 0.0 yaw 44.99999" in text
     assert "{{" not in text
 
 

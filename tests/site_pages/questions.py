@@ -6,24 +6,26 @@ import re
 
 from frametool.cli.command import option_row
 from frametool.cli.commands.help import topics
+from site_pages import try_it
 from site_pages.cookbook import Question, questions
 from site_pages.markup import Page, Section, definitions, fenced, links, see_also
 
 
-def section() -> Section:
-    """Return the pages of all questions, by chapter."""
+def section(calculator: str = "") -> Section:
+    """Return the pages of all questions, by chapter; with the address of the calculator what runs there leads to it."""
     chapters: dict[str, list[Page]] = {}
     for each in questions():
-        chapters.setdefault(each.chapter, []).append(Page(each.path, each.title, each.title, "", _text(each)))
+        chapters.setdefault(each.chapter, []).append(Page(each.path, each.title, each.title, "", _text(each, calculator)))
     return Section("cookbook", "Cookbook", "Questions people ask, each with the command that answers it.", chapters)
 
 
-def _text(question: Question) -> str:
+def _text(question: Question, calculator: str) -> str:
     parts = []
+    tried = try_it.lines() if calculator else {}
     for command, output in question.shell:
-        parts.append(fenced(command, "sh"))
-        if output.strip():
-            parts += ["prints", fenced(output, "text" if re.search(r"(?m)^ |  ", output) else "output")]
+        parts.append(fenced(f"$ {command}\n{output}", "console"))
+        if command in tried:
+            parts.append(f'<p class="try"><a href="{calculator}{try_it.link(tried[command])}">Try it</a></p>')
     if question.prose:
         parts += ["## Why, and what to mind", _linked(question.prose)]
     options = {option.name: option_row(option) for call in question.calls for option in call.options}

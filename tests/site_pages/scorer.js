@@ -1,5 +1,7 @@
 // The order of what a search finds: a page comes the earlier, the more of the words asked for are its title, and the
 // more of its title they are. The numbers are those of Sphinx, of which one file has to be all there is.
+// In a folder no browser lets a page read others, for what stands around the words that are found.
+if (location.protocol === "file:") DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
 var Scorer = {
   objNameMatch: 11,
   objPartialMatch: 6,

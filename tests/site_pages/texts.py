@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import posixpath
 import re
+from runpy import run_path
+from typing import TYPE_CHECKING
 
 from console import ROOT
 
 from site_pages.markup import Page, slug
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 TEXTS = {  # file -> its page, what it is called in the side bar, what it is about
     "examples/BEYOND.md": ("beyond.md", "Beyond one machine", "Points by the million in Spark, Ray, dask, DuckDB and Polars"),
@@ -29,9 +34,14 @@ def pages() -> list[Page]:
     return found
 
 
-def text_of(file: str) -> str:
+def home() -> str:
+    """Return README as somebody reads it who has no clone."""
+    return text_of("README.md", run_path(str(ROOT / ".ci" / "release.py"))["with_setup"])
+
+
+def text_of(file: str, changed: Callable[[str], str] = str) -> str:
     """Return a text of the repository, without a head for programs; its links begin at the top of the site."""
-    text = re.sub(r"(?s)\A---\n.*?\n---\n", "", (ROOT / file).read_text("utf-8"))
+    text = re.sub(r"(?s)\A---\n.*?\n---\n", "", changed((ROOT / file).read_text("utf-8")))
     pieces = CODE.split(text)  # a link in code is none
     pieces[::2] = [re.sub(r"\]\((?![a-z][a-z0-9+.-]*:|[#/])([^)\s#]+)", lambda link: f"]({page_of(file, link[1])}", piece) for piece in pieces[::2]]
     return "".join(pieces).strip()
