@@ -421,8 +421,7 @@ class FrameTree(Frames):
         tree = FrameTree()
         tree.add("base", "camera", base_from_camera)
         tree.lookup("camera", "base")               # camera_from_base
-        tree.add("ecef", "map", earth_pose(48.1, 11.5, 520.0))    # axes at a position on the Earth,
-        `frametool.earth_pose`
+        tree.add("ecef", "map", frametool.earth_pose(48.1, 11.5, 520.0))  # axes at a position on the Earth
     """
 
     def __init__(self, name: str = "") -> None:

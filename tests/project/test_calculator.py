@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 import subprocess
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import make_calculator
 import pytest
+from chromium import serving
 from site_pages import try_it
 from site_pages.cookbook import questions
 
@@ -29,13 +27,6 @@ READY = "body[data-state=ready]"
 FASTEST = 60  # milliseconds of a next answer, the median
 
 
-class Handler(SimpleHTTPRequestHandler):
-    """Serve a folder, without a word."""
-
-    def log_message(self, *_: object) -> None:
-        """Say nothing."""
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Make the page, or skip where its packages cannot be had."""
@@ -50,10 +41,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def address(made: Path) -> Iterator[str]:
     """Serve the page below a path."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(made.parents[1]))) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}/some/path/index.html"
-        server.shutdown()
+    with serving(made.parents[1]) as root:
+        yield f"{root}/some/path/index.html"
 
 
 @pytest.fixture(scope="module")

@@ -49,6 +49,15 @@ def test_relative_links_lead_to_the_repository(text: str, expected: str) -> None
     assert release.with_whole_links(text, ADDRESS, "v1") == expected
 
 
+def test_the_set_up_of_the_description_is_that_without_a_clone() -> None:
+    text = release.with_setup((ROOT / "README.md").read_text())
+    assert re.findall(r"(?m)^## (.*)", text)[:2] == ["Set-up", "Ten questions"]
+    assert [line in text for line in ("uvx frametool", "pipx install frametool", "pip install 'frametool[bag]'", "pip install -q .")] == [True, True, True, False]
+    assert release.with_setup("# a\n\n## Set-up\n\nold\n\n## B\n").startswith("# a\n\n## Set-up\n\n```sh\nuvx")
+    with pytest.raises(release.Refused, match=r"README\.md has 0 sections '## Set-up'; write one"):
+        release.with_setup("# a\n")
+
+
 def test_no_relative_link_is_left_in_the_readme() -> None:
     text = release.with_whole_links((ROOT / "README.md").read_text(), ADDRESS, "HEAD")
     assert {link.partition("://")[0] for link in re.findall(r"\]\(([^)]+)\)", text)} == {"https"}

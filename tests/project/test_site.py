@@ -13,8 +13,9 @@ from urllib.parse import unquote, urlsplit
 
 import make_site
 import pytest
+from chromium import serving
 from console import ROOT
-from site_pages import calls, markup, texts
+from site_pages import calls, markup, texts, try_it
 from site_pages.cookbook import questions
 
 import frametool
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+ADDRESS = "https://example.org/frametool"
 KINDS = ("cookbook", "commands", "topics", "formats", "examples", "python")
 LOADED = {"script": "src", "img": "src", "link": "href", "iframe": "src", "source": "src", "object": "data", "embed": "src"}
 # their words in another order, some left out, as somebody would type them
@@ -83,7 +85,7 @@ def expected() -> Iterator[str]:
     yield from (f"formats/{name}.md" for name in ("read", "only-written"))
     yield from (f"{kind}/index.md" for kind in KINDS)
     yield from (page for file, (page, *_) in texts.TEXTS.items() if (ROOT / file).is_file())
-    yield from ("index.md", "llms.txt", "conf.py", "static/site.css", "scorer.js")
+    yield from ("index.md", "404.md", "llms.txt", "robots.txt", "conf.py", "static/site.css", "static/mark.svg", "scorer.js")
 
 
 def test_there_is_a_page_for_each_row_of_the_tables_and_no_other(files: dict[str, str]) -> None:
@@ -102,7 +104,8 @@ def test_every_question_has_a_page_with_its_commands_and_what_they_print(files: 
     assert [each.title for each in questions()] == list(answers())
     for each in questions():
         page = files[each.path]
-        assert page.startswith(f"# {markup.inline(each.title)}\n\n```sh\n{each.shell[0][0]}\n```"), each.title
+        command, output = each.shell[0]
+        assert page.startswith(f"# {markup.inline(each.title)}\n\n```console\n$ {command}\n{output.rstrip()}"), each.title
         assert all(command in page and output.rstrip("\n") in page for command, output in each.shell)
         assert each.commands, each.title
 
@@ -149,10 +152,31 @@ def test_a_link_to_a_file_without_a_page_ends_the_script() -> None:
 
 def test_no_address_is_made_up_and_the_one_that_is_given_is_used(files: dict[str, str]) -> None:
     written = (ROOT / "README.md").read_text()  # a release makes its links whole
-    assert [link for text in files.values() for link in re.findall(r"https?://[^\s)\"'`]+", text) if link not in written] == []
+    assert [link for text in files.values() for link in re.findall(r"https?://[^\s)\"'`]+", text) if link not in written] == ["http://www.sitemaps.org/schemas/sitemap/0.9", "http://www.w3.org/2000/svg"]  # names of what is written
     given = make_site.files("https://example.org/frametool")
     assert "(https://example.org/frametool/_sources/topics/pose.md)" in given["llms.txt"]
     assert "html_baseurl = 'https://example.org/frametool/'\n" in given["conf.py"]
+
+
+def test_a_command_that_runs_in_the_browser_leads_there() -> None:
+    made = make_site.files(calculator=True)
+    links = re.findall(r'<a href="\.\./calculator/index\.html#l=([^"]+)">Try it</a>', "".join(made.values()))
+    assert sorted(f"frametool {unquote(each)}" for each in links) == sorted(try_it.lines()[command] for each in questions() for command, _ in each.shell if command in try_it.lines())
+    assert len(links) > 60
+    assert '<a href="calculator/index.html">Try it in the browser</a>' in made["index.md"]
+    assert "'extra'" in made["conf.py"]
+
+
+def test_the_home_page_installs_what_is_published(files: dict[str, str]) -> None:
+    assert files["index.md"].index("pipx install frametool") < files["index.md"].index("## Ten questions")
+    assert "pip install -q ." not in files["index.md"]
+
+
+def test_every_command_shows_its_output_and_says_what_its_arguments_are(files: dict[str, str]) -> None:
+    for name in calls.commands():
+        page = files[f"commands/{name.replace(' ', '-')}.md"]
+        assert "```console\n$ " in page or name in ("view", "record", "sim", "sim teleop"), name  # they draw, or write files
+        assert all(": " in line for line in re.findall(r"(?ms)^## Arguments\n\n(.*?)\n\n", page)), name
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +186,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.importorskip(package, reason=f"no {package} to make the site with")
     folder = tmp_path_factory.mktemp("site")
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "1"}
-    for command in ([str(ROOT / "tests" / "make_site.py"), "."], ["-m", "sphinx", "-q", "-W", "-b", "html", ".", "html"]):
+    for command in ([str(ROOT / "tests" / "make_site.py"), ".", "--address", ADDRESS], ["-m", "sphinx", "-q", "-W", "-b", "html", ".", "html"]):
         done = subprocess.run([sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     return folder / "html"
@@ -174,7 +198,8 @@ def pages(site: Path) -> dict[Path, Read]:
     return {path: Read(path) for path in site.rglob("*.html")}
 
 
-def test_two_runs_write_the_same(files: dict[str, str], site: Path) -> None:
+def test_two_runs_write_the_same(site: Path) -> None:
+    files = make_site.files(ADDRESS)
     assert {name: (site.parent / name).read_text() for name in files} == {name: f"{text.rstrip()}\n" for name, text in files.items()}
 
 
@@ -197,7 +222,7 @@ def test_every_link_of_the_markdown_and_of_llms_holds(files: dict[str, str], sit
     texts = [site / "llms.txt", *sources.rglob("*.md")]
     broken = [
         (path.name, link) for path in texts for link in re.findall(r"\]\(([^)#\s]+\.md)\)", path.read_text())
-        if not (path.parent / link).is_file()
+        if not (path.parent / link.removeprefix(f"{ADDRESS}/")).is_file()
     ]  # fmt: skip
     assert broken == []
     assert {path.relative_to(sources).as_posix() for path in sources.rglob("*.md")} == {name for name in files if name.endswith(".md")}
@@ -213,6 +238,15 @@ def test_ordinary_links_lead_only_where_the_texts_do_and_to_those_who_made_the_t
     written = "".join(files.values())
     found = {link for page in pages.values() for link in page.links if urlsplit(link).netloc and link not in written}
     assert found == {"https://www.sphinx-doc.org/", "https://pradyunsg.me", "https://github.com/pradyunsg/furo"}
+
+
+def test_search_engines_find_each_page_with_what_it_is_about(pages: dict[Path, Read], site: Path) -> None:
+    own = {path.relative_to(site).as_posix() for path in pages} - {"404.html", "search.html"}
+    assert set(re.findall(rf"<loc>{ADDRESS}/(.*?)</loc>", (site / "sitemap.xml").read_text())) == own
+    assert (site / "robots.txt").read_text() == f"User-agent: *\nAllow: /\nSitemap: {ADDRESS}/sitemap.xml\n"
+    described = {name: re.findall(r'<meta name="description" content="([^"]*)">', (site / name).read_text()) for name in own}
+    assert [name for name, found in described.items() if len(found) != 1 or not 10 < len(found[0]) <= 200] == []
+    assert f'<base href="{ADDRESS}/">' in (site / "404.html").read_text()
 
 
 def test_the_words_of_a_question_are_in_the_index_with_its_page(site: Path) -> None:
@@ -246,6 +280,15 @@ def test_a_search_by_words_finds_the_question_first(browser: Any, site: Path, ty
     tab.close()
     assert complaints == []
     assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+
+
+def test_a_search_on_a_server_shows_what_stands_around_the_words(browser: Any, site: Path) -> None:
+    with serving(site) as address:
+        tab = browser.new_page()
+        tab.goto(f"{address}/search.html?q=rvec")
+        tab.wait_for_selector("ul.search li p.context")
+        assert "rvec" in tab.inner_text("ul.search li p.context >> nth=0").lower()
+        tab.close()
 
 
 @pytest.mark.parametrize("width", [390, 1400])

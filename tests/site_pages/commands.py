@@ -76,8 +76,8 @@ def _text(name: str, command: click.Command) -> str:
 
 def _seen(name: str) -> str:
     """Return the shortest call of a command in the cookbook that is no error, with its output and where it stands."""
-    lines = [(output.count("\n"), command, output, each) for each in questions() for command, output in each.shell if re.match(rf"frametool {name}\b", command)]
-    _, command, output, question = min((each for each in lines if each[0] and not each[2].startswith("frametool: ")), default=(0, "", "", None), key=lambda each: (each[0] > MOST_SEEN, len(each[1])))
+    lines = [(output.count("\n"), command, output, each) for each in questions() for command, output in each.shell if re.search(rf"\bframetool {name}\b", command)]
+    _, command, output, question = min((each for each in lines if each[0] and not each[2].startswith("frametool: ")), default=(0, "", "", None), key=lambda each: (each[0] > MOST_SEEN, not each[1].startswith(f"frametool {name}"), len(each[1])))
     shown = fenced(f"$ {command}\n{output}", "console")
     return f"{shown}\n\n[{inline(question.title)}](/{question.path})" if question else ""
 

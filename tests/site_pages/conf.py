@@ -41,8 +41,9 @@ def describe(app: Any, name: str, _template: str, context: dict[str, Any], doctr
         return
     from docutils import nodes
 
-    texts = [each.astext() for each in doctree.findall(nodes.paragraph) if not isinstance(each.parent, nodes.list_item)]
-    words = f"{context['title']}: {' '.join(texts)}".split()
+    paragraphs = sorted(doctree.findall(nodes.paragraph), key=lambda each: isinstance(each.parent, nodes.list_item))
+    title = next(doctree.findall(nodes.title)).astext()
+    words = f"{title}: {' '.join(each.astext() for each in paragraphs)}".split()
     while len(" ".join(words)) > LONGEST_DESCRIPTION:
         words.pop()
     context["metatags"] += f'<meta name="description" content="{escape(" ".join(words), {chr(34): "&quot;"})}">'
