@@ -1,1 +1,1 @@
-"""What a person looks at: aligned text, drawings; the only place that imports rich."""
+"""Output for people: aligned text, charts, pictures and pages; the only room that imports rich."""

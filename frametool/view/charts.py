@@ -20,7 +20,7 @@ LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is 
 
 
 class Area(NamedTuple):
-    """A rectangle of a picture that values are drawn in, without what is written around it."""
+    """The plot area of a chart in pixels, without its labels."""
 
     left: float
     top: float
@@ -29,7 +29,7 @@ class Area(NamedTuple):
 
 
 class ChartLine(NamedTuple):
-    """A line by its points in the units of the axes; without a name it is not in the legend."""
+    """A line in data coordinates; a line without a name is not in the legend."""
 
     name: str
     colour: str
@@ -40,12 +40,12 @@ class ChartLine(NamedTuple):
 
 
 class Chart:
-    """Two axes in an area of a picture, and where values are between them."""
+    """Two axes in a plot area, and the mapping from data to pixels."""
 
     def __init__(self, area: Area, x: Range, y: Range, names: tuple[str, str], *, equal: bool = False) -> None:
-        """Choose the ends of both axes.
+        """Choose the limits of both axes.
 
-        names: what is along x and along y, with units.  equal: a unit is as long along x as along y.
+        names: titles of the x and the y axis, with units.  equal: use one scale for both axes.
         """
         self.area, self.names = area, names
         if equal:
@@ -63,14 +63,14 @@ class Chart:
                       for each, (begin, end) in zip(self.ticks, (self.x, self.y), strict=True)]  # fmt: skip
 
     def place(self, x: float, y: float) -> Point:
-        """Return the pixels of two values; of values beyond the axis y, those of its end."""
+        """Return the pixels of a point; values beyond the y axis are clamped to its ends."""
         left, top, width, height = self.area
         inside = min(max(y, self.y[0]), self.y[1])
         across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
         return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
 
     def drawn(self, lines: Sequence[ChartLine] = (), rows: Sequence[str] | None = None) -> Iterator[Shape]:
-        """Draw the axes, the lines and a legend of those with names; rows: words in the place of numbers along y."""
+        """Draw axes, lines and the legend; rows: labels that replace the numbers along y."""
         left, top, width, height = self.area
         right, bottom = left + width, top + height
         yield PictureWords(left, top - 14.0, self.names[1], "soft")
@@ -93,7 +93,7 @@ class Chart:
 
 
 def legend(lines: Sequence[ChartLine], right: float, y: float) -> Iterator[Shape]:
-    """Write the names of lines on one line that ends at the right, each behind a piece of its line."""
+    """Draw a right-aligned legend on one line, each name after a sample of its line."""
     for line in reversed(lines):
         yield PictureWords(right, y, line.name, "ink", "end", 11.0)
         right -= text_width(line.name, 12.0) + 5.0
@@ -102,7 +102,7 @@ def legend(lines: Sequence[ChartLine], right: float, y: float) -> Iterator[Shape
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Return round numbers that enclose two values: 1, 2 or 5 times a power of ten apart, four to ten of them."""
+    """Return 2 to 10 round numbers that enclose two values, spaced 1, 2 or 5 times a power of ten."""
     span = high - low if high - low > LEAST_SPAN else 1.0
     step = 10.0 ** math.floor(math.log10(span / 4.0))
     step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)

@@ -1,4 +1,4 @@
-"""Comparisons as a report: one page with the numbers, paths and errors over time; or a drawing of one as SVG."""
+"""Reports of comparisons: an HTML page with numbers, paths and errors over time, or an SVG of one comparison."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ FAR = 1e3  # times its size is a path away from 0 where the numbers along its ax
 
 
 class Curve(NamedTuple):
-    """A comparison as it is drawn: with its name and colour, the pairs that were chosen and their times."""
+    """A comparison to draw: its name, its colour, the indices of the pairs drawn and their times."""
 
     found: Comparison
     name: str
@@ -58,12 +58,12 @@ class Curve(NamedTuple):
     times: list[float]
 
     def over_time(self, values: Any) -> list[tuple[float, float]]:
-        """Return the chosen ones of some values with their times."""
+        """Return (time, value) of the pairs drawn."""
         return [*zip(self.times, values[self.chosen].tolist(), strict=True)]
 
 
 def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
-    """Return a report in one file that loads nothing: `svg` of one comparison, or `html` of any number."""
+    """Return a self-contained report: `svg` of one comparison, or `html` of any number."""
     curves = [_curve(each, at, len(found)) for at, each in enumerate(found)]
     numbers = [each.as_dict() for each in found]
     unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
@@ -107,7 +107,7 @@ def _curve(found: Comparison, at: int, count: int) -> Curve:
 
 
 def _extremes(values: Any, stretches: int) -> Any:
-    """Return which of many values are drawn: of each stretch the least and the greatest, and both ends."""
+    """Return the indices to draw: the minimum and maximum of each stretch, and both ends."""
     count = len(values)
     if count <= 2 * stretches:
         return np.arange(count)
@@ -121,7 +121,7 @@ def _figure(high: float, shapes: Sequence[Shape]) -> Picture:
 
 
 def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
-    """Return axes in equal scales for all paths, along the axis they spread least, and what flattens positions."""
+    """Return the chart of all paths, seen along the axis of least extent, and the projection of positions onto it."""
     every = np.concatenate([xyz for each in curves for xyz in (each.found.pairs.ref.xyz, each.found.moved.xyz)])
     low, high = every.min(0), every.max(0)
     axes = np.sort(np.argsort(high - low, kind="stable")[1:])
@@ -136,7 +136,7 @@ def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
 
 
 def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
-    """Draw all paths, a single one in the colours of its errors."""
+    """Draw the paths; a single estimate is coloured by its error."""
     first = curves[0]
     lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
     shapes: list[Shape] = []
@@ -150,7 +150,7 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
 
 
 def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
-    """Draw a path in the colours of its errors, and what these mean."""
+    """Draw a path coloured by error, with the colour scale."""
     errors, low = curve.found.ate.m, chart.area.top + chart.area.height + 25.0
     worst = float(errors.max())
     levels = np.minimum((errors[curve.chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1)
@@ -170,14 +170,14 @@ def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart)
 
 
 def _named(lines: list[ChartLine]) -> list[ChartLine]:
-    """Leave the legend to the table of estimates where their names are too long for one line."""
+    """Drop names from a legend too long for one line; the table of estimates shows the colours."""
     if sum(text_width(line.name, 12.0) + 33.0 for line in lines) < WIDE - 60.0:
         return lines
     return [line._replace(name="" if at else line.name) for at, line in enumerate(lines)]
 
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[ChartLine]]]:
-    """Return charts of the errors in position, in rotation, and of a single estimate along and across its path."""
+    """Return the charts over time: errors in position, in rotation, and for one estimate along and across its path."""
     end, ate, one = max(each.times[-1] for each in curves), curves[0].found.ate, len(curves) == 1
     kinds = {"error in position (m)": [(each.name * (not one), each.colour, each.found.ate.m, each) for each in curves]}
     if turned := [(each, each.found.ate.rad) for each in curves if each.found.ate.rad is not None]:
@@ -204,7 +204,7 @@ def _stacked(charts: Sequence[tuple[Chart, list[ChartLine]]]) -> Picture:
 
 
 def _distribution(curves: Sequence[Curve]) -> Picture:
-    """Draw how many poses have which error; of several estimates a box each."""
+    """Draw the distribution of the error: a histogram of one estimate, a box plot of several."""
     errors = [each.found.ate.m for each in curves]
     ends = (0.0, max(float(each.max()) for each in errors))
     if len(curves) == 1:
@@ -230,7 +230,7 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
 
 
 def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> dict[str, Picture]:
-    """Draw KITTI's errors by length, or else those of the deltas in metres, where there are enough lengths."""
+    """Draw errors by length, of KITTI or else of the deltas in metres; nothing for fewer than LEAST_LENGTHS lengths."""
     lines = []
     for curve, each in zip(curves, numbers, strict=True):
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]
@@ -245,7 +245,7 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> di
 
 
 def _samples(curve: Curve, map_chart: Chart, seen: Any, time_chart: Chart) -> dict[str, Any]:
-    """Return where the drawn pairs are in both pictures, and what is said of them when they are pointed at."""
+    """Return the pixels of the drawn pairs in both charts and the values shown on hover."""
     ate, chosen = curve.found.ate, curve.chosen
     places = [map_chart.place(*point) for point in seen(curve.found.moved.xyz[chosen])]
     over = [time_chart.place(*point) for point in curve.over_time(ate.m)]
@@ -259,7 +259,7 @@ def _samples(curve: Curve, map_chart: Chart, seen: Any, time_chart: Chart) -> di
 
 
 def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
-    """Return pictures in columns as one SVG document."""
+    """Return columns of pictures as one SVG document."""
     drawn, bottom = "", 0.0
     for number, column in enumerate(columns):
         top = 24.0
@@ -272,7 +272,7 @@ def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
 
 
 def _tiles(found: dict[str, Any]) -> str:
-    """Return the three numbers that one looks for first."""
+    """Return the tiles: absolute error, relative error, poses paired."""
     ate, poses = found["ate"]["m"], found["poses"]
     said = f"rmse; at most {ate['max']:.4g} m, aligned by {found['settings']['align']}"
     tiles = [("ATE", f"{ate['rmse']:.4g}", "m", said)]
@@ -297,7 +297,7 @@ TABLE_MEANINGS = (
 
 
 def _table(numbers: Sequence[dict[str, Any]], curves: Sequence[Curve]) -> str:
-    """Return a row for each estimate, the best of each column marked, which sorts by the title that is clicked."""
+    """Return the sortable table of estimates, with the best value of each column marked."""
     rows = [fit_text.table_row(each) for each in numbers]
     best = fit_text.best_of(rows)
     shown = [at for at in range(len(TITLES)) if any(row[at] is not None for row in rows)]
@@ -316,7 +316,7 @@ def _table(numbers: Sequence[dict[str, Any]], curves: Sequence[Curve]) -> str:
 
 
 def _measured(found: dict[str, Any], *, one: bool) -> str:
-    """Return all measures of a comparison with what they mean, and its settings, folded."""
+    """Return the table of measures with their explanations, and the folded settings."""
     rows = ["".join(f"<th>{title}</th>" for title in ("", "", *fit_text.COLUMNS, "%"))]
     row = '<th tabindex="0" data-tip="{}">{}</th><td>{}</td>{}'.format
     for label, meaning, summed, percent in fit_text.measures(found):

@@ -1,12 +1,11 @@
-"""Frames as files that other programs show: one HTML page, and glTF 2.0 in one binary file (.glb).
+"""Frames as files for other programs: an interactive HTML page, and binary glTF 2.0 (.glb).
 
-The page looks at them from all sides, with everything inside and no request to anywhere.  Its script and style stand as
-plain files in the folder `page`, one after another in the order of SCRIPTS; the page lets nothing else run.  Poses go
-in as doubles, stamps as 64-bit integers of nanoseconds; joints of a robot with their limits.  A run of turtles is shown
-as its followers saw it in tf.
+The page is self-contained and makes no network requests.  Its script and style are the files in the folder `page`,
+joined in the order of SCRIPTS and EXTRAS; its policy lets nothing else run.  Poses are stored as doubles, stamps as
+64-bit integers of nanoseconds.  A run of turtles is shown as its followers saw it in tf.
 
-A .glb has a node a frame, named and nested as they are, with coloured axes; moving frames are animated, from their
-first stamp on, in seconds.  glTF has y up, so one node above all turns z up.
+A .glb has one node per frame, with its name, its parent and coloured axes; moving frames are animated, in seconds
+after their first stamp.  glTF has y up, so the root node rotates z up.
 Source: Khronos glTF 2.0, sections 3.6 (buffers), 3.11 (animation), 4.4 (binary).
 """
 
@@ -52,7 +51,7 @@ MATERIAL = {"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": {
 
 
 class BinaryPart:
-    """The numbers of the file: one buffer, its views, and what is to be found in them."""
+    """The binary part of a .glb: one buffer, its views and accessors."""
 
     def __init__(self) -> None:
         """Create an empty one."""
@@ -61,7 +60,7 @@ class BinaryPart:
         self.accessors: list[dict[str, Any]] = []
 
     def add(self, data: bytes, kind: str, component: int, count: int, *, target: int = 0, **more: Any) -> int:
-        """Append numbers, and return the number of their accessor."""
+        """Append numbers and return the index of their accessor."""
         self.data += bytes(-len(self.data) % 4)
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
         self.views.append(view | ({"target": target} if target else {}))
@@ -98,7 +97,7 @@ def write_glb(scene: FrameScene) -> bytes:
 
 
 def _add_axes(part: BinaryPart) -> None:
-    """Add three bars along x, y, z of length 1: places, colours, triangles."""
+    """Add three bars of length 1 along x, y, z: positions, colours, triangles."""
     places: list[list[float]] = []
     faces: list[int] = []
     for axis in range(3):
@@ -116,7 +115,7 @@ def _add_axes(part: BinaryPart) -> None:
 
 
 def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Return the nodes, and the number of each frame's; what has no drawn parent stands where it is in `fixed`."""
+    """Return the nodes and the index of each frame's; a frame without a drawn parent is placed in `fixed`."""
     nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": Z_UP, "children": []}]
     index: dict[str, int] = {}
     for name, pose in poses.items():
@@ -131,7 +130,7 @@ def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[lis
 
 
 def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> dict[str, Any] | None:
-    """Return the samples of the frames that move below one and the same drawn parent."""
+    """Return the animation of the frames that move below one drawn parent."""
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
     first_ns, _ = scene.span_ns
@@ -148,7 +147,7 @@ def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> di
 
 
 def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence[float]], list[Sequence[float]]]:
-    """Return seconds that rise as float32, places, and rotations of which each is the nearer one of q and -q."""
+    """Return increasing float32 seconds, positions, and quaternions with continuous signs."""
     seconds: list[float] = []
     places: list[Sequence[float]] = []
     rotations: list[Sequence[float]] = []
@@ -179,10 +178,10 @@ def write_page(
 ) -> str:  # fmt: skip
     """Return the page.
 
-    title: its heading.  file: the tree's name in the command that the page offers to copy.
+    title: its heading.  file: the name of the tree in the command that the page copies.
     eye: azimuth and elevation of the first view, radians.
-    other: another tree seen in the same frame, laid over this one; other_title: what it is called.
-    sliders: whether the joints of robots have one each.  solids: what is drawn of them; a mesh as a box.
+    other, other_title: another tree in the same frame, drawn over this one, and its name.
+    sliders: add one for each joint of a robot.  solids: of robots; a mesh is drawn as a box.
     """
     head = _head(scene) | {"title": title, "file": file or title, "made": f"frametool {__version__}"}
     head["show"] = _shown(scene, eye)
@@ -202,7 +201,7 @@ def write_page(
 
 
 def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]:
-    """Return what the page shows first."""
+    """Return the initial view of the page."""
     shown: dict[str, Any] = {"fixed": scene.fixed, "path": scene.path_only}
     shown |= {key: name for key, name in (("target", scene.target), ("source", scene.source)) if name}
     if scene.at_ns is not None:
@@ -213,7 +212,7 @@ def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]
 
 
 def _head(scene: FrameScene) -> dict[str, Any]:
-    """Return names, parents and where each track's numbers begin in the blob."""
+    """Return names, parents and the offset of each track in the blob."""
     index = {name: number for number, name in enumerate(scene.names)}
     standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
     parents = [-1 if track is None else index[track.parent] for track in standing]
@@ -229,7 +228,7 @@ def _head(scene: FrameScene) -> dict[str, Any]:
 
 
 def _blob(scene: FrameScene) -> Iterator[bytes]:
-    """Yield the poses of frames that stand still, then of each track its stamps and its samples."""
+    """Yield the static poses, then the stamps and samples of each track."""
     standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
     yield _little(array("d", chain.from_iterable(track.components if track else NO_POSE for track in standing)))
     for moving in scene.tracks.values():
@@ -254,7 +253,7 @@ def _packed(pieces: Iterator[bytes]) -> Iterator[bytes]:
 
 
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
-    """Return the joints that turn or slide and stand still, and the links that they move, as the page has them."""
+    """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
     index = {name: number for number, name in enumerate(scene.names)}
     joints: list[dict[str, Any]] = []
     moved: list[dict[str, Any]] = []
@@ -285,7 +284,7 @@ MESH_PART = 0.35  # of the usual distance between frames is the least edge of a 
 
 
 def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
-    """Return the solids of frames that are there, meshes as boxes around the frames that hang from theirs."""
+    """Return the solids of known frames; a mesh becomes a box around the child frames of its frame."""
     index = {name: number for number, name in enumerate(scene.names)}
     places: dict[str, list[Sequence[float]]] = {name: [NO_POSE] for name in scene.names}
     for track in scene.tree.tracks():
@@ -306,10 +305,10 @@ def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
 
 
 class RunPage:
-    """Collect the transforms of a run, all of them, for a page."""
+    """Collect all transforms of a run for a page."""
 
     def __init__(self) -> None:
-        """Create the page of a run that has not begun."""
+        """Create an empty page."""
         self.buffer = TransformBuffer(name="run")
 
     def watch(self, step: SimulationStep) -> None:

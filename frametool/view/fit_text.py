@@ -1,4 +1,4 @@
-"""Fits and comparisons for people in 80 columns; solutions as a report, tables of comparisons for papers."""
+"""Text of comparisons and solutions within 80 columns, and tables of comparisons for papers."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class SolvedFrame(NamedTuple):
 
 
 class SolvedRow(NamedTuple):
-    """A measurement and how far it is off: metres, radians, and in sigmas (`u`).
+    """A measurement and its residual: metres, radians, and in sigmas (`u`).
 
-    counted: used or left out by the fit, not by its own weight of 0; fits: the blunder that explains it
+    counted: its weight is not 0; fits: the blunder that explains it
     """
 
     place: str
@@ -63,7 +63,7 @@ class SolvedRow(NamedTuple):
 
     @property
     def is_left_out(self) -> bool:
-        """Return True if it was left out because it does not agree with the rest."""
+        """Return True if the fit rejected it as an outlier."""
         return self.counted and not self.used
 
 
@@ -88,12 +88,12 @@ class Solution(NamedTuple):
 
     @property
     def used(self) -> int:
-        """Return how many measurements are used."""
+        """Return the number of measurements used."""
         return sum(each.used for each in self.rows)
 
     @property
     def left_out(self) -> list[SolvedRow]:
-        """Return the measurements that were left out."""
+        """Return the rejected measurements."""
         return [each for each in self.rows if each.is_left_out]
 
 
@@ -125,7 +125,7 @@ def _sigmas(each: SolvedFrame) -> dict[str, list[float]] | None:
 
 
 def write_solution(found: Solution) -> str:
-    """Write the summary, the frames, and what was left out."""
+    """Write the summary, the frames and the rejected measurements."""
     lines = [_first(found)]
     if found.sigma is not None and found.dof > 0:
         place, turn = found.sigma
@@ -139,7 +139,7 @@ def write_solution(found: Solution) -> str:
 
 
 def write_left_out(found: Solution) -> str:
-    """Write what was left out, a line for each; nothing where all was used."""
+    """Write one line per rejected measurement."""
     return "".join(f"{line}\n" for line in _left_out(found))
 
 
@@ -224,12 +224,12 @@ def _left_out(found: Solution) -> Iterator[str]:
 
 
 def _row_name(each: SolvedRow, *, in_sigmas: bool) -> str:
-    """Return where a measurement stands, and what it measures: of samples and points all measure the same."""
+    """Return the location of a measurement and, in a tree, what it measures."""
     return f"{each.place} {each.id or f'row {each.row}' if in_sigmas else f'{each.parent}<-{each.child}'}"
 
 
 def _aligned(name: str, width: int, rest: str) -> Sequence[str]:
-    """Put a name before numbers; one that is too long stands on a line of its own, cut at the width."""
+    """Put a name before numbers; a name that is too long gets its own line, cut at the width."""
     if cells(name) <= width:
         return [f"  {name}{' ' * (width - cells(name))}{rest}"]
     while cells(name) > WIDTH - 2:
@@ -247,7 +247,7 @@ CSV_TITLES = (
 RANKED = range(1, TITLES.index("scale"))
 
 def write_comparison(found: dict[str, Any]) -> str:
-    """Write the numbers of one comparison: the pairs first, then the fit, then the errors."""
+    """Write one comparison: pairs, alignment, errors."""
     poses, settings = found["poses"], found["settings"]
     longest = 2 + max(len(found["ref"]), len(found["est"]))
     width = max(NAME, longest if longest <= LONGEST_NAME else 0)
@@ -294,7 +294,7 @@ MEANINGS = {
 
 
 def measures(found: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, float] | None, float | None]]:
-    """Yield each measure of a comparison: its label with the unit last, what it means, its statistics, its percent."""
+    """Yield (label with the unit last, explanation, statistics, percent) for each measure of a comparison."""
     for label, (key, meaning) in MEANINGS.items():
         if key in found["ate"]:
             yield label, meaning, found["ate"][key], None
@@ -312,7 +312,7 @@ def _row(label: str, summed: dict[str, float] | None) -> str:
 
 
 def kitti_sentence(found: dict[str, Any]) -> str:
-    """Return the numbers of the KITTI benchmark, or why there are none."""
+    """Return the KITTI errors as text, or why there are none."""
     if kitti := found["kitti"]:
         return f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
     asked = min(found["settings"]["segments_m"])
@@ -320,7 +320,7 @@ def kitti_sentence(found: dict[str, Any]) -> str:
 
 
 def exact(value: Any) -> str:
-    """Write a number within the width of a column; `-` where there is none."""
+    """Write a number that fits its column; `-` for None."""
     if value is None:
         return "-"
     whole = len(str(int(abs(value)))) + (value < 0)
@@ -332,7 +332,7 @@ def _short(value: float | None) -> str:
 
 
 def write_explanation(found: dict[str, Any]) -> str:
-    """Write how the numbers come about, each formula with those of this run."""
+    """Write the formulas of a comparison with the numbers of this run."""
     poses, fit, ate, settings = found["poses"], found["transform"], found["ate"], found["settings"]
     c, q = fit.get("scale", 1.0), fit["quaternion"]
     parts = [ate[key]["rmse"] for key in ("along_m", "across_m", "up_m")]
@@ -364,7 +364,7 @@ def write_explanation(found: dict[str, Any]) -> str:
 
 
 def table_row(found: dict[str, Any]) -> list[Any]:
-    """Return the numbers of a comparison that stand in a table, behind the name of the estimate."""
+    """Return the table row of a comparison: the name of the estimate and its errors."""
     ate, last = found["ate"], found["rpe"][-1] if found["rpe"] else None
     rmse = [(ate[key] or {}).get("rmse") for key in ("m", "deg", "along_m", "across_m", "up_m")]
     return [
@@ -374,7 +374,7 @@ def table_row(found: dict[str, Any]) -> list[Any]:
 
 
 def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
-    """Write one row for each comparison: `text` or `markdown` or `latex` with the best of a column marked, or `csv`."""
+    """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
     rows = [table_row(each) for each in found]
     if form == "csv":
         lines = [CSV_TITLES, *(["" if cell is None else str(cell) for cell in row] for row in rows)]
@@ -402,7 +402,7 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
 
 
 def best_of(rows: Sequence[Sequence[Any]]) -> list[float | None]:
-    """Return the least number of each column that is ranked; one alone is no best."""
+    """Return the minimum of each ranked column; None if there is one row only."""
     columns = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
     return [min(there) if at in RANKED and there and len(rows) > 1 else None for at, there in enumerate(columns)]
 

@@ -1,4 +1,4 @@
-"""What notebooks show of values: the text that a terminal shows, of a tree its picture."""
+"""HTML of values for notebooks: the text that a terminal shows, and the picture of a tree."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from frametool.geometry.transform import Transform
 
 
 def html_of(value: Any) -> str | None:
-    """Return what a notebook shows of a transform, rotation, tree, trajectory or comparison; None for its repr."""
+    """Return the HTML of a transform, rotation, tree, trajectory or comparison; None if its repr is all there is."""
     if isinstance(value, Frames) and value.frames:
         from frametool.view.pictures import still_picture, write_svg
         from frametool.view.scene import FrameScene

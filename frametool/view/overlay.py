@@ -1,7 +1,6 @@
-"""Points over the picture that a camera took of them: each where it is seen, in the colour of its depth.
+"""Overlays: projected points on the camera's image, coloured by depth.
 
-The picture stays as it is, and its file's bytes stand in the drawing; places are pixels of the camera, the centre of
-the first one at 0, 0.
+The image file is embedded unchanged; coordinates are pixels, the centre of the first one at 0, 0.
 """
 
 from __future__ import annotations
@@ -54,10 +53,10 @@ def read_shot(path: str) -> PictureImage:
 
 
 class Overlay:
-    """The points in the image; of more than MOST every second, fourth .. is drawn."""
+    """The points in an image; beyond MOST, every second, fourth .. is drawn."""
 
     def __init__(self, image: str, path: str) -> None:
-        """Read the picture; path: of the drawing, whose suffix must be one of SUFFIXES.  Raises ValueInvalid."""
+        """Read the image; path: the output file, with one of SUFFIXES.  Raises ValueInvalid."""
         self.image, self.path = image, path
         self.suffix = os.path.splitext(path)[1].lower()
         if self.suffix not in SUFFIXES:
@@ -70,11 +69,11 @@ class Overlay:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Return width and height of the picture."""
+        """Return the width and height of the image."""
         return self.shot.width, self.shot.height
 
     def take(self, u: Number, v: Number, depth: Number, inside: Any) -> None:
-        """Add those of a block of points, or the one, that are in the image."""
+        """Add the points of a block, or one point, that are in the image."""
         if isinstance(inside, bool):
             found = [(depth, u, v)] * inside
         else:
@@ -85,7 +84,7 @@ class Overlay:
             self.points, self.every = self.points[::2], 2 * self.every
 
     def drawn(self) -> str | bytes:
-        """Return the drawing in the format of its suffix, far points first."""
+        """Return the overlay in the format of its suffix, with far points below near ones."""
         self.points.sort(reverse=True)
         near, far = (self.points[-1][0], self.points[0][0]) if self.points else (0.0, 0.0)
         wide, high = self.size

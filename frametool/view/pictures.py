@@ -1,7 +1,7 @@
-"""Still pictures of lines, dots, boxes and words, in pixels with y down; as SVG, as HTML around that, or as PNG.
+"""Static pictures of lines, dots, boxes, text and images, in pixels with y down, written as SVG, HTML or PNG.
 
-A colour is `#rrggbb`, or a name of PALETTE, which is another one where the reader's system is dark.  Only PNG needs a
-library, matplotlib.  Also draws frames so: ground, links, trails, axes, names and a scale.
+A colour is `#rrggbb` or a name in PALETTE, which has light and dark values.  Only PNG needs a library, matplotlib.
+Also here: the HTML shell of all pages, and the static picture of frames.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark when it begins to a green
 
 
 def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
-    """Return the colour of a part of the way from little, 0, to much, 1."""
+    """Return the colour of a value from 0 to 1."""
     place = part * (len(stops) - 1)
     at = min(int(place), len(stops) - 2)
     mixed = (round(a + (b - a) * (place - at)) for a, b in zip(stops[at], stops[at + 1], strict=True))
@@ -62,9 +62,9 @@ def shade_of(part: float, stops: Sequence[tuple[int, int, int]] = STOPS) -> str:
 
 
 class PictureLine(NamedTuple):
-    """A line through points, broken at those that are no numbers.
+    """A polyline, broken at NaN.
 
-    dashes: pixels drawn and left out; title: what it says when pointed at.
+    dashes: pixels drawn and skipped in turn; title: its tooltip.
     """
 
     points: Sequence[tuple[float, float]]
@@ -86,7 +86,7 @@ class PictureDot(NamedTuple):
 
 
 class PictureBox(NamedTuple):
-    """A filled rectangle by its left upper corner."""
+    """A filled rectangle; x, y: its upper left corner."""
 
     x: float
     y: float
@@ -96,7 +96,7 @@ class PictureBox(NamedTuple):
 
 
 class PictureWords(NamedTuple):
-    """A text on one line, its middle at y; anchor: start, middle or end of it is at x."""
+    """One line of text, vertically centred at y; anchor: which part of it is at x; halo: colour of its outline."""
 
     x: float
     y: float
@@ -109,7 +109,7 @@ class PictureWords(NamedTuple):
 
 
 class PictureImage(NamedTuple):
-    """A picture in the picture by its left upper corner: the bytes of a file, and whether these are png or jpeg."""
+    """An embedded image file; x, y: its upper left corner; kind: png or jpeg."""
 
     x: float
     y: float
@@ -123,7 +123,7 @@ Shape = PictureImage | PictureLine | PictureDot | PictureBox | PictureWords
 
 
 class Picture(NamedTuple):
-    """Shapes from the back to the front, the size of the whole, its left upper corner, and decimals of a pixel."""
+    """Shapes from back to front; corner: the coordinates of its upper left corner; decimals: of coordinates in SVG."""
 
     width: float
     height: float
@@ -142,7 +142,7 @@ image {image-orientation: none}
 
 
 def write_svg(picture: Picture, more: str = "") -> str:
-    """Return the picture as an SVG document; more: elements behind it."""
+    """Return the picture as an SVG document; more: elements drawn below it."""
     rule = ".{name} {{fill: {colour}}} .{name}-line {{stroke: {colour}}}\n".format
     light, dark = ("".join(rule(name=name, colour=PALETTE[name][scheme]) for name in PALETTE) for scheme in (0, 1))
     style = f"<style>\n{SHARED}{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n</style>\n"
@@ -150,9 +150,9 @@ def write_svg(picture: Picture, more: str = "") -> str:
 
 
 def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
-    """Return the picture as an element of a page or of a picture, which has its style.
+    """Return the picture as an SVG element without styles.
 
-    before: what stands behind it.  place: attributes that say where it is.
+    before: elements drawn below it.  place: its x and y attributes inside another SVG.
     """
     width, height, (left, top) = f"{picture.width:g}", f"{picture.height:g}", picture.corner
     size = f'width="{width}" height="{height}" viewBox="{left:g} {top:g} {width} {height}"'
@@ -163,9 +163,9 @@ def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
 def write_html(
     title: str, body: str, *, style: str = "report.css", script: str = "", data: Mapping[str, str] | None = None
 ) -> str:
-    """Return a page in one file, which lets its own script and style run, and loads nothing.
+    """Return a self-contained page whose policy allows its own script and style only.
 
-    style, script: of the files in the folder `page`.  data: JSON by the id of the element that holds it.
+    style, script: names of files in the folder `page`.  data: JSON texts by element id.
     """
     texts = {"style": page_file(style), "script": "".join(map(page_file, script.split()))}
     if style == "report.css":
@@ -208,7 +208,7 @@ def _digest(text: str) -> str:
 
 
 def write_picture(picture: Picture, suffix: str, more: str = "") -> str | bytes:
-    """Return a picture in the form of a suffix: .png, .svg or .html; `more` stands below it in HTML."""
+    """Return a picture as .png, .svg or .html; more: HTML below the picture."""
     if suffix == ".png":
         return write_png(picture)
     if suffix == ".svg":
@@ -256,12 +256,12 @@ def _title(text: str) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text as XML may hold it."""
+    """Escape a text for XML."""
     return escape(printable(text))
 
 
 def _number(value: float, decimals: int = 1) -> str:
-    """Write pixels with some decimals."""
+    """Write a coordinate with some decimals."""
     return f"{round(value, decimals) + 0.0:.{5 + decimals}g}" if abs(value) < 1e4 else f"{value:.0f}"
 
 
@@ -270,7 +270,7 @@ ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
 
 def require_matplotlib() -> None:
-    """Say what to install if it is missing.
+    """Check that matplotlib is installed.
 
     Raises FileProblem.
     """
@@ -281,7 +281,7 @@ def require_matplotlib() -> None:
 
 
 def write_png(picture: Picture) -> bytes:
-    """Return the picture as the bytes of a PNG, without a date in them.
+    """Return the picture as a PNG without a timestamp.
 
     Raises FileProblem where matplotlib is missing.
     """
@@ -306,14 +306,14 @@ def write_png(picture: Picture) -> bytes:
 
 
 def _paint_dots(axes: Any, dots: Iterable[Any], order: int) -> None:
-    """Paint dots over what was painted before."""
+    """Paint a run of dots."""
     rows = ((x, y, (2.0 * radius * POINTS) ** 2, _plain(colour)) for x, y, radius, colour, _ in dots)
     xs, ys, sizes, colours = zip(*rows, strict=True)
     axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
 
 
 def _paint_images(axes: Any, images: Iterable[Any], order: int) -> None:
-    """Paint pictures, gray ones as they are."""
+    """Paint images; gray ones stay gray."""
     from matplotlib.image import imread
 
     for x, y, width, height, kind, data in images:
@@ -328,7 +328,7 @@ def _plain(colour: str) -> str:
 
 
 def _paint(axes: Any, shapes: Iterable[Any], order: int) -> None:
-    """Paint shapes of one kind over those before them."""
+    """Paint a run of shapes of one kind."""
     for shape in shapes:
         _paint_shape(axes, shape, order)
 
@@ -358,7 +358,7 @@ AXES = ("x", "y", "z")
 
 
 class StillPicture(NamedTuple):
-    """The picture; how many names found no place in it; how many frames lie in one small spot."""
+    """The picture, the number of names without room, and the number of frames crowded in one small spot."""
 
     picture: Picture
     hidden: int
@@ -368,9 +368,9 @@ class StillPicture(NamedTuple):
 def still_picture(
     scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
 ) -> StillPicture:  # fmt: skip
-    """Draw a scene as it is seen from a direction: azimuth and elevation, radians.
+    """Draw a scene from a direction: azimuth and elevation in radians.
 
-    other: another tree seen in the same frame, whose frames are laid faintly over those of the same names.
+    other: another tree in the same frame; its frames with the same names are drawn faintly.
     """
     flat = Projection(scene, SIZE, eye)
     blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
@@ -404,7 +404,7 @@ def _frame(flat: Projection, name: str) -> Iterator[Shape]:
 
 
 def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> Iterator[Shape]:
-    """Draw where a frame went, coloured by time."""
+    """Draw the trail of a frame, coloured by time."""
     steps = max(sum(len(stretch) - 1 for stretch in stretches), 1)
     size, done = -(-steps // PIECES), 0
     for stretch in stretches:
@@ -415,7 +415,7 @@ def _trail(frame: str, stretches: Sequence[Sequence[tuple[float, float]]]) -> It
 
 
 def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
-    """Draw where a frame stands in the other tree, and the way there."""
+    """Draw a frame's pose in the other tree, and a line to it."""
     x, y, _ = flat.at(pose[:3])
     for axis, tip in zip(AXES, axis_tips(pose, flat.axis), strict=True):
         yield PictureLine([(x, y), flat.at(tip)[:2]], axis, 2.0, 0.4, title=name)
@@ -423,7 +423,7 @@ def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
 
 
 def _label(label: Label) -> Iterator[Shape]:
-    """Write a name, with a line to its frame where it stands off."""
+    """Draw a name, with a leader line if it is away from its frame."""
     left, top, right, bottom = label.box
     if label.away > 16.0:
         end = min(max(label.point.x, left), right), top if top > label.point.y else bottom
@@ -432,7 +432,7 @@ def _label(label: Label) -> Iterator[Shape]:
 
 
 def _corner(flat: Projection) -> Iterator[Shape]:
-    """Draw which way the axes of the fixed frame point."""
+    """Draw the directions of the axes of the fixed frame."""
     x, y = CORNER, HEIGHT - CORNER
     right, up, toward = flat.view
     for axis in sorted(range(3), key=lambda axis: toward[axis]):
@@ -442,7 +442,7 @@ def _corner(flat: Projection) -> Iterator[Shape]:
 
 
 def _scale(flat: Projection, step: float) -> Iterator[Shape]:
-    """Draw how long a metre is, and say what all is seen in."""
+    """Draw the scale bar, and name the fixed frame."""
     metres = nice(110.0 / flat.scale)
     left, right, base = WIDTH - 20.0 - metres * flat.scale, WIDTH - 20.0, HEIGHT - 20.0
     yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")

@@ -1,4 +1,4 @@
-"""How far a job is: a bar on stderr, if that is a terminal and the job takes longer than two seconds."""
+"""Progress bars on stderr, if it is a terminal and the job takes longer than two seconds."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ PATIENCE = 2.0  # seconds before anything is shown
 
 
 class ProgressBar:
-    """Show how far a job is, if stderr is a terminal and the job takes longer than two seconds."""
+    """Show the progress of a job, if stderr is a terminal and it takes longer than two seconds."""
 
     def __init__(self, total: int | None, *, quiet: bool, counted: str = "rows") -> None:
-        """Start the clock; `total` is the number of bytes, if it is known; counted: what is done, "" if only that."""
+        """Start the clock; total: bytes, if known; counted: the unit of the count, "" for none."""
         self.total, self._counted = total, counted
         self.rows = self.size = 0
         self._hidden = quiet or sys.stderr is None or not sys.stderr.isatty()

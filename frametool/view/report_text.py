@@ -1,4 +1,4 @@
-"""Reports for a person, within 80 columns: edges of a recording, differences between trees, forms of files."""
+"""Reports within 80 columns: edges of a recording, differences between trees, file formats."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LEFT = ("parent", "child", "topics")
 
 
 def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noqa: ARG001 - the numbers here are for reading
-    """Return the edges as an aligned table; columns that say nothing are left out."""
+    """Return the edges as an aligned table without empty columns."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
@@ -48,7 +48,7 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
 
 
 def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
-    """Return the patterns of what is wrong in a report, each with a group called by its colour."""
+    """Return the patterns that highlight problems in a report; each group is named by its colour."""
     odd = [entry for entry in entries if entry["jumps"] or entry["backward"]]
     names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in odd)
     rows = (rf"(?m)^(?P<red>{parent} +{child} .*)$" for parent, child in names)
@@ -57,7 +57,7 @@ def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
 
 
 def _folded_edge(row: dict[str, str], titles: Sequence[str]) -> list[str]:
-    """Return the lines of one edge where a table would be too wide: its frames, then what is said of it."""
+    """Return one edge as lines, for when the table is too wide: its frames, then its values."""
     parent, child = (short(row[key], WIDTH // 2 - 4) for key in ("parent", "child"))
     said = [f"{title} {short(cell, WIDTH - 20)}" for title, (key, cell) in zip(titles, row.items(), strict=True)
             if cell and key not in ("parent", "child")]  # fmt: skip
@@ -65,7 +65,7 @@ def _folded_edge(row: dict[str, str], titles: Sequence[str]) -> list[str]:
 
 
 def _motion(entry: dict[str, Any]) -> str:
-    """Return the sentence about the way of an edge that moves: how far, how long, how fast, and its pauses."""
+    """Return the sentence on a moving edge: length, duration, speed, gaps."""
     speed = f"{entry['speed_mean']:.3f} m/s (at most {entry['speed_max']:.3f})"
     gaps = f"{entry['gaps']} gap{'s' * (entry['gaps'] != 1)}"
     begin = f"{short(entry['parent'], WIDTH // 2 - 4)} <- {short(entry['child'], WIDTH // 2 - 4)}:"
@@ -73,7 +73,7 @@ def _motion(entry: dict[str, Any]) -> str:
 
 
 def _cell(key: str, value: Any) -> str:
-    """Write a value; its unit is the end of its key."""
+    """Write a value; its key ends with its unit."""
     if value is None:
         return "static" if key == "rate_hz" else ""
     if key.endswith("_ns"):
@@ -82,7 +82,7 @@ def _cell(key: str, value: Any) -> str:
 
 
 def _chain(entry: dict[str, Any]) -> str:
-    """Return the sentence about the interval in which the whole chain has data."""
+    """Return the sentence on the interval in which the whole chain has data."""
     first, last = entry["first_ns"], entry["last_ns"]
     if first is None:
         sentence = "stands still: any time will do"
@@ -99,7 +99,7 @@ LABEL = WIDTH - 4 * NUMBER
 
 
 def write_diff(found: Iterable[Difference]) -> str:
-    """Return differences in parts with a heading each."""
+    """Return the differences grouped under headings."""
     kinds: dict[str, list[Difference]] = {}
     for each in found:
         kinds.setdefault(each.kind, []).append(each)
@@ -115,7 +115,7 @@ _HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "othe
 
 
 def _said(each: Difference) -> str:
-    """Return the lines about one frame, in words."""
+    """Return the description of one frame's difference."""
     text = short(each.frame, WIDTH - 4)
     if each.kind in ("only-in-a", "only-in-b"):
         parent = each.parent_a if each.kind == "only-in-a" else each.parent_b
@@ -133,7 +133,7 @@ def _said(each: Difference) -> str:
 
 
 def _folded(text: str) -> Iterator[str]:
-    """Yield the words of a text in lines, by the cells they take; all but the first line further in."""
+    """Wrap a text by display width, with a hanging indent."""
     line = " "
     for word in (short(word, WIDTH - 4) for word in text.split(" ")):
         if cells(line) + cells(word) >= WIDTH and line.strip():
@@ -144,7 +144,7 @@ def _folded(text: str) -> Iterator[str]:
 
 
 def _table(start: str | None, found: Sequence[Difference]) -> str:
-    """Return the table of the frames that moved, as far as they are seen from one frame."""
+    """Return the table of moved frames, seen from one frame."""
     both = 2 * NUMBER
     seen = short(f"seen from {start}" if start is not None else "seen from elsewhere", both - 2)
     head = f"{'moved':<{LABEL}}{'in its parent':>{both}}{' ' * (both - cells(seen))}{seen}\n"
@@ -153,7 +153,7 @@ def _table(start: str | None, found: Sequence[Difference]) -> str:
 
 
 def _row(each: Difference) -> str:
-    """Return the line of one frame; two if its name is long."""
+    """Return the row of one frame; two lines if its name is long."""
     label = f"  {each.frame} in {each.parent_a}" if each.parent_a is not None else f"  {each.frame}"
     numbers = "".join(f"{text:>{NUMBER}}" for text in (*_numbers(each.own), *_numbers(each.seen)))
     label = short(label, WIDTH)
@@ -162,7 +162,7 @@ def _row(each: Difference) -> str:
 
 
 def _numbers(apart: Apart | None) -> tuple[str, str]:
-    """Write how far two poses are apart in mm and degrees; what is rounding as 0, what decimals do not show as 1e-5."""
+    """Write the distance of two poses in mm and degrees; rounding errors are 0."""
     if apart is None:
         return "-", "-"
     metres = 0.0 if apart.metres <= apart.rounding else apart.millimetres
@@ -175,7 +175,7 @@ def _numbers(apart: Apart | None) -> tuple[str, str]:
 
 
 def short(name: str, width: int) -> str:
-    """Return a name on one line within so many columns; of a longer one both ends."""
+    """Shorten a name to some columns, keeping both ends."""
     name = printable(name)
     if cells(name) <= width:
         return name
@@ -187,7 +187,7 @@ LIST_LABEL = 15  # columns, the indent included
 
 
 def form_entry(name: str) -> dict[str, Any]:
-    """Return what the table says of a form, as plain values; None where it says nothing."""
+    """Return the table row of a format as plain values."""
     row = FORMATS[name]
     return {
         "name": name, "summary": row.summary, "suffixes": row.suffixes, "reads": row.reads, "writes": row.writes,
@@ -196,14 +196,14 @@ def form_entry(name: str) -> dict[str, Any]:
 
 
 def option_of(ask: str) -> str:
-    """Return how an option that answers a question is written: `--dh standard|modified`."""
+    """Return the spelling of an option: `--dh standard|modified`."""
     choices = "|".join(CHOICES.get(ask, ()))
     name = "from" if ask == "order" else ask.replace("_", "-")
     return f"--{name}{' ' * bool(choices)}{choices}"
 
 
 def write_forms(entries: Iterable[dict[str, Any]]) -> str:
-    """Return a list of forms: those that are read first, then those only written."""
+    """Return the list of formats, those that are only written last."""
     parts: dict[str, list[str]] = {}
     for entry in entries:
         kind = _READ if entry["reads"] else _WRITTEN
@@ -219,7 +219,7 @@ _READ, _WRITTEN = "read", "only written"
 
 
 def write_form(entry: dict[str, Any]) -> str:
-    """Return all there is to say of one form, with an example if its module shows one."""
+    """Describe one format, with the example of its module if there is one."""
     name = entry["name"]
     facts = {
         "suffixes": " ".join(entry["suffixes"]), "read as": ", ".join(entry["reads"]),
@@ -232,7 +232,7 @@ def write_form(entry: dict[str, Any]) -> str:
 
 
 def example_of(name: str) -> list[str]:
-    """Return the lines that stand indented in the docstring of what reads a form, or else of what writes it."""
+    """Return the indented lines in the docstring of the format's reader, or else its writer."""
     for module in filter(None, (FORMATS[name].reader, FORMATS[name].writer)):
         text = import_module(module).__doc__ or ""
         if lines := [line[4:] for line in text.split("\n") if line.startswith("    ")]:
@@ -241,7 +241,7 @@ def example_of(name: str) -> list[str]:
 
 
 def _labelled(label: str, texts: Iterable[str | None]) -> str:
-    """Return lines with a label before the first, folded."""
+    """Return wrapped lines with a label before the first."""
     lines = [line for text in texts if text for line in wrap(text, WIDTH - LIST_LABEL, break_on_hyphens=False)]
     first = f"  {label:{LIST_LABEL - 2}}"
     apart = "\n" + " " * LIST_LABEL
@@ -249,7 +249,7 @@ def _labelled(label: str, texts: Iterable[str | None]) -> str:
 
 
 def _signs(name: str) -> Iterator[str]:
-    """Name the signs of a form; of a pattern only the kind, if it is more than words."""
+    """Yield what a format is recognised by; of a regular expression only the kind."""
     for kind, what in FORMATS[name].magic:
         words = what if isinstance(what, str) and re.fullmatch(r"[\w./*|-]+", what) else ""
         yield f"{kind} {words}".rstrip()

@@ -1,7 +1,4 @@
-"""Runs of turtles as pictures: turtlesim's window with distance and commands over time.
-
-Knows what a plot needs of a run, and no file.
-"""
+"""Plots of turtle runs: turtlesim's window, and charts of distance and commands."""
 
 from __future__ import annotations
 
@@ -35,7 +32,7 @@ FLAT = 1e-6  # metres; small, because the points left out before are not looked 
 
 
 class Stroke(NamedTuple):
-    """A line drawn with one pen: points in metres, y up."""
+    """A line drawn with one pen; points in metres, y up."""
 
     turtle: str
     pen: Pen
@@ -43,7 +40,7 @@ class Stroke(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """A follower over time: seconds, metres, m/s, rad/s, one of each a control step."""
+    """The curves of a follower, one value per control step: seconds, metres, m/s, rad/s."""
 
     times: list[float]
     distance: list[float]
@@ -57,10 +54,10 @@ def colours_of(turtles: Iterable[str]) -> dict[str, str]:
 
 
 class Drawing:
-    """Remember of the steps what a plot shows; turtles that do not move add nothing."""
+    """Collect what a plot shows of a run; turtles that do not move take no memory."""
 
     def __init__(self, scene: Scene) -> None:
-        """Create the drawing of a run that has not begun."""
+        """Create an empty drawing."""
         self.strokes: list[Stroke] = []
         self.turtles: dict[str, TurtleState] = {}
         self.curves: dict[str, Curves] = {name: Curves([], [], [], []) for name in scene.followers}
@@ -88,7 +85,7 @@ class Drawing:
         return colours_of({*self.turtles, *self.curves})
 
     def _draw(self, name: str, step: SimulationStep) -> None:
-        """Go on with a turtle's stroke, or begin one with its new pen."""
+        """Extend a turtle's stroke, or begin one with a new pen."""
         x, y, _ = step.states[name]
         pen = step.pens[name]
         stroke = self._current.get(name)
@@ -101,7 +98,7 @@ class Drawing:
 
 
 def _extend(points: list[Point], place: Point) -> None:
-    """Go on to a place; a point on the straight way there is left out."""
+    """Extend a line; a point on a straight segment is dropped."""
     if len(points) > 1 and _is_straight(points[-2], points[-1], place):
         points[-1] = place
     elif not points or points[-1] != place:
@@ -109,7 +106,7 @@ def _extend(points: list[Point], place: Point) -> None:
 
 
 def _is_straight(begin: Point, middle: Point, end: Point) -> bool:
-    """Return True if the middle lies between both ends, and so near to the line through them that nobody sees it."""
+    """Return True if the middle lies between both ends, invisibly near to the line through them."""
     ahead_x, ahead_y = middle[0] - begin[0], middle[1] - begin[1]
     on_x, on_y = end[0] - middle[0], end[1] - middle[1]
     if ahead_x * on_x + ahead_y * on_y <= 0.0:
@@ -136,7 +133,7 @@ FEET = [(x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)]
 
 
 def run_picture(drawing: Drawing) -> Picture:
-    """Draw the run; the diagrams are left out where nobody follows."""
+    """Draw the run; without followers there are no charts."""
     followed = {name: curve for name, curve in drawing.curves.items() if curve.times}
     shapes = list(_window(drawing))
     colours = drawing.colours()
@@ -153,7 +150,7 @@ def run_picture(drawing: Drawing) -> Picture:
 
 
 def last_commands(drawing: Drawing) -> str:
-    """Return an HTML table of what each follower saw and did last."""
+    """Return an HTML table of each follower's last values."""
     rows = "".join(
         f"<tr><th>{escape(printable(name))}</th><td>{curve.times[-1]:g}</td><td>{curve.distance[-1]:.4f}</td>"
         f"<td>{curve.linear[-1]:.4f}</td><td>{curve.angular[-1]:.4f}</td></tr>\n"
@@ -165,12 +162,12 @@ def last_commands(drawing: Drawing) -> str:
 
 
 def _place(x: float, y: float) -> tuple[float, float]:
-    """Return the pixels of a place in the world."""
+    """Return the pixels of a position in the world."""
     return MARGIN + x * METRE, MARGIN + (SIZE - y) * METRE
 
 
 def _window(drawing: Drawing) -> Iterator[Shape]:
-    """Draw the world: background, trails, turtles where they ended."""
+    """Draw the world: background, trails, final turtles."""
     yield PictureBox(MARGIN, MARGIN, WINDOW, WINDOW, BACKGROUND)
     for stroke in drawing.strokes:
         red, green, blue, width, _ = stroke.pen

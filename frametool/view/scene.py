@@ -1,8 +1,7 @@
-"""What is drawn of a tree: which frames, seen in which one, at which time; poses and trails in its metres.
+"""The scene: which frames of a tree are drawn, in which fixed frame, at which time; poses and trails in metres.
 
-Knows no format: the page, SVG, PNG, GLB and the terminal ask here.  Also a picture's geometry: from metres in space to
-pixels, seen from a direction, without perspective, and places for names.  No name stands over another: a grid of cells
-holds what is taken, so that only near ones are compared.
+Shared by the page, SVG, PNG, GLB and the terminal.  Also the orthographic projection to pixels, and the placement of
+names without overlaps; a grid of cells holds the taken boxes, so that only near ones are compared.
 """
 
 from __future__ import annotations
@@ -47,14 +46,14 @@ MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
 
 
 class Trail(NamedTuple):
-    """Where a frame went: stretches of points, in metres, cut where its parent changes or data are missing."""
+    """The path of a frame in metres: stretches of points, cut where its parent changes or data are missing."""
 
     frame: str
     stretches: list[list[Point]]
 
 
 def _expression(text: str) -> re.Pattern[str]:
-    """Compile a regular expression; what Python would warn of is nobody's business here."""
+    """Compile a regular expression without Python's warnings."""
     import warnings
 
     try:
@@ -65,14 +64,14 @@ def _expression(text: str) -> re.Pattern[str]:
 
 
 class Ground(NamedTuple):
-    """What is drawn in the place of the Earth's frame: level axes, x east and y north, at a frame that stands there."""
+    """The replacement of the Earth's frame: level axes, x east and y north, at a frame on the ground."""
 
     name: str
     pose: Rigid
 
 
 def _ground(tree: Frames) -> Ground | None:
-    """Return the ground below the first frame on the Earth, one that stands still if there is any."""
+    """Return the ground at the first frame on the Earth, a static one if there is any."""
     earth = tree.resolve_name(EARTH)
     there = sorted((track for track in tree.tracks() if track.parent == earth), key=lambda track: not track.is_static)
     if not there or earth not in tree.roots:
@@ -85,7 +84,7 @@ def _ground(tree: Frames) -> Ground | None:
 
 
 def _on(tree: Frames, ground: Ground) -> Frames:
-    """Return the same frames with the ground in the place of the Earth's frame."""
+    """Return the tree with the ground instead of the Earth's frame."""
     earth, found = tree.resolve_name(EARTH), TransformBuffer(name=tree.name)
     for frame in tree.frames:
         found.add_root(ground.name if frame == earth else frame)
@@ -98,12 +97,12 @@ def _on(tree: Frames, ground: Ground) -> Frames:
 
 
 class FrameScene:
-    """The frames of a tree as they are drawn.
+    """The frames of a tree to draw.
 
     tree: what they come from
     names: every frame, parents before children by the first parents
     tracks: of the frames that move, by name
-    fixed: the frame that all is seen in
+    fixed: the frame that everything is drawn in
     at_ns: the time; None where nothing moves
     target, source: the two frames whose transform is asked for, if any
     chosen: the frames that are drawn; None for all
@@ -117,9 +116,9 @@ class FrameScene:
     ) -> None:  # fmt: skip
         """Choose what is drawn.
 
-        fixed: left out, the target, or `below`, or the root of most frames; on the Earth the ground.
-        ground: that of another scene; left out, below the first frame that stands on the Earth.
-        at_ns: left out, the first time that all moving edges have.
+        fixed: by default the target, or `below`, or the root of most frames; on the Earth the ground.
+        ground: that of another scene; by default at the first frame on the Earth.
+        at_ns: by default the first time that all moving edges have.
         below: only this frame and those that hang from it.  only: a regular expression that names must match.
         Raises UnknownFrame; ValueInvalid for an empty tree, a bad expression, or one that matches nothing.
         """
@@ -141,7 +140,7 @@ class FrameScene:
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """Return the first and the last stamp of all."""
+        """Return the first and the last stamp."""
         return (
             min((track.first_ns for track in self.tracks.values()), default=0),
             max((track.last_ns for track in self.tracks.values()), default=0),
@@ -188,12 +187,12 @@ class FrameScene:
 
     @cached_property
     def trails(self) -> list[Trail]:
-        """Return where each chosen frame that moves went in `fixed`."""
+        """Return the trail in `fixed` of each chosen frame that moves."""
         chosen = ((name, self._stretches(name)) for name in self.tracks if self._is_chosen(name))
         return [Trail(name, stretches) for name, stretches in chosen if stretches]
 
     def _stretches(self, name: str) -> list[list[Point]]:
-        """Look a frame up at the stamps of all that moves on its way, and between them."""
+        """Look a frame up at, and between, the stamps of all moving frames on its path."""
         import numpy as np
 
         movers = self._movers_above(name) | self._movers_above(self.fixed)
@@ -213,7 +212,7 @@ class FrameScene:
         return [[(x, y, z) for x, y, z in piece.tolist()] for piece in pieces]
 
     def _movers_above(self, name: str) -> set[str]:
-        """Return the moving frames on any way from a frame to a root."""
+        """Return the moving frames on any path from a frame to a root."""
         seen, waiting = {name}, [name]
         for each in waiting:  # it grows as it is walked
             if track := self.tree.track(each):
@@ -236,7 +235,7 @@ def _first_parent(tree: Frames, name: str) -> str | None:
 
 
 def _in_order(tree: Frames, parents: dict[str, str | None]) -> tuple[list[str], dict[str, int]]:
-    """Return the frames as a walk through the tree meets them, and how many hang from each root."""
+    """Return the frames in depth-first order, and the number below each root."""
     children: dict[str | None, list[str]] = {}
     for name, parent in parents.items():
         children.setdefault(parent if parent in parents else None, []).append(name)
@@ -309,21 +308,21 @@ class Size(NamedTuple):
 
 
 class Projection:
-    """Where the frames of a scene are on a picture, and how long their axes are drawn.
+    """The projection of a scene: pixels of its frames, and the length of their axes.
 
     poses: of the drawn frames in `fixed`, by name
-    trails: where the moving ones went
+    trails: of the moving ones
     links: (parent, child) where both are drawn
-    origins: where they are on the picture
-    axis: metres of a drawn axis
-    scale: pixels of a metre
+    origins: their pixels
+    axis: length of a drawn axis in metres
+    scale: pixels per metre
     view: the directions right, up and toward the eye
     """
 
     def __init__(
         self, scene: FrameScene, size: Size, eye: tuple[float, float] = SLANTED, *, most: bool = False
     ) -> None:
-        """Fit all that is drawn into the picture; most: only what lies together, where a few frames are far away."""
+        """Fit the scene into the picture; most: leave out a few frames that are far from the others."""
         self.scene, self.size = scene, size
         sa, ca, se, ce = (function(angle) for angle in eye for function in (math.sin, math.cos))
         self.view = (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
@@ -357,7 +356,7 @@ class Projection:
                 yield from stretch
 
     def _together(self) -> list[Point]:
-        """Return the places of the frames that are not far from most, or all points where none is."""
+        """Return the positions of the frames in the densest cluster; all points if no frame is far away."""
         places = [pose[:3] for pose in self.poses.values()]
         middle = [sorted(column)[len(places) // 2] for column in zip(*places, strict=True)]
         away = sorted(math.dist(place, middle) for place in places)
@@ -372,23 +371,23 @@ class Projection:
                 if not (0.0 <= x < self.size.width and 0.0 <= y < self.size.height)]  # fmt: skip
 
     def turned(self, point: Sequence[float]) -> Point:
-        """Return metres to the right, up, and toward the eye."""
+        """Return a point's metres to the right, up, and toward the eye."""
         (a, b, c), (d, e, f), (g, h, i) = self.view
         x, y, z = point
         return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
     def at(self, point: Sequence[float]) -> Flat:
-        """Return where a point in metres is on the picture."""
+        """Return the pixels of a point in metres."""
         right, up, toward = self.turned(point)
         across = self.size.width / 2.0 + (right - self.middle[0]) * self.scale
         return Flat(across, self.size.height / 2.0 - (up - self.middle[1]) * self.scale, toward)
 
     def tips(self, name: str, part: float = 1.0) -> list[Flat]:
-        """Return where the axes x, y, z of a frame end, or a part of the way there."""
+        """Return the tips of the axes x, y, z of a frame, or points at a part of their length."""
         return [self.at(tip) for tip in axis_tips(self.poses[name], part * self.axis)]
 
     def nearest_last(self) -> list[str]:
-        """Return the frames from the farthest to the nearest to the eye."""
+        """Return the frames from the farthest to the nearest."""
         return sorted(self.poses, key=lambda name: self.origins[name].depth)
 
     def axis_order(self, name: str) -> list[int]:
@@ -397,7 +396,7 @@ class Projection:
         return sorted(range(3), key=lambda axis: tips[axis].depth)
 
     def groups(self, near: float) -> list[tuple[Flat, list[str]]]:
-        """Gather the frames that lie within some pixels of one another, nearest to the eye first."""
+        """Group the frames within some pixels of each other, nearest first."""
         spots: dict[tuple[int, int], tuple[Flat, list[str]]] = {}
         for name in reversed(self.nearest_last()):
             place = self.origins[name]
@@ -405,7 +404,7 @@ class Projection:
         return list(spots.values())
 
     def crowded(self) -> int:
-        """Return how many frames lie in a small spot of the picture, where that is most of them; else 0."""
+        """Return the number of frames in one small spot if that is most of them, else 0."""
         places = self.origins.values()
         middle = [sorted(column)[len(places) // 2] for column in zip(*(place[:2] for place in places), strict=True)]
         reach = SPOT * min(self.size[:2])
@@ -413,7 +412,7 @@ class Projection:
         return near if len(places) >= 6 and near > 0.6 * len(places) else 0
 
     def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
-        """Return the spacing of a grid on z = 0, in metres, and its lines with whether they pass the origin."""
+        """Return the grid on z = 0: its spacing in metres, and its lines with whether they pass the origin."""
         wide = max(self.high[0] - self.low[0], self.high[1] - self.low[1], 4.0 * self.axis)
         step = nice(wide / 8.0)
         first = [math.floor(low / step - 0.6) for low in self.low]
@@ -440,7 +439,7 @@ def nice(length: float) -> float:
 
 
 def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]]:
-    """Return the least and the greatest coordinates of some points; of none, 0."""
+    """Return the bounding box of some points; zeros if there are none."""
     columns = list(zip(*points, strict=True)) or [(0.0,)] * 3
     return [min(column) for column in columns], [max(column) for column in columns]
 
@@ -455,7 +454,7 @@ WIDE, THIN = "mwMW_@", "il.·tfjrI "
 
 
 class Label(NamedTuple):
-    """A name's place: its words, the point it belongs to, its rectangle, and how far it stands off."""
+    """A placed name: its text, the point it labels, its box, and its distance from the point."""
 
     words: str
     point: Flat
@@ -464,9 +463,9 @@ class Label(NamedTuple):
 
 
 class TakenBoxes:
-    """Rectangles that nothing may be put over.
+    """Boxes that must not be covered.
 
-    Of those that are the same to a pixel one is stored: a million frames on one spot cost their names no more than one.
+    Boxes that are equal to a pixel are stored once, so that a million frames on one spot cost no more than one.
     """
 
     def __init__(self) -> None:
@@ -475,7 +474,7 @@ class TakenBoxes:
         self._known: set[tuple[int, ...]] = set()
 
     def add(self, box: Box) -> None:
-        """Take a rectangle."""
+        """Add a box."""
         rounded = tuple(map(round, box))
         if rounded in self._known:
             return
@@ -484,7 +483,7 @@ class TakenBoxes:
             self._cells.setdefault(cell, []).append(box)
 
     def meets(self, box: Box) -> bool:
-        """Return True if a rectangle lies over one that is taken."""
+        """Return True if a box overlaps one of them."""
         left, top, right, bottom = box
         return any(
             left < other[2] and right > other[0] and top < other[3] and bottom > other[1]
@@ -499,10 +498,10 @@ def _cells(box: Box) -> Iterator[tuple[int, int]]:
 
 
 def place_labels(flat: Projection, *, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
-    """Place a name next to every group of frames that lie on one point, the nearest to the eye first.
+    """Place a name next to each group of frames on one point, nearest first.
 
-    blocked: what else stands on the picture.
-    Returns the places, and how many names found none.
+    blocked: boxes to keep free.
+    Returns the placed names and the number without room.
     """
     taken, axes = TakenBoxes(), TakenBoxes()
     for box in blocked:
@@ -526,7 +525,7 @@ def place_labels(flat: Projection, *, blocked: Iterable[Box] = ()) -> tuple[list
 
 
 def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: Callable[[Spot], bool]) -> Spot | None:
-    """Return the first spot over nothing at all, or else the first that is only over axes."""
+    """Return the first free spot, or else the first that covers axes only."""
     second = None
     for spot in spots:
         if is_taken(spot):
@@ -538,7 +537,7 @@ def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: 
 
 
 def _spots(flat: Projection, words: str, point: Flat) -> Iterator[Label]:
-    """Yield where a name might stand inside the picture, the best first."""
+    """Yield the candidate positions of a name inside the picture, best first."""
     wide = text_width(words, FONT)
     for away in DISTANCES:
         for dx, dy in SIDES:
@@ -550,12 +549,12 @@ def _spots(flat: Projection, words: str, point: Flat) -> Iterator[Label]:
 
 
 def text_width(words: str, size: float) -> float:
-    """Return about how many pixels a text is wide, a little too many rather than too few."""
+    """Estimate the width of a text in pixels, rather too wide than too narrow."""
     return size * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
 
 
 def words_of(names: list[str], most: int = 2) -> str:
-    """Return the words for frames on one point: some of their names, and how many more there are."""
+    """Return the label of frames on one point: some of their names, and the number of others."""
     shown_names = map(printable, names[:most])
     words = " · ".join(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in shown_names)
     return words + (f" +{len(names) - most}" if len(names) > most else "")

@@ -1,7 +1,6 @@
-"""Pictures of dots in a terminal: braille characters, eight dots a cell, one colour a cell. Memory does not grow.
+"""Pictures in a terminal: braille characters with eight dots and one colour per cell.
 
-Frames with their axes, names next to them and a scale bar, as plain text for a pipe; the turtles while they walk, with
-trails of dots and an arrow for each, at most 20 pictures a second.
+Frames with axes, names and a scale bar, also as plain text; turtles while they move, at most 20 pictures a second.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then 
 
 
 class Canvas:
-    """Some lines of cells; a terminal's cell is about twice as high as wide, so that dots are about square."""
+    """A grid of cells; a terminal's cell is about twice as high as wide, so that dots are about square."""
 
     def __init__(self, lines: int, columns: int | None = None) -> None:
         """Create an empty one, a square where the columns are None."""
@@ -48,15 +47,15 @@ class Canvas:
         self._cells: dict[tuple[int, int], tuple[int, str, int]] = {}
 
     def clear(self) -> None:
-        """Wipe all dots."""
+        """Remove all dots."""
         self._cells.clear()
 
     def dot(self, x: float, y: float, colour: str) -> None:
-        """Set the dot of a place, 0 to 1 with y up; the cell takes its colour."""
+        """Set the dot at a position, 0 to 1 with y up, and the colour of its cell."""
         self.mark(*self._dots(x, y), colour)
 
     def mark(self, across: int, down: int, colour: str, rank: int = 0) -> None:
-        """Set a dot by its number from the left and the top; of several in a cell the highest rank colours it."""
+        """Set a dot by column and row; the highest rank in a cell gives its colour."""
         if not (0 <= across < 2 * self.columns and 0 <= down < 4 * self.lines):
             return
         cell = down // 4, across // 2
@@ -65,7 +64,7 @@ class Canvas:
         self._cells[cell] = bits | DOTS[down % 4][across % 2], *shown
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Return line and column of a place."""
+        """Return line and column of a position."""
         across, down = self._dots(x, y)
         return down // 4, across // 2
 
@@ -80,7 +79,7 @@ class Canvas:
             yield (chr(BRAILLE + bits) if bits else " "), colour
 
     def runs(self, line: int, over: Mapping[tuple[int, int], tuple[str, str]]) -> list[tuple[str, str]]:
-        """Return a line as pieces of one colour; `over` holds what stands in cells instead of dots."""
+        """Return a line as runs of one colour; over: letters that replace cells."""
         cells = (over.get((line, column), cell) for column, cell in enumerate(self.row(line)))
         return [("".join(map(itemgetter(0), run)), colour) for colour, run in groupby(cells, key=itemgetter(1))]
 
@@ -99,7 +98,7 @@ MOST_OUTSIDE = 12  # frames that are pointed to
 
 
 class TerminalPicture:
-    """The picture of a scene in so many columns and lines, the last of which says how long a metre is."""
+    """The picture of a scene in some columns and lines; the last line is the scale."""
 
     def __init__(self, scene: FrameScene, columns: int, lines: int, eye: tuple[float, float] = SLANTED) -> None:
         """Draw it."""
@@ -115,7 +114,7 @@ class TerminalPicture:
         self._scale = self._scale_line(eye, hidden)
 
     def lines(self) -> Iterator[list[Run]]:
-        """Yield the lines, each as pieces of one style."""
+        """Yield the lines as runs of one style."""
         for line in range(self._canvas.lines):
             yield self._canvas.runs(line, self._names)
         yield self._scale
@@ -140,7 +139,7 @@ class TerminalPicture:
                 self._line(flat.origins[name], tips[axis], AXES[axis], AXIS)
 
     def _line(self, begin: Flat, end: Flat, colour: str, rank: int, gap: int = 1) -> None:
-        """Set every dot, or every second, third, .. between two places; of what leaves the picture only its begin."""
+        """Set every dot, or every second, third, .. of a line; a line that leaves the picture is cut."""
         if not self._is_inside(begin):
             begin, end = end, begin
         if not self._is_inside(begin):
@@ -158,7 +157,7 @@ class TerminalPicture:
         return 0.0 <= place.x < 2.0 * self._canvas.columns and 0.0 <= place.y < 4.0 * self._canvas.lines
 
     def _place(self, place: Flat, names: list[str]) -> bool:
-        """Write a name where it covers no other and, if that can be, no axis; False where there is no room."""
+        """Write a name where it covers no other and, if possible, no axis; return False if there is no room."""
         for most in range(len(names), 0, -1):
             letters = list(_cells(words_of(names, most)))
             around = _around(math.floor(place.y) // 4, math.floor(place.x) // 2, len(letters))
@@ -170,7 +169,7 @@ class TerminalPicture:
         return False
 
     def _point_to(self, name: str) -> bool:
-        """Point at the edge to a frame beyond it, with its distance; False where there is no room."""
+        """Point at the edge to a frame beyond it, with its distance; return False if there is no room."""
         x, y, _ = self._flat.origins[name]
         across, down = x - self._canvas.columns, y - 2.0 * self._canvas.lines
         arrow = ARROWS[round(math.atan2(-down, across) / (math.pi / 4.0)) % 8]
@@ -192,13 +191,13 @@ class TerminalPicture:
         return any(self._canvas.rank(*cell) >= AXIS for cell in cells)
 
     def _is_taken(self, cells: list[Spot]) -> bool:
-        """Tell whether a name does not fit into cells, of which the first and the last stay free, or covers another."""
+        """Return True if cells are beyond the picture or hold another name; the first and the last are margins."""
         (line, before), (_, behind) = cells[0], cells[-1]
         inside = 0 <= line < self._canvas.lines and before >= -1 and behind <= self._canvas.columns
         return not inside or any(cell in self._names for cell in cells)
 
     def _scale_line(self, eye: tuple[float, float], hidden: int) -> list[Run]:
-        """Say how long a metre is, from where all is seen, and how many names found no room."""
+        """Return the scale, the direction of view, and the number of names without room."""
         metres = nice(24.0 / self._flat.scale)
         bar = "─" * max(round(metres * self._flat.scale / 2.0) - 2, 0)
         azimuth, elevation = (round(math.degrees(angle)) + 0 for angle in eye)
@@ -227,7 +226,7 @@ def _rich_text(picture: TerminalPicture) -> Text:
 
 
 def _cells(words: str) -> Iterator[str]:
-    """Yield what each cell of a text holds: a wide letter takes two, the second of them empty."""
+    """Yield the content of each cell of a text; a wide letter takes two, the second one empty."""
     for letter in words:
         yield letter
         if east_asian_width(letter) in "WF":
@@ -235,7 +234,7 @@ def _cells(words: str) -> Iterator[str]:
 
 
 def _around(line: int, column: int, wide: int) -> Iterator[Spot]:
-    """Yield where a name of so many cells might begin, the best first."""
+    """Yield the candidate positions of a name of some cells, best first."""
     yield line, column + 2
     yield line, column - 1 - wide
     for away in (1, -1):
@@ -254,10 +253,10 @@ TALK = 3  # lines of messages below the turtles
 
 
 class Screen:
-    """Draw the steps of a run as they come; a context, so that the terminal is as before afterwards."""
+    """Draw the steps of a run as they come; a context manager that restores the terminal."""
 
     def __init__(self, scene: Scene, *, to_stderr: bool = False, console: Console | None = None) -> None:
-        """Choose where to draw; the picture takes what the terminal's height and width allow."""
+        """Choose where to draw; the picture fits the terminal."""
         from rich.live import Live
 
         from frametool.sim.simulate import SimulationStep
@@ -279,12 +278,12 @@ class Screen:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Draw the last frame and give the terminal back."""
+        """Draw the last frame and restore the terminal."""
         self._live.update(self._picture(), refresh=True)
         self._live.stop()
 
     def watch(self, step: SimulationStep) -> None:
-        """Add a step to the picture, and show it if the last frame is old enough."""
+        """Add a step to the picture, and show it if enough time has passed."""
         self._talk = [*self._talk, *step.log, *map(str, step.walls)][-TALK:]
         self._last.update((command.turtle, command) for command in step.commands)
         if not step.is_tick:
@@ -330,6 +329,6 @@ class Screen:
 
 
 def _sentence(command: IssuedCommand) -> str:
-    """Describe in a line what a follower does."""
+    """Describe a follower's command in one line."""
     ahead, turning, _ = command.twist
     return f"{printable(command.turtle)}: {command.distance or 0.0:.2f} m, linear {ahead:.2f}, angular {turning:+.2f}"

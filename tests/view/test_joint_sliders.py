@@ -159,7 +159,7 @@ def test_solids_are_read_with_their_sizes_and_poses(tmp_path: Path, form: str, t
 
 def test_a_mesh_is_a_box_as_far_as_the_frames_on_it_and_that_is_said(run: Callable[..., Any], tmp_path: Path) -> None:
     done = run("view", "bot.urdf", "-o", "bot.html", files={"bot.urdf": SHAPES.replace("collision>", "other>")})
-    assert "note: meshes are not read, boxes stand for 2 of them" in done.err
+    assert "note: 2 meshes drawn as boxes; mesh files are not read" in done.err
     head = json.loads(re.search('id="head-data">(.*?)</script>', (tmp_path / "bot.html").read_text())[1])  # type: ignore[index]
     mast = head["solids"][1]
     assert (mast["kind"], mast["size"][2], mast["pose"][:3]) == ("box", 0.5, [0, 0, 0.25])
@@ -169,7 +169,7 @@ def test_a_mesh_is_a_box_as_far_as_the_frames_on_it_and_that_is_said(run: Callab
 def test_a_solid_that_cannot_be_read_keeps_no_page_back(run: Callable[..., Any]) -> None:
     done = run("view", "bot.urdf", "-o", "bot.html", files={"bot.urdf": SHAPES.replace("0.5 0.35 0.2", "0.5 0.35")})
     assert done.status == 0
-    assert "note: no solids are drawn: bot.urdf:1:89: size: expected 3 numbers, found 2 in '0.5 0.35'" in done.err
+    assert "note: solids not drawn: bot.urdf:1:89: size: expected 3 numbers, found 2 in '0.5 0.35'" in done.err
 
 
 PAINTED = """() => {

@@ -167,10 +167,10 @@ def _solids(tree: str) -> list[Solid]:
         try:
             solids = read_solids(file, file.form)
         except FormatError as error:
-            say(f"note: no solids are drawn: {str(error).partition(chr(10))[0]}")
+            say(f"note: solids not drawn: {str(error).partition(chr(10))[0]}")
             return []
     if meshes := sum(each.kind == "mesh" for each in solids):
-        say(f"note: meshes are not read, boxes stand for {meshes} of them")
+        say(f"note: {meshes} mesh{'es' * (meshes > 1)} drawn as boxes; mesh files are not read")
     return solids
 
 
