@@ -180,8 +180,7 @@ class SeveralClouds:
                 request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
                 planned.append((columns, request, path))
             into = self.output.told or form
-            if not holds_arrays(into):
-                raise click.UsageError(f"several clouds become one cloud: -o all.ply, or -f; forms: {_WRITTEN}")
+            refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; forms: {_WRITTEN}")
             refuse(self.output.path is self.output.told is None, "several clouds become one file: give -o all.ply")
             merged = MergedClouds(planned, self.output.style.in_form(into))
             status = 0

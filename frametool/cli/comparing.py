@@ -59,23 +59,11 @@ def _read_up(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _read_deltas(text: str) -> tuple[Delta, ...]:
+def read_delta(text: str, *units: str) -> Delta:
+    """Read a step in one of some units, all without any; in frames a number may stand alone."""
     from frametool.fit.comparison import parse_delta
 
-    return tuple(map(parse_delta, text.split(",")))
-
-
-def parse_every(text: str) -> Delta:
-    """Read a step of the path or of its turning."""
-    from frametool.fit.comparison import parse_delta
-
-    return parse_delta(text, ("m", "deg"))
-
-
-def _read_first(text: str) -> Delta:
-    from frametool.fit.comparison import parse_delta
-
-    return parse_delta(f"{text}frames" if text.isdigit() else text, ("frames", "s", "m"))
+    return parse_delta(f"{text}frames" if text.isdigit() and "frames" in units else text, *[units] * bool(units))
 
 
 ALIGN = ("se3", "sim3", "yaw", "origin", "origin+scale", "none")
@@ -89,12 +77,13 @@ pairing_options = together(
     option("--offset TIME|auto", "what EST's clock is behind; auto:LIMIT finds it", _read_offset),
     option("--mount POSE|auto", "REF's body in EST's; also FILE:BODY:POINT"),
     option("--align FIT", ", ".join(ALIGN).replace("se3", "se3 (default)", 1), ALIGN),
-    option("--align-first N|10s|5m", "fit by the first pairs alone", _read_first),
+    option("--align-first N|10s|5m", "fit by the first pairs alone", lambda text: read_delta(text, "frames", "s", "m")),
     option("--tie-first", "of se3, sim3, yaw: first position on first"),
     option("--up AXIS", "of REF's world: z, -y ..  [default: z]", _read_up),
 )  # fmt: skip
 error_options = together(
-    option("--delta 1m,5deg,..", "of rpe: m, s, deg, frames  [default: 1m,10m,100m]", _read_deltas, name="deltas"),
+    option("--delta 1m,5deg,..", "of rpe: m, s, deg, frames  [default: 1m,10m,100m]",
+           lambda text: tuple(map(read_delta, text.split(","))), name="deltas"),
     option("--all-pairs", "rpe from every pose, not in a chain"),
     option("--tolerance SHARE", "of the delta of all pairs  [default: 10%]", parse_share, requires=("all_pairs",)),
     option("--pairs-from WHICH", "reference or estimate  [default: reference]", ("reference", "estimate")),

@@ -38,10 +38,6 @@ def telling_of(line: BatchLine) -> Iterator[None]:
         _lines.pop()
 
 
-def _place() -> str:
-    return str(_lines[-1]) if _lines else ""
-
-
 def tell(text: str) -> None:
     """Write lines; that stderr is closed or on a full disk does not change what the data is worth."""
     if sys.stderr is None:
@@ -54,11 +50,7 @@ def tell(text: str) -> None:
 
 def say(text: str) -> None:
     """Write one line about the work, under the program's name; several where a terminal ends."""
-    _tell_folded(f"frametool: {_place()}{text}")
-
-
-def _tell_folded(text: str) -> None:
-    text = printable(text)
+    text = printable(f"frametool: {_lines[-1] if _lines else ''}{text}")
     tell(folded(text) if sys.stderr is not None and sys.stderr.isatty() else text)
 
 
@@ -88,7 +80,7 @@ def say_warning(message: str, rule: str = "") -> None:
         if said.get(rule):
             return
         said[rule] = rule == "by-size"
-    _tell_folded(f"frametool: {_place()}warning: {message}")
+    say(f"warning: {message}")
 
 
 def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:

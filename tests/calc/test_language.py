@@ -272,7 +272,7 @@ def test_what_does_not_fit_is_refused_with_its_place(sentence: str, text: str, c
 
 
 @pytest.mark.parametrize(("text", "hint"), [
-    ("base_link<-lidr", "unknown frame 'lidr' in ROBOT; did you mean 'lidar'? frames: arm_base_link"),
+    ("base_link<-lidr", "unknown frame 'lidr' in ROBOT; did you mean 'lidar'? frames: lidar, arm_base_link"),
     ("dst(map<-tool, map<-lidar)", "did you mean 'dist'?"),
     ("x = 2;gaol = 3;goal * 2", "unknown name 'goal'; did you mean 'gaol'?"),
     ("e[map<-tool]", "unknown name 'e'"),

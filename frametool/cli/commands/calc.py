@@ -6,19 +6,12 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import FUNCTIONS
 from frametool.calc.parser import Line, mentions_row, walk
 from frametool.cli.calc_input import Expression, calculate_lines, file_named_in, talk, value_texts
 from frametool.cli.command import Command, Inputs, argument, command_named, option, refuse
-from frametool.cli.options import (
-    ColumnNames,
-    reading_options,
-    result_options,
-    whole_pose_options,
-)
+from frametool.cli.options import ColumnNames, reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import Stream, stream_options
 from frametool.cli.trees import load_tree
@@ -26,6 +19,8 @@ from frametool.documents.source import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
+
+    import click
 
     from frametool.calc.rows import RowExpressions
     from frametool.calc.values import Term
@@ -136,8 +131,7 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
     results = marked or [lines[-1]]
     names = [line.name for line in results]
     refuse(len(names) > 1 and not all(names), "rows get one result, or several with names: -e NAME=EXPR -e NAME=EXPR")
-    if twice := next((name for name in names if name and names.count(name) > 1), ""):
-        raise click.UsageError(f"-e {twice}= is given twice")
+    refuse(twice := next((name for name in names if name and names.count(name) > 1), ""), f"-e {twice}= is given twice")
     bindings = [line for line in lines if line not in results]
     return RowExpressions(results, bindings, scope, output.style)
 

@@ -5,12 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frametool.cli.command import FILE, Inputs, argument, command_named, refuse
-from frametool.cli.options import (
-    STREAMED,
-    reading_options,
-    result_options,
-    whole_pose_options,
-)
+from frametool.cli.options import STREAMED, reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.streaming import RECORDS, Stream, stream_options
 from frametool.cli.trees import FRAME, frame_name, opened, state

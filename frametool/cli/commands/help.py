@@ -11,21 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool import __version__
-from frametool.cli.command import (
-    EXIT_CODES,
-    HEADINGS,
-    Inputs,
-    Text,
-    argument,
-    command_named,
-    grouped,
-    option,
-    option_groups,
-    option_row,
-    refuse,
-    show_help,
-    write_options,
-)
+from frametool.cli import command as shared
+from frametool.cli.command import EXIT_CODES, Inputs, Text, argument, command_named, option, option_groups, refuse
 from frametool.cli.commands import COMMANDS
 from frametool.cli.commands.examples import example
 from frametool.cli.sink import show
@@ -155,10 +142,10 @@ def common(ctx: click.Context) -> str:
     """Return the options that stand in groups, each as the first command has it that does."""
     found: dict[str, Any] = {}
     for command in _commands(ctx).values():
-        shared = [each for each in command.params if getattr(each, "under", HEADINGS[0]) != HEADINGS[0]]
-        found = {each.name or "": each for each in shared} | found
+        several = [each for each in command.params if getattr(each, "under", shared.HEADINGS[0]) != shared.HEADINGS[0]]
+        found = {each.name or "": each for each in several} | found
     formatter = ctx.make_formatter()
-    write_options(formatter, grouped(found.values()))
+    shared.write_options(formatter, shared.grouped(found.values()))
     return f"{MADE['common']}\n\n{formatter.getvalue()}"
 
 
@@ -191,7 +178,7 @@ def _option(option: click.Option, group: str, ctx: click.Context) -> dict[str, A
     kind, is_flag = option.type, option.is_flag or option.count
     choices = kind.offers(ctx, "") if isinstance(kind, Text) else getattr(kind, "choices", ())
     metavar = option.metavar or (option.opts[-1].strip("-") if choices else kind.name).upper()
-    default = re.search(r"\[default: (.*?)\]", option_row(option)[1])
+    default = re.search(r"\[default: (.*?)\]", shared.option_row(option)[1])
     return {
         "names": option.opts, "metavar": None if is_flag else metavar, "choices": list(choices or ()),
         "default": default and default[1], "repeated": option.multiple, "group": group, "help": option.help,
@@ -228,7 +215,7 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
     if inputs.form == "json":
         text = _json(ctx, name, named)
     elif named and name not in topics():  # calc and formats are subjects too
-        show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
+        shared.show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
         return
     elif not words:
         text = f"Topics (frametool help TOPIC; any other WORD is searched for):\n\n{_listed(topics() | MADE)}\n"

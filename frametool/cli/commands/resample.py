@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from frametool.cli import options
 from frametool.cli.command import Inputs, argument, command_named, option, refuse
-from frametool.cli.comparing import forms_of, parse_every, read_span, trajectory, trajectory_options, write_trajectory
-from frametool.cli.options import (
-    limit_options,
-    read_times,
-    reading_options,
-    result_options,
-    rotation_options,
-    window_of,
-)
+from frametool.cli.comparing import forms_of, read_delta, read_span, trajectory, trajectory_options, write_trajectory
+from frametool.cli.options import limit_options, read_times, reading_options, result_options, rotation_options
 from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, warn
@@ -30,7 +24,7 @@ if TYPE_CHECKING:
 @argument("path", metavar="TRAJ")
 @option("--rate HZ", "so many poses a second, from the first on", parse_number)
 @option("--at FILE|TIMES", "at the stamps of a file; T,T,.., START:STOP:STEP", name="times")
-@option("--every 1m|5deg", "at even steps of the path, or of its turning", parse_every)
+@option("--every 1m|5deg", "at even steps of the path, or of its turning", lambda text: read_delta(text, "m", "deg"))
 @option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span,
     name="max_gap_ns")  # fmt: skip
 @trajectory_options
@@ -62,7 +56,7 @@ def command(inputs: Inputs) -> int:
         refuse(every is None, f"{name} has no stamps; give them with --stamps FILE")
         found = found.numbered()
     stamps = stamps_at_rate(found, rate) if rate else stamps_every(found, every) if every else _stamps(times or "")
-    if not counted and (window := window_of(inputs)):
+    if not counted and (window := options.window_of(inputs)):
         inputs.ask("start", "stop")
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
     made = resampled(found, stamps, inputs.max_gap_ns)

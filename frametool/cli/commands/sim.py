@@ -9,20 +9,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from frametool.cli import sim_output
 from frametool.cli.command import EXIT_CODES, Command, Inputs, argument, misuse, option, refuse
 from frametool.cli.commands import Group
 from frametool.cli.explaining import explain_option, significant
 from frametool.cli.poses import inline_misuse, source_of
 from frametool.cli.signals import clean_up
-from frametool.cli.sim_output import (
-    LEADER,
-    SimOutput,
-    follow_options,
-    leader_of,
-    output_options,
-    parse_duration,
-    style_of,
-)
+from frametool.cli.sim_output import LEADER, SimOutput, follow_options, leader_of, output_options, parse_duration
 from frametool.cli.sink import writing
 from frametool.cli.stderr import say
 from frametool.formats.table import by_suffix
@@ -107,7 +100,7 @@ def _explain(inputs: Inputs) -> None:
     from frametool.explain.derive import DerivationStyle, derive_follow
     from frametool.sim.followed import follow_steps
 
-    plan = DerivationStyle(style_of(inputs), significant(inputs.precision))
+    plan = DerivationStyle(sim_output.style_of(inputs), significant(inputs.precision))
     text = derive_follow(plan, follow_steps(scene, inputs.explain_step)).render(inputs.explain or "text")
     with writing(inputs.output, force=bool(inputs.force)) as write:
         write(text)

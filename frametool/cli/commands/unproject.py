@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, argument, command_named, option
+from frametool.cli.command import Inputs, argument, command_named, option, refuse
 from frametool.cli.commands.apply import is_record
 from frametool.cli.commands.project import CameraTask, camera_options
 from frametool.cli.options import STREAMED, at_ns
@@ -100,8 +100,7 @@ def _records(arguments: Sequence[str]) -> Iterator[Source]:
     """Yield the records of arguments: mappings, or the numbers of one pixel."""
     numbers = [each for each in arguments if not is_record(each)]
     yield from (Source("argument", each) for each in arguments if is_record(each))
-    if len(numbers) not in (0, 2, 3):
-        raise click.UsageError(f"a pixel is U V or U V DEPTH, found {len(numbers)}; more pixels are rows")
+    refuse(len(numbers) not in (0, 2, 3), f"a pixel is U V or U V DEPTH, found {len(numbers)}; more pixels are rows")
     if numbers:
         u, v, *depth = map(parse_length, numbers)
         yield Source("argument", f'{{"pixel": [{u!r}, {v!r}]{"".join(f", {DEPTH}: {each!r}" for each in depth)}}}')
@@ -127,8 +126,7 @@ def _columns(inputs: Inputs, names: Sequence[str], source: str) -> Sequence[str]
     """Return the columns of u and v, and of how far away it is where there is one; raises FormatError."""
     if inputs.peek("columns"):
         columns: Sequence[str] = [each.strip() for each in inputs.columns[0].split(",")]
-        if len(columns) not in (2, 3):
-            raise click.UsageError("--columns names those of u and v, and of a depth if there is one")
+        refuse(len(columns) not in (2, 3), "--columns names those of u and v, and of a depth if there is one")
         return columns
     if names[:2] == ("1", "2"):  # without names
         return names[:3]
