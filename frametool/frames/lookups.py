@@ -468,6 +468,29 @@ class FrameTree(Frames):
         for track in way:
             self._put(StaticTransform(track.parent, track.child, rigid.inverse(*track.components)))
 
+    def hang(self, parent: str, child: str, components: Rigid) -> bool:
+        """Add an edge between two trees, whatever their roots; return False if it would close a loop."""
+        if self.groups.of(parent) == self.groups.of(child):
+            return False
+        self.reroot(child)
+        self.add_components(parent, child, components)
+        return True
+
+    def near(self, target: str, source: str) -> Rigid:
+        """Return target_from_source of two frames of one tree.
+
+        Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
+        """
+        ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
+        tops = [target, source]
+        at = 0
+        while (top := tops[at]) not in ways[1 - at]:
+            if track := self.track(top):
+                tops[at] = track.parent
+                ways[at][track.parent] = rigid.compose(*track.components, *ways[at][top])
+            at = 1 - at
+        return rigid.compose(*rigid.inverse(*ways[0][top]), *ways[1][top])
+
     def __repr__(self) -> str:
         """Show the number of frames and the roots."""
         return f"FrameTree({len(self._frames)} frames, roots: {', '.join(self.roots) or 'none'})"

@@ -17,7 +17,6 @@ Every model is a scope: a pose is relative to a frame of the model it stands in,
 from __future__ import annotations
 
 from collections import Counter
-from functools import reduce
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,13 +24,14 @@ from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
+from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry import euler, floats, quaternion, rigid
 from frametool.geometry.quaternion import unit_vector
 from frametool.geometry.rigid import IDENTITY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
@@ -95,11 +95,10 @@ class SdfFrame:
     name: with its scopes, as the tree has it; local: as the file has it
     scope: the model, or the world, in which it stands; of the world itself
     attached_to: the frame that it moves with, unless it is a link
-    pose: as written, in `relative_to`; in_scope: worked out, in the frame of the scope
+    pose: as written, in `relative_to`; of `placement`, if it has one
     """
 
-    __slots__ = ("attached_to", "holder", "in_scope", "kind", "local", "name", "open", "placement", "pose",
-                 "relative_to", "scope")  # fmt: skip
+    __slots__ = ("attached_to", "holder", "kind", "local", "name", "placement", "pose", "relative_to", "scope")
 
     def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: XmlNode) -> None:
         """Create a frame whose pose is not read yet."""
@@ -110,8 +109,6 @@ class SdfFrame:
         self.pose = IDENTITY
         self.relative_to = self.attached_to = self.scope
         self.placement: SdfFrame | None = None
-        self.in_scope: Rigid | None = None
-        self.open = False
 
     def below(self, scope: SdfFrame) -> list[SdfFrame]:
         """Return the frames on the way up from this one to a scope around it, that excluded."""
@@ -141,8 +138,10 @@ class SdfFrames:
         self._take([self.top])
         while self._read_all():  # as long as names are lost with what was left out
             pass
+        self.tree = FrameTree()
         for frame in self.all.values():
-            self._settle(frame)
+            if frame is not self.top:
+                self._hang(frame)
 
     def _take(self, scopes: list[SdfFrame]) -> None:
         """Register what stands in some scopes, and in those below."""
@@ -267,45 +266,13 @@ class SdfFrames:
                 return True
         return False
 
-    def _settle(self, frame: SdfFrame) -> None:
-        """Work out the pose of a frame in its scope, after those it depends on; a stack, for chains may be long.
-
-        Raises FormatError for frames that are relative to each other in a circle.
-        """
-        pending = [frame]
-        while pending:
-            current = pending[-1]
-            if current.in_scope is not None:
-                pending.pop()
-                continue
-            needed = self._between(current.relative_to, current.scope)
-            if current.placement:
-                needed = needed + current.placement.below(current)
-            needed = [each for each in needed if each.in_scope is None]
-            if not needed:
-                current.in_scope = self._worked_out(current)
-            elif current.open or any(each.open for each in needed):
-                named = " -> ".join(shown(each.name) for each in [current, *needed][:2])
-                message = f"poses relative to each other in a circle: {named}"
-                raise (current.holder.first("pose") or current.holder).error(message)
-            else:
-                current.open = True
-                pending += needed
-
-    def _between(self, frame: SdfFrame, scope: SdfFrame) -> list[SdfFrame]:
-        """Return the frames between one and a scope: those below that, or above it where the frame is the world."""
-        return scope.below(self.top) if frame is self.top else frame.below(scope)
-
-    def _worked_out(self, frame: SdfFrame) -> Rigid:
-        pose = frame.pose
-        if frame.relative_to is not frame.scope:
-            outer = _product(self._between(frame.relative_to, frame.scope))
-            if frame.relative_to is self.top:
-                outer = rigid.inverse(*outer)
-            pose = rigid.compose(*outer, *pose)
-        if frame.placement is None:
-            return pose
-        return rigid.compose(*pose, *rigid.inverse(*_product(frame.placement.below(frame))))
+    def _hang(self, frame: SdfFrame) -> None:
+        """Put the pose of a frame into the tree; raises FormatError for frames relative to each other in a circle."""
+        placed = frame.placement or frame
+        if not self.tree.hang(frame.relative_to.name, placed.name, frame.pose):
+            named = f"{shown(frame.name)} -> {shown(frame.relative_to.name)}"
+            message = f"poses relative to each other in a circle: {named}"
+            raise (frame.holder.first("pose") or frame.holder).error(message)
 
     def relative(self, outer: SdfFrame, frame: SdfFrame) -> Rigid:
         """Return the pose of one frame in another, before anything has moved; as written where it was written so."""
@@ -313,16 +280,7 @@ class SdfFrames:
             return frame.pose
         if outer.relative_to is frame and outer.placement is None:
             return rigid.inverse(*outer.pose)
-        around = {id(each) for each in (outer, *outer.below(self.top), self.top)}
-        common = next(each for each in (*frame.below(self.top), self.top) if id(each) in around)
-        seen = _product(frame.below(common))
-        return seen if common is outer else rigid.relative(*_product(outer.below(common)), *seen)
-
-
-def _product(way: Sequence[SdfFrame]) -> Rigid:
-    """Compose the poses of frames in their scopes, the innermost given first."""
-    poses = [each.in_scope or IDENTITY for each in reversed(way)]
-    return reduce(lambda outer, inner: rigid.compose(*outer, *inner), poses) if poses else IDENTITY
+        return self.tree.near(outer.name, frame.name)
 
 
 KINDS = {  # how many axes each has
@@ -524,7 +482,8 @@ class _SdfTree:
             return Link(joint.outer.name, frame.name, origin, joint.motions, line, after, rest, inverted)
         outer = self._outer(frame)
         model = frame.below(self.frames.top)[-1]
-        if not self.in_world and outer is self.frames.top and model.kind == "model" and model.in_scope == IDENTITY:
+        stays = outer is self.frames.top and model.kind == "model" and relative(outer, model) == IDENTITY
+        if stays and not self.in_world:
             return Link(None, frame.name, line=line)  # outside of any world, in a model without a pose in one
         return Link(outer.name, frame.name, relative(outer, frame), line=line)
 

@@ -318,40 +318,19 @@ def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
             error = topology.own_parent(each.source)
             raise Misfit(error.message, each.path, key=True)
         ends = frozenset((each.target, each.source))
-        if tree.groups.of(each.target) != tree.groups.of(each.source):
+        parent, child, components = each.parent, each.child, each.components
+        if child != each.source:
+            components = rigid.inverse(*components)
+        if tree.track(child) is not None and tree.track(parent) is None:
+            parent, child, components = child, parent, rigid.inverse(*components)
+        if tree.hang(parent, child, components):
             first[ends] = each
-            _hang(tree, each)
         else:
-            _compare(_lookup(tree, each.target, each.source), each, first.get(ends), reading)
+            _compare(tree.near(each.target, each.source), each, first.get(ends), reading)
     return [
         Edge(track.parent, track.child, track.components, path=first[frozenset((track.parent, track.child))].path)
         for track in tree.tracks()
     ]
-
-
-def _hang(tree: FrameTree, each: Stated) -> None:
-    """Add a pose that connects two trees."""
-    child, parent = each.child, each.parent
-    if tree.track(child) is not None and tree.track(parent) is None:
-        child, parent = parent, child
-    tree.reroot(child)
-    tree.add_components(parent, child, each.components if child == each.source else rigid.inverse(*each.components))
-
-
-def _lookup(tree: FrameTree, target: str, source: str) -> Rigid:
-    """Return target_from_source of two frames that hang together.
-
-    Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
-    """
-    ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
-    tops = [target, source]
-    at = 0
-    while (top := tops[at]) not in ways[1 - at]:
-        if track := tree.track(top):
-            tops[at] = track.parent
-            ways[at][track.parent] = rigid.compose(*track.components, *ways[at][top])
-        at = 1 - at
-    return rigid.compose(*rigid.inverse(*ways[0][top]), *ways[1][top])
 
 
 def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading) -> None:
