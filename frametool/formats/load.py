@@ -570,12 +570,9 @@ def load_sources(
     return tree
 
 
-CAMERAS = ("camchain", "euroc-sensor", "opencv", "kitti-calib", "nuscenes", "nerf")  # and recordings
-
-
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
     """Add to a tree the robots of its files, and cameras: of trees of ours now, of others when one is asked for."""
-    others = [file for file in files if file.form in CAMERAS or FORMATS[file.form].reader == BAG]
+    others = [file for file in files if FORMATS[file.form].cameras]
     tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
     tree.read_cameras = partial(_read_cameras, tree, others)

@@ -43,7 +43,7 @@ class Format(NamedTuple):
     delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
     columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
     poses: what its rows mean
-    texts: whether columns of texts have a place among its `arrays`
+    texts: whether columns of texts have a place among its `arrays`; cameras: whether it may hold intrinsics too
     """
 
     summary: str
@@ -62,6 +62,7 @@ class Format(NamedTuple):
     widths: tuple[int, ...] = ()
     poses: Poses = Poses("quaternion", counted="")
     texts: bool = False
+    cameras: bool = False
 
     @property
     def is_table(self) -> bool:
@@ -112,7 +113,9 @@ _TREE = "frametool.formats.trees.tree_reader"
 _MESSAGES = "frametool.ros.message_stream"
 _TABLE = "frametool.stream.table_samples"
 BAG = "frametool.recordings.messages"
-_RECORDING = {"writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write"}
+_RECORDING: dict[str, Any] = {
+    "writes": ("poses", "points", "tree", "recording"), "writer": "frametool.recordings.write", "cameras": True,
+}  # fmt: skip
 _NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
 _MESSAGE_KEYS = (
@@ -269,7 +272,7 @@ FORMATS = {
         conventions="the file holds camera<-world, quaternion w x y z",
     ),
     "nerf": _trajectory(
-        "NeRF transforms.json", "frametool.formats.rows.nerf", names=("transforms.json",),
+        "NeRF transforms.json", "frametool.formats.rows.nerf", names=("transforms.json",), cameras=True,
         poses=Poses("matrix", axes="opengl", frames=_CAMERA, counted="places in its list"),
         magic=(("json path", "frames/transform_matrix"),), conventions="world<-camera; opengl (y up, z back)",
     ),
@@ -305,7 +308,7 @@ FORMATS = {
             ("text", rf"(?m)^(?:\{{\s*|[ \t]+(?=\"))?[\"']?(?:{_TWO_FRAMES})[\"']?:\s*(?:\[|-)\s*[\[-]\s*[-+.\d]"),
         ),
         conventions="target<-source as each key says; metres; intrinsics: frametool project",
-        required_options=("direction", "frames"),
+        required_options=("direction", "frames"), cameras=True,
     ),
     "kalibr": _read_tree(
         "results of Kalibr as text", "frametool.formats.trees.kalibr",
@@ -326,11 +329,11 @@ FORMATS = {
             ("yaml key", "trans_matrix"),  # of OpenLORIS-Scene
         ),
         conventions="target<-source as each key says, camera<-object by rvec and tvec; metres",
-        required_options=("direction", "frames"),
+        required_options=("direction", "frames"), cameras=True,
     ),
     "euroc-sensor": _read_tree(
         "sensor.yaml of EuRoC", "frametool.formats.trees.camchain", magic=(("yaml key", "T_BS"), ("json key", "T_BS")),
-        conventions="T_BS is body<-sensor, metres", required_options=("frames",),
+        conventions="T_BS is body<-sensor, metres", required_options=("frames",), cameras=True,
     ),
     "apollo": _read_tree(
         "Apollo extrinsics: a TransformStamped", _TREE, magic=(("yaml inner", "euler_angles_degree"),),
@@ -339,7 +342,7 @@ FORMATS = {
     "kitti-calib": _read_tree(
         "KITTI calibration", "frametool.formats.trees.kitti_calib", magic=(("text", _KITTI),),
         conventions="parent<-child, metres, optical axes of cameras unless told",
-        required_options=("frames", "camera_axes"),
+        required_options=("frames", "camera_axes"), cameras=True,
     ),
     "handeye": _tree(
         "hand-eye calibration of easy_handeye", "frametool.formats.trees.handeye",
@@ -350,6 +353,7 @@ FORMATS = {
         "nuScenes table", "frametool.formats.trees.nuscenes",
         magic=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
         conventions="ego<-sensor, global<-ego, metres, w first, microseconds", required_options=("frames",),
+        cameras=True,
     ),
     "dh": _read_tree(
         "Denavit-Hartenberg table", "frametool.formats.robots.dh", magic=(("text", _DH),),
