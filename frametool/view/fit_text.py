@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import cells, printable
 from frametool.text.csv_line import quoted
+from frametool.view.report_text import columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -394,11 +395,13 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     if form == "latex":
         body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *shown))
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
-    widths = [max(map(len, column)) for column in zip(TITLES, *shown, strict=True)]
-    gap = "\n" if sum(widths) + 2 * len(widths[1:]) > WIDTH else "  "  # numbers may stand below their name
-    width = widths[0] if gap != "\n" else 0
-    aligned = ((line[0].ljust(width), "  ".join(map(str.rjust, line[1:], widths[1:]))) for line in (TITLES, *shown))
-    return "".join(f"{gap.join(line)}\n" for line in aligned)
+    table: list[Sequence[str]] = [TITLES, *shown]
+    numeric = [False] * len(TITLES[1:])
+    aligned = columns(table, [True, *numeric])
+    if max(map(cells, aligned)) > WIDTH:  # numbers go below their name
+        numbers = columns([row[1:] for row in table], numeric)
+        aligned = [line for row, below in zip(table, numbers, strict=True) for line in (row[0], below)]
+    return "".join(f"{line}\n" for line in aligned)
 
 
 def best_of(rows: Sequence[Sequence[Any]]) -> list[float | None]:

@@ -36,15 +36,23 @@ def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noq
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
     rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry[key]) for key in shown] for entry in edges)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    pads = [str.ljust if key in LEFT else str.rjust for key in shown]
-    aligned = ([pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows)
-    lines = ["  ".join(row).rstrip() for row in aligned]
+    lines = columns(rows, [key in LEFT for key in shown])
     if max(map(cells, lines)) > max(WIDTH, get_terminal_size((WIDTH, 0)).columns):
         lines = [line for row in rows[1:] for line in _folded_edge(dict(zip(shown, row, strict=True)), rows[0])]
     table = "".join(f"{line}\n" for line in lines)
     table += "".join(map(_motion, (entry for entry in edges if entry["length_m"])))
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
+
+
+def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> list[str]:
+    """Return rows as lines with aligned cells; left: which columns are aligned to the left."""
+    widths = [max(map(cells, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        padded = ((cell, " " * (width - cells(cell))) for cell, width in zip(row, widths, strict=True))
+        parts = (cell + pad if is_left else pad + cell for (cell, pad), is_left in zip(padded, left, strict=True))
+        lines.append("  ".join(parts).rstrip())
+    return lines
 
 
 def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
