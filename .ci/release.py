@@ -1,6 +1,7 @@
 """What a release changes in its sources: `release.py FOLDER ADDRESS [TAG]`, called by `.ci/release` on a copy of them.
 
-The package gets the addresses that nobody knew before, and README's links lead to ADDRESS.
+The package gets the addresses that nobody knew before, README the set-up without a clone and links to ADDRESS, the
+recipe of conda the version.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ def main(words: list[str]) -> None:
         raise Refused("the last commit has no pyproject.toml here; run this in a clone of the repository")
     version = version_of((folder / "frametool" / "__init__.py").read_text("utf-8"))
     check_version(version, (folder / "CHANGELOG.md").read_text("utf-8"), tag)
+    recipe = folder / ".ci" / "conda" / "recipe.yaml"
+    recipe.write_text(with_version(recipe.read_text("utf-8"), version), "utf-8")
     project.write_text(with_addresses(project.read_text("utf-8"), address, tag or "HEAD"), "utf-8")
     readme.write_text(with_whole_links(with_setup(readme.read_text("utf-8")), address, tag or "HEAD"), "utf-8")
 
@@ -69,6 +72,11 @@ def is_date(text: str) -> bool:
         return date.fromisoformat(text).isoformat() == text
     except ValueError:
         return False
+
+
+def with_version(recipe: str, version: str) -> str:
+    """Return a recipe of conda for a version."""
+    return re.sub(r'(?m)^  version: ".*"$', f'  version: "{version}"', recipe)
 
 
 def with_addresses(project: str, address: str, ref: str) -> str:

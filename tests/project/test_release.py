@@ -58,6 +58,10 @@ def test_the_set_up_of_the_description_is_that_without_a_clone() -> None:
         release.with_setup("# a\n")
 
 
+def test_the_recipe_gets_the_version() -> None:
+    assert release.with_version('context:\n  version: "0.1.0"\n\nother: ""\n', "1.2.0") == 'context:\n  version: "1.2.0"\n\nother: ""\n'
+
+
 def test_no_relative_link_is_left_in_the_readme() -> None:
     text = release.with_whole_links((ROOT / "README.md").read_text(), ADDRESS, "HEAD")
     assert {link.partition("://")[0] for link in re.findall(r"\]\(([^)]+)\)", text)} == {"https"}

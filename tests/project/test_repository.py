@@ -61,14 +61,41 @@ def test_only_publishing_has_a_right_and_nothing_has_a_secret(path: Path) -> Non
     assert "secrets" not in path.read_text()
     assert workflow["permissions"] == {"contents": "read"}
     rights = {name: (job.get("permissions"), job.get("environment")) for name, job in workflow["jobs"].items()}
-    assert rights == {name: ({"id-token": "write"}, "pypi") if name == "publish" else (None, None) for name in rights}
+    needed = {"publish": ({"id-token": "write"}, "pypi"), "deploy": ({"id-token": "write", "pages": "write"}, "github-pages")}
+    assert rights == {name: needed.get(name, (None, None)) for name in rights}
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
-def test_an_action_has_its_version(path: Path) -> None:
-    used = [step["uses"] for job in read(str(path))["jobs"].values() for step in job.get("steps", ()) if "uses" in step]
+def test_an_action_is_pinned_by_its_hash_and_leaves_no_credentials(path: Path) -> None:
+    used = re.findall(r"(?m)^ *- uses: (.*)", path.read_text())
     assert used
-    assert all(re.fullmatch(r"actions/[\w-]+@v\d+|pypa/gh-action-pypi-publish@release/v1", each) for each in used)
+    assert all(re.fullmatch(r"(actions/[\w-]+|pypa/gh-action-pypi-publish)@[0-9a-f]{40} # v\d+\.\d+\.\d+", each) for each in used)
+    steps = [step for job in read(str(path))["jobs"].values() for step in job.get("steps", ())]
+    assert all(step["with"] == {"persist-credentials": "false"} for step in steps if step.get("uses", "").startswith("actions/checkout@"))
+    assert "concurrency" in read(str(path))
+
+
+def test_a_bot_moves_what_is_pinned() -> None:
+    updates = read(".github/dependabot.yml")["updates"]
+    assert {(each["package-ecosystem"], each["directory"]) for each in updates} == {
+        ("github-actions", "/"), ("npm", "/tests/site_pages/calculator"), ("pip", "/tests/site_pages/calculator"),
+    }  # fmt: skip
+
+
+def test_systems_that_nobody_tried_do_not_fail_the_run() -> None:
+    assert TEST["jobs"]["tests"]["continue-on-error"] == "${{ matrix.os != 'ubuntu-latest' }}"
+
+
+def test_the_pages_are_made_as_the_scripts_say() -> None:
+    runs = [step["run"] for step in read(".github/workflows/pages.yml")["jobs"]["build"]["steps"] if "run" in step]
+    assert runs[1:] == ['python tests/make_site.py site --address "$ADDRESS" --calculator', "python -m sphinx -W -b html site site/html"]
+
+
+def test_extras_are_what_users_want_and_groups_what_developers_want() -> None:
+    extras = PROJECT["project"]["optional-dependencies"]
+    assert [*extras] == ["bag", "arrow", "las", "test", "plot", "all", "docs", "dev"]  # README's and CI's commands name test, docs, dev
+    assert extras["all"] == ["frametool[bag,arrow,las,plot]"]
+    assert [*PROJECT["dependency-groups"]] == ["engines", "oracles", "browser"]
 
 
 def test_the_recipe_of_conda_says_what_the_project_says() -> None:
@@ -89,6 +116,7 @@ def test_the_image_is_small_and_runs_the_tool_as_a_user() -> None:
     steps = {step: what for step, _, what in lines if step.isupper()}
     assert (steps["FROM"], steps["ENTRYPOINT"]) == ("python:3-slim", '["frametool"]')
     assert int(steps["USER"]) > 0
+    assert "[bag,arrow]" in steps["RUN"]
     assert list(steps)[-3:] == ["USER", "WORKDIR", "ENTRYPOINT"]
 
 
