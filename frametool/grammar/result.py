@@ -106,8 +106,8 @@ class Style:
         """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        value = value + 0.0 if self.full or not self.screen or self.form != "text" else _nine_digits(value)
-        return repr(value) if self.precision is None else f"{value:z.{self.precision}f}"
+        bits = value + 0.0 if self.full or not self.screen or self.form != "text" else _nine_digits(value)
+        return repr(bits) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
         """Return True if a notation's angles are written in degrees: its own suffix has priority."""
