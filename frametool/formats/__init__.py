@@ -1,1 +1,1 @@
-"""The forms of files: the table of what is read and written, how a file's form is told, and how files become trees."""
+"""File formats: the table of all formats, the detection of a file's format, and the conversion of files to trees."""

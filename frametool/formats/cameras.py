@@ -1,6 +1,6 @@
-"""Intrinsics of cameras from the files that people keep them in: which cameras a file holds, and each one by its name.
+"""Intrinsics of cameras from files: the cameras in a file, each by its name.
 
-    camera: {model: plumb_bob, K: [fx, fy, cx, cy], D: [..], size: [w, h]}      ours: a file, in a tree, or inline
+    camera: {model: plumb_bob, K: [fx, fy, cx, cy], D: [..], size: [w, h]}      frametool: a file, in a tree, or inline
     camera_matrix: {data: [9]}, distortion_coefficients: {data: [..]}           camera_info of ROS, OpenCV
     k: [9], d: [..], p: [12], distortion_model: plumb_bob, width: 640           a message CameraInfo
     cam0: {camera_model: pinhole, intrinsics: [4], distortion_coeffs: [..]}     Kalibr
@@ -9,8 +9,8 @@
     P2: 12 numbers  or  K_02:, D_02:, S_02:, P_rect_02:                         KITTI
     [{sensor_token: .., camera_intrinsic: [9]}, ..]                             nuScenes
 
-Pixels count from the centre of the first one, in COLMAP and NeRF from its corner.  Each reader yields names, and what
-`Camera` takes; a camera is made when it is asked for, so that one that is not read is in nobody's way.
+Pixels count from the centre of the first one, in COLMAP and NeRF from its corner.  Each reader yields names and the
+arguments of `Camera`; a camera is created on demand, so that an unsupported one does not affect the others.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     Makers = dict[str, Callable[..., Camera]]
 
 INFO = "sensor_msgs/msg/CameraInfo"
-# what Camera takes -> keys that files have for it; OpenCV's may end in a number
+# argument of Camera -> keys in files; OpenCV's may end in a number
 KEYS = {
     "K": "K|k|camera_matrix|cameraMatrix|M|camera_intrinsic",
     "D": r"D|d|dist(?!ance|ortion_(?:model|type))\w*?",
@@ -52,7 +52,7 @@ KEYS = {
     "model": "distortion_model|model",
 }
 SIZES = ("width", "height"), ("image_width", "image_height")
-# of COLMAP and NeRF: model, how many focal lengths, how many numbers behind the centre
+# of COLMAP and NeRF: model, number of focal lengths, number of parameters after the centre
 COLMAP = {
     "SIMPLE_PINHOLE": ("pinhole", 1, 0), "PINHOLE": ("pinhole", 2, 0), "SIMPLE_RADIAL": ("plumb_bob", 1, 1),
     "RADIAL": ("plumb_bob", 1, 2), "OPENCV": ("plumb_bob", 2, 4), "FULL_OPENCV": ("rational_polynomial", 2, 8),
@@ -67,10 +67,10 @@ def load_camera(
     path: str | os.PathLike[str], name: str | None = None, *, model: str | None = None,
     size: Sequence[int] | None = None,
 ) -> Camera:  # fmt: skip
-    """Read a camera from a file: `load_camera("chain.yaml", "cam0")`; a text that begins with `{` is one itself.
+    """Read a camera from a file: `load_camera("chain.yaml", "cam0")`; text that begins with `{` is read directly.
 
-    name: which, where there are several; `FILE:NAME` says it too
-    model: instead of the model that the file says; size: of the picture, where that is another or not said
+    name: selects one of several cameras; `FILE:NAME` does too
+    model: overrides the model in the file; size: of the image, if the file does not state it, or to resize
     Raises FormatError, and FileProblem.
     """
     text = str(path)
@@ -92,9 +92,9 @@ def load_camera(
 
 
 def cameras_of(file: InputFile) -> dict[str, partial[Camera]]:
-    """Return what makes each camera of a file, by its name; "" where it has none.
+    """Return a function that creates each camera of a file, by its name; "" for a camera without one.
 
-    Raises FormatError for a text that is broken.
+    Raises FormatError for invalid text.
     """
     found: dict[str, dict[str, Any]] = {}
     changed: dict[str, None] = {}
@@ -108,7 +108,7 @@ def cameras_of(file: InputFile) -> dict[str, partial[Camera]]:
 
 
 def cameras_of_tree(tree: Frames, files: Sequence[FrameFile]) -> Makers:
-    """Return what makes the cameras that files of a tree hold, by the frames that they are."""
+    """Return functions that create the cameras in a tree's files, by their frames."""
     found: Makers = {}
     for file in files:
         again = file
@@ -129,7 +129,7 @@ def cameras_of_tree(tree: Frames, files: Sequence[FrameFile]) -> Makers:
 def _made(
     source: str, fields: dict[str, Any], *, name: str, model: str | None = None, size: Sequence[int] | None = None
 ) -> Camera:
-    """Make a camera of what a file says; raises FormatError."""
+    """Create a camera from the fields in a file; raises FormatError."""
     given, line = {"model": None, **fields}, fields.get("line", 0)
     with _placed(source, "" if line else name, line):
         if "colmap" in fields:
@@ -144,7 +144,7 @@ def _made(
 
 
 def resized(camera: Camera, size: Sequence[int] | None, source: str) -> Camera:
-    """Return the camera of its picture in another size, which is told; raises ValueInvalid for another shape."""
+    """Return the camera for another image size, with a warning; raises ValueInvalid for another aspect ratio."""
     if size is None or camera.size == tuple(size):
         return camera
     made, known = camera.scaled(size), camera.size
@@ -155,7 +155,7 @@ def resized(camera: Camera, size: Sequence[int] | None, source: str) -> Camera:
 
 @contextmanager
 def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
-    """Make one error of whatever numbers of another kind or count than a form has raise; raises FormatError."""
+    """Convert errors about the kind or number of values into a FormatError."""
     try:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -165,12 +165,12 @@ def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
         raise FormatError(f"{name}: {what}" if name else what, source=source, line=line) from None
 
 
-# ---------------------------------------------------------------- which form
+# ---------------------------------------------------------------- which format
 
 
 def _read(file: InputFile) -> Found:
-    """Yield the name of each camera of a file, and what it is made of."""
-    if "text" not in vars(file):  # that of a tree is read
+    """Yield the name of each camera of a file, and its fields."""
+    if "text" not in vars(file):  # that of a tree has been read
         if of_folder(file.path) or file.path.endswith(".db3") or file.head().startswith((b"#ROSBAG ", b"\x89MCAP")):
             return _in_bag(file)
         if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
@@ -208,7 +208,7 @@ def _in_document(value: Any, file: InputFile) -> Found:
 
 
 def _ours(value: Any, name: str) -> Found:
-    """Yield what stands under `camera:` in a file or in a tree, nested or as a list."""
+    """Yield the cameras under `camera:` in a file or in a tree, nested or as a list."""
     for key, each in value.items() if isinstance(value, dict) else enumerate(value):
         if key == "camera" and isinstance(each, dict) and "K" in each:
             frame = value.get("name", value.get("child_frame_id", name))
@@ -221,7 +221,7 @@ def _ours(value: Any, name: str) -> Found:
 
 
 def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
-    """Return what keys say that CameraInfo and OpenCV have; nothing where there is no K."""
+    """Return the fields of the keys that CameraInfo and OpenCV use; empty without a K."""
     found: dict[str, Any] = {}
     for taken, keys in KEYS.items():
         for key, each in value.items():
@@ -244,7 +244,7 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
 
 
 def _in_bag(file: InputFile) -> Found:
-    """Yield the cameras of a bag by topic and by frame_id, from the messages CameraInfo."""
+    """Yield the cameras of a bag by topic and by frame_id, from CameraInfo messages."""
     from frametool.recordings.read import opened_recording
 
     with opened_recording(file.path, Tally()) as reader:
@@ -280,8 +280,8 @@ def _colmap(file: InputFile) -> Found:
 
 
 def _of_colmap(name: str, numbers: Sequence[float], size: Sequence[int] | None) -> dict[str, Any]:
-    """Return a camera by a model's name and its parameters; raises ValueInvalid."""
-    if name == ANGLE:  # NeRF's, across the picture
+    """Return a camera from a model's name and its parameters; raises ValueInvalid."""
+    if name == ANGLE:  # NeRF's, across the image
         if not size:
             raise ValueInvalid(f"{ANGLE} needs --size W,H")
         focal = size[0] / (2.0 * tan(0.5 * numbers[0]))
@@ -298,7 +298,7 @@ def _of_colmap(name: str, numbers: Sequence[float], size: Sequence[int] | None) 
 
 
 def _nerf(value: dict[str, Any]) -> dict[str, Any]:
-    """Return the one camera of transforms.json: a model of COLMAP whose parameters have names."""
+    """Return the only camera of transforms.json: a model of COLMAP whose parameters have names."""
     keys = rf"fl_[xy]|c[xy]|[wh]|[kp]\d|{ANGLE}"
     known = {key: parse_number(each) for key, each in value.items() if re.fullmatch(keys, key)}
     size = [known["w"], known["h"]] if {"w", "h"} <= known.keys() else None
@@ -316,7 +316,7 @@ def _nerf(value: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kitti(file: InputFile) -> Found:
-    """Yield the cameras of a calibration of KITTI."""
+    """Yield the cameras of a KITTI calibration."""
     from frametool.formats.trees.kitti_calib import CAMERAS, RECTIFICATIONS, Calibration
 
     read = Calibration(file, _options(file))
@@ -330,7 +330,7 @@ def _kitti(file: InputFile) -> Found:
         more = {"size": each} if (each := numbers.get(f"S_rect_0{at}")) else {}
         for name, p in ((f"{camera}{rect}", numbers.get(f"P{at}")), (f"{camera}_rect", said.get("P"))):
             fields: dict[str, Any] = {"model": "pinhole", "K": p and [p[0:3], p[4:7], p[8:11]], "P": p, **more}
-            if p and "R" in said and (t := numbers.get(f"T_0{at}")):  # what P says beyond the pose of the frame
+            if p and "R" in said and (t := numbers.get(f"T_0{at}")):  # the part of P beyond the pose of the frame
                 turn, centre = said["R"], Camera(**fields).rectified(from_first=True).fields["shift"]
                 fields["shift"] = [c - sum(turn[3 * i + k] * t[k] for k in range(3)) for i, c in enumerate(centre)]
             if p:
@@ -338,7 +338,7 @@ def _kitti(file: InputFile) -> Found:
 
 
 def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
-    """Yield the cameras of calibrated_sensor.json by the names that their frames have."""
+    """Yield the cameras of calibrated_sensor.json by the names of their frames."""
     from frametool.formats.trees.nuscenes import read
 
     for edge in read(file, _options(file)):
@@ -348,5 +348,5 @@ def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
 
 
 def _options(file: InputFile) -> Options:
-    """Return how the poses of a file are read."""
+    """Return the options for reading the poses of a file."""
     return Options(Tally(), Topics(()), answers=getattr(file, "answers", Answers()))

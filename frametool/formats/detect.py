@@ -1,27 +1,27 @@
-"""What form a file has, by its first bytes and its name: the one place that guesses.
+"""Detect the format of a file by its first bytes and its name; nothing else guesses.
 
-Kinds of signs in the table, the strongest first.  Above the suffix, a sign belongs to one form alone:
+Kinds of signs in the table, the strongest first.  Signs with priority over the suffix belong to one format only:
 
     magic      a pattern of the first bytes
-    folder     a file that the folder holds
-    xml text   a pattern found in XML, outside its comments
+    folder     a file in the folder
+    xml text   a pattern found in XML, outside comments
     xml        the root element
-    json path  the way to a key that is not outermost: keys with slashes between them, * for any; lists do not count
+    json path  the path to a nested key: keys separated by slashes, * for any; lists do not count
     json key   a key of the outermost object, or of the objects in the outermost list
-    own key    a pattern of a key at the beginning of a line that makes YAML ours, whatever stands in it or beside it
+    own key    a pattern of a key at the beginning of a line that makes YAML a frametool tree, whatever its value
     yaml key   a pattern of a key at the beginning of a line
-    yaml inner a pattern of a key that stands deeper
+    yaml inner a pattern of a nested key
     text       a pattern found in the first characters
-    entries    a pattern of keys that stand in the maps, or lists of seven numbers, which all outermost keys have, or
-               the outermost `transforms` or `extrinsics`; no key of a message stands there
-    line       a pattern of the first line of data, behind blank lines, comments and what tools print
-    leaves     a pattern of the keys that have a number beside them, behind a slash for each key above them; of five
-               one may be another, so that a misspelt one is told where it stands
+    entries    a pattern of keys in the maps, or lists of seven numbers, that all outermost keys have, or
+               the outermost `transforms` or `extrinsics`; without any key of a message
+    line       a pattern of the first line of data, after blank lines, comments and text that tools print
+    leaves     a pattern of the keys with a number as value, with a slash for each enclosing key; one in five
+               may differ, so that a misspelt key gets an error with its place
 
-Below it, the first form that looks so is taken:
+After the suffix, the first match is used:
 
     begin      a pattern of the first characters
-    header     a pattern of the first line that is no comment, or of a comment that names columns
+    header     a pattern of the first line that is not a comment, or of a comment with column names
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ if TYPE_CHECKING:
 
 
 class Beginning:
-    """The first bytes of a file, and what they show; worked out when first asked for."""
+    """The first bytes of a file, and their properties, computed on demand."""
 
     def __init__(self, head: bytes) -> None:
-        """Keep the bytes."""
+        """Store the bytes."""
         self.head = head
 
     @cached_property
@@ -66,7 +66,7 @@ class Beginning:
 
     @cached_property
     def first_line(self) -> str:
-        """Return the first line that is no comment; a comment with commas or tabs, as the rows below, is a header."""
+        """Return the first line that is not a comment; a comment with commas or tabs, like the rows, is a header."""
         lines = [line.strip("\r") for line in self.text.split("\n") if line.strip()]
         plain = next((line for line in lines if not line.startswith("#")), "")
         if lines and lines[0].startswith("#") and (not plain or _has_delimiter(plain)) and _has_delimiter(lines[0]):
@@ -75,13 +75,13 @@ class Beginning:
 
     @cached_property
     def has_data(self) -> bool:
-        """Tell what may hold frames or poses from sentences."""
+        """Return True for text that may hold frames or poses, False for prose."""
         is_prose = re.match(_SENTENCE, self.data_line) and not re.search(rf"(?i)\b{_OURS}\b", self.data_line)
         return not is_prose and re.search(_DATA, self.text[:LOOKED_AT]) is not None
 
     @cached_property
     def json_paths(self) -> set[tuple[str, ...]]:
-        """Return the ways to the keys of JSON; lists on the way do not count."""
+        """Return the paths of the keys of JSON; lists on the path do not count."""
         from frametool.documents.json import json_events, looks_like_json
         from frametool.documents.source import END, LEAF, MAP
 
@@ -104,22 +104,22 @@ class Beginning:
 
     @cached_property
     def yaml_keys(self) -> set[str]:
-        """Return the words at the beginnings of lines that a colon follows."""
+        """Return the words at the beginnings of lines that are followed by a colon."""
         return {found[2] for found in re.finditer(rf"(?m)^{_YAML_KEY}(?=\s|$)", self.text)}
 
     @cached_property
     def yaml_inner_keys(self) -> set[str]:
-        """Return the words behind the blanks or dashes of a line, and a brace, that a colon follows."""
+        """Return the words after blanks, dashes or a brace at the beginning of a line that are followed by a colon."""
         return {found[2] for found in re.finditer(rf"(?m)^(?:[ -]++|[\w./-]+: *(?=\{{))\{{?+ *+{_YAML_KEY}", self.text)}
 
     @cached_property
     def leaves(self) -> set[str]:
-        """Return the keys of the first map of YAML with a number beside them, behind a slash for each map around it.
+        """Return the keys of the first YAML map whose values are numbers, with a slash for each enclosing map.
 
         A list in between is a `[`.
         """
         found, inner = set[str](), [("", self.document)]
-        for way, mapping in inner:  # grows while it is walked
+        for way, mapping in inner:  # grows during the loop
             for key, each in mapping.items():
                 if isinstance(each, str) and re.match(r"[-+]?\.?\d", each):
                     found.add(way + key)
@@ -131,12 +131,12 @@ class Beginning:
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """Return the first map of YAML or JSON as plain values, as far as the text is looked at; {} for no map."""
+        """Return the first YAML or JSON map as plain values, as far as the text is read; {} if there is no map."""
         from frametool.documents.source import END, LEAF, MAP
         from frametool.documents.yaml import yaml_events
 
         top: list[Any] = []
-        ways: list[tuple[Any, str | None]] = [(top, None)]  # what is open, and the key that waits for a value
+        ways: list[tuple[Any, str | None]] = [(top, None)]  # open containers, and the key that waits for a value
         for kind, word, *_ in yaml_events(self.text[:LOOKED_AT]):
             inside, key = ways[-1]
             if kind == END:
@@ -157,7 +157,7 @@ class Beginning:
 
     @cached_property
     def xml(self) -> str:
-        """Return the text of XML from its root element on, without comments; "" for what is no XML."""
+        """Return the text of XML from its root element on, without comments; "" if it is not XML."""
         if not self.text.lstrip().startswith("<"):
             return ""
         text = re.sub(r"(?s)<!--.*?(?:-->|\Z)", "", self.text)
@@ -165,7 +165,7 @@ class Beginning:
 
     @cached_property
     def elements(self) -> list[str]:
-        """Return the names of the root element of XML and of the first one in it."""
+        """Return the names of the root element of XML and of its first child."""
         return re.findall(r"<([\w.:-]+)", self.xml[:LOOKED_AT])[:2]
 
 
@@ -180,7 +180,7 @@ _NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angula
 
 
 def _are_poses(begin: Beginning, words: str) -> bool:
-    """Tell a map of names, or a list, whose entries are poses; of a long text the last one may be cut."""
+    """Return True for a map of names, or a list, whose entries are poses; the last one may be truncated."""
     if not (begin.yaml_keys or begin.text.lstrip().startswith("{")):
         return False
     top: dict[Any, Any] = {key: each for key, each in begin.document.items() if key != "angles"}
@@ -202,7 +202,7 @@ def _are_poses(begin: Beginning, words: str) -> bool:
     return bool(entries) and not names and all(map(is_pose, entries))
 
 
-# kind -> whether a beginning shows what a row says, the strongest first
+# kind -> a function that returns whether a beginning matches a sign, the strongest first
 _STRONG: dict[str, Shows] = {
     "magic": lambda begin, what: re.match(what, begin.head, re.DOTALL) is not None,
     "xml text": lambda begin, what: bool(begin.xml) and re.search(what, begin.xml) is not None,
@@ -232,10 +232,10 @@ def _count(keys: set[str], pattern: str) -> int:
 
 
 def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) -> tuple[list[str], str]:
-    """Return the forms that show a sign of the strongest kind that is shown at all, and that kind."""
+    """Return the formats that match a sign of the strongest matching kind, and that kind."""
     for kind, shows in tests.items():
         found = [name for name in names if any(kind == of and shows(begin, what) for of, what in _signs(name))]
-        if found and kind == "yaml key":  # no stronger than those that stand deeper
+        if found and kind == "yaml key":  # weaker than nested keys
             found += _fitting(begin, {"yaml inner": tests["yaml inner"]}, names)[0]
         if found:
             return list(dict.fromkeys(found)), kind
@@ -246,7 +246,7 @@ def _signs(form: str) -> tuple[tuple[str, str | bytes], ...]:
     return (UNSUPPORTED[form] if form in UNSUPPORTED else FORMATS[form]).magic
 
 
-# kind -> by what a file was known; all others by its keys
+# kind -> the description of the sign; all other kinds are keys
 _KNOWN_BY = {
     "magic": "its first bytes",
     "xml text": "its elements",
@@ -257,18 +257,18 @@ _KNOWN_BY = {
 
 
 def by_sign(head: bytes, *reads: str, name: str = "") -> str | None:
-    """Return the form, among those from which `reads` is read, whose sign the first bytes show; None if none does.
+    """Return the format, among those from which `reads` is read, that matches the first bytes; None if none does.
 
-    Raises FormatError if two forms fit, or an unsupported one.
+    Raises FormatError if two formats fit, or an unsupported one.
     """
     return _by_sign(Beginning(head), *reads, name=name)[0]
 
 
 def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]:
-    """Return the form whose sign is shown, and by what it is known; a form that is read goes before one that is not."""
+    """Return the matching format and the description of its sign; supported formats have priority."""
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *UNSUPPORTED, *readers("drawing")))
     if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
-        return None, ""  # bytes that look like a line of something by chance
+        return None, ""  # bytes that resemble a line of some format by chance
     found = [form for form in fitting if not _is_unread(form, reads)] or fitting
     if not found:
         return None, ""
@@ -287,13 +287,13 @@ _NO_POSES = "no poses in it (frametool tree shows the frames); give what it was 
 
 
 def not_read(form: str, name: str) -> FormatError:
-    """Make the error for a file that is recognised and not read: what it is, what to do."""
+    """Return the error for a file that is recognised but not supported: what it is, what to do."""
     about = str(UNSUPPORTED[form]) if form in UNSUPPORTED else f"{FORMATS[form].summary}: {_NO_POSES}"
     return FormatError(about, source=name or "stdin")
 
 
 def of_folder(path: str) -> str | None:
-    """Return the form of which a folder is; None for a file, and for any other folder."""
+    """Return the format of a folder; None for a file, and for any other folder."""
     for form, row in FORMATS.items():
         for kind, what in row.magic:
             if kind == "folder" and os.path.isdir(path) and os.path.exists(os.path.join(path, str(what))):
@@ -302,11 +302,11 @@ def of_folder(path: str) -> str | None:
 
 
 def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> tuple[str, str]:
-    """Return the form of a file and by what it was known, among the forms from which `reads` is read.
+    """Return the format of a file and the description of its sign, among the formats from which `reads` is read.
 
-    head: its first bytes; name: of the file, "" for standard input; otherwise: the form if nothing tells; empty: that
-    of a file in which there is nothing but comments.
-    Raises FormatError if nothing tells and there is no such form, or two forms fit.
+    head: its first bytes; name: of the file, "" for standard input; otherwise: the default format; empty: the format of
+    a file with nothing but comments.
+    Raises FormatError if nothing matches and there is no default, or two formats fit.
     """
     begin = Beginning(head)
     form, known_by = _by_sign(begin, *reads, name=name)
@@ -342,14 +342,14 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
 
 
 def _no_text(what: str, name: str) -> FormatError:
-    """Make the error for bytes that are no text: a cloud without a header can only be told."""
+    """Return the error for binary data: a cloud without a header needs --in."""
     if name.lower().endswith(".bin"):
         what = "binary data; of a cloud say which: --in kitti-bin (float32 x y z intensity) or nuscenes-bin (and ring)"
     return FormatError(f"{what}; {_LISTED}", source=name or "stdin")
 
 
 def instead_of_text(error: FormatError, path: str) -> FormatError:
-    """Return the error for a file that is no text where a pose is wanted: what it is, not where its first byte is."""
+    """Return the error for a binary file where a pose is expected: what it is, not the position of a byte."""
     with open(path, "rb") as file:
         head = file.read(HEAD)
     what = not_text(head)
@@ -364,7 +364,7 @@ _KEYS = (
     r"orientation|rotation|quaternion|matrix|(?:xyz|rpy|euler)\w*"
 )
 _OURS = r"(?:\w*[._])?(?:q?[xyz]|qw|roll|pitch|yaw|frame|frame_id|name|parent)"
-# a number that is a cell or a value, one at the beginning of a line, a key of ours, a list or map, a header
+# a number as a cell or a value, one at the beginning of a line, a frametool key, a list or map, a header
 _DATA = "(?im)" + "|".join((
     rf"[,;\t:{{][ \t]*+{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
     rf"^[ \t]*+(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
@@ -375,7 +375,7 @@ _MOST_NAMED = 8
 
 
 def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
-    """Make the error for a file that shows no sign: how it begins, which forms there are."""
+    """Return the error for a file without a sign: how it begins, and the list of formats."""
     likely = readers(*reads)
     what = "this text"
     if begin.xml:
@@ -391,18 +391,18 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
 
 
 _ROBOT = rb"\s*(?:<\?xml\b|<!--|<(?:robot|sdf|mujoco|launch|opencv_storage)\b)"
-_FRAMES_KEY = r"""(?m)^[^\S\n]*+(?:---\s*+)?(?:\{\s*+)?["']?frames["']?\s*+:"""  # of the tool's own trees
-_MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # are read as poses too
+_FRAMES_KEY = r"""(?m)^[^\S\n]*+(?:---\s*+)?(?:\{\s*+)?["']?frames["']?\s*+:"""  # of frametool trees
+_MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # formats that are read as poses too
 
 
 def refuse_robots(text: bytes, name: str) -> None:
-    """Raise FormatError for XML of a robot or a launch file where one pose is wanted."""
+    """Raise FormatError for XML of a robot or a launch file where a single pose is expected."""
     if re.match(_ROBOT, text) and (error := _points_to_lookup(text, name)):
         raise error
 
 
 def with_hint(error: FormatError, text: bytes, name: str, *, told: bool = False) -> FormatError:
-    """Return the error for a text without a pose: of frames, one that points to `lookup`; no prose is quoted."""
+    """Return the error for text without a pose; for frames it suggests `lookup`; prose is not quoted."""
     from frametool.grammar.pasted import unsupported_tool
 
     begin = Beginning(text[:HEAD])

@@ -1,7 +1,7 @@
-"""Files of frames in, one tree out: merges what several files say and names the places where they disagree.
+"""Read files of frames and merge them into one tree; errors name the places where files disagree.
 
-Each file is read by the module of its form's row; edges make a FrameTree while everything stands still, and a
-TransformBuffer once something moves.  The forms themselves are not known here.
+Each file is read by the module of its format; edges become a FrameTree while everything is static, and a
+TransformBuffer once something moves.  This module does not know the formats themselves.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ OWN = ("yaml", "json")
 
 
 class FrameFile(InputFile):
-    """A file of frames and its form."""
+    """A file of frames and its format."""
 
-    cameras: Mapping[str, Camera] = MappingProxyType({})  # in a tree of ours, by their frames
+    cameras: Mapping[str, Camera] = MappingProxyType({})  # in a frametool tree, by their frames
 
     def __init__(
         self,
@@ -70,10 +70,10 @@ class FrameFile(InputFile):
         answers: Answers = Answers(),  # noqa: B008 - it is frozen
         reads: Sequence[str] = ("tree",),
     ) -> None:
-        """Open a file, a bag's folder, or standard input for `-`, and find its form, unless it is told.
+        """Open a file, a bag's folder, or standard input for `-`, and detect its format, unless it is set.
 
-        stream: what was opened already, with nothing of it read.  topics: those of a recording that are read.
-        answers: what the form may leave open.  reads: of what its form may be, as the table says it.
+        stream: an opened stream, not yet read.  topics: of a recording, to be read.
+        answers: options for what the format does not specify.  reads: restricts the formats, as in the table.
         Raises FileProblem.
         """
         folder = found if (found := of_folder(str(path))) and form in (None, "", found) else None
@@ -93,19 +93,19 @@ class FrameFile(InputFile):
 
     @classmethod
     def inline(cls, source: Source) -> FrameFile:
-        """Take a tree that is written on the command line or was read already."""
+        """Create from a tree written on the command line or already read."""
         made = cls(source.name, BytesIO(), "yaml")
         made.text = source.text
         return made
 
     @property
     def holds_samples(self) -> bool:
-        """Tell a recording from a tree in YAML or JSON."""
+        """Return True for a recording, False for a tree in YAML or JSON."""
         return "records" not in FORMATS[self.form].reads
 
     @property
     def required_options(self) -> tuple[str, ...]:
-        """Name what the file leaves open; of a table frames too where no columns name them, of poses in recordings."""
+        """Return what the file does not specify; of tables also frames without columns, of recordings those of poses."""
         row = FORMATS[self.form]
         if self.form in ("csv", "tsv", "semicolon"):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
@@ -114,18 +114,18 @@ class FrameFile(InputFile):
 
     @property
     def known(self) -> str:
-        """Return what the file was taken for, and by what it was known, unless that was told."""
+        """Return the detected format and its sign, unless the format was set."""
         return f"{self.name}: {FORMATS[self.form].summary}{f', known by {self.known_by}' if self.known_by else ''}"
 
     @property
     def stated(self) -> str:
-        """Say what was assumed of a file that was read, or left out; "" where it says all itself."""
+        """Return what was assumed about a file that was read, or omitted; "" if it is complete."""
         return f"{self.name}: {self.tally.assumed}" if self.tally.assumed else ""
 
     def edges(
         self, report: Report = stop, *, tell: bool = True, normalize: bool = False
     ) -> Iterator[Edge]:
-        """Yield the edges in the order they were written, then warn of what was odd; otherwise as `pieces`."""
+        """Yield the edges in the order of the file, then emit warnings; otherwise as `pieces`."""
         for piece in self.pieces(report, tell=tell, normalize=normalize):
             if isinstance(piece, Edge):
                 yield piece
@@ -135,11 +135,11 @@ class FrameFile(InputFile):
     def pieces(
         self, report: Report = stop, *, tell: bool = True, normalize: bool = False
     ) -> Iterator[Edge | Samples | EdgeColumns]:
-        """Yield edges, one by one or in bulk, in the order they were written.
+        """Yield edges, one by one or in bulk, in the order of the file.
 
-        report: takes the errors, and reading goes on behind them where it can; without it the first one is raised.
-        tell: without it what was odd is only kept, in `tally`.
-        normalize: take any non-zero quaternion and any matrix near a rotation.
+        report: receives errors, and reading continues after them if possible; without it the first one is raised.
+        tell: emit warnings; without it they are only collected, in `tally`.
+        normalize: accept any non-zero quaternion and any matrix near a rotation.
         """
         try:
             options = Options(self.tally, self.topics, report, normalize, self.answers)
@@ -157,17 +157,17 @@ class FrameFile(InputFile):
             self.tell()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Let a tree that still reads cameras of it pass to another process."""
+        """Allow pickling a tree that still reads its cameras."""
         return {key: each for key, each in vars(self).items() if key != "stream"}
 
     def _take_cameras(self) -> None:
-        """Keep the cameras of a tree of ours, which was read without a fault."""
+        """Store the cameras of a frametool tree that was read without errors."""
         from frametool.formats.cameras import cameras_of
 
         self.cameras = {name: make() for name, make in cameras_of(self).items()}
 
     def tell(self) -> None:
-        """Warn of what was odd in the file, once it was read."""
+        """Emit the warnings about the file, once it was read."""
         found: dict[str | Finding, list[Finding]] = {}
         for told in self.tally.told():
             found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
@@ -176,7 +176,7 @@ class FrameFile(InputFile):
 
 
 def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
-    """Return files that are opened one after the other; where one cannot be, the others are closed again."""
+    """Open files one after another; if one cannot be opened, close the others."""
     found: list[FrameFile] = []
     try:
         found.extend(files)
@@ -189,14 +189,14 @@ def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
 
 
 def close_all(files: Iterable[Source | FrameFile]) -> None:
-    """Let go of files, those among them that were not read."""
+    """Close files that were not read."""
     for file in files:
         if isinstance(file, FrameFile):
             file.close()
 
 
 def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
-    """Raise the error for a joint that options or files told of and that none of the files has, once all were read."""
+    """Raise the error for a joint in options or files that no file has, once all were read."""
     told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
     robots = [file.tally for file in files if file.tally.robot is not None]
     if told and not robots:
@@ -208,19 +208,19 @@ def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
 
 
 def _about_folder(path: str) -> str:
-    """Return why a folder is not read, and which of its files would be."""
+    """Return why a folder is not read, and which of its files could be."""
     bags = tuple(suffix for row in FORMATS.values() if row.reader == BAG for suffix in row.suffixes)
     files = sorted(name for name in os.listdir(path) if name.endswith(bags))[:5]
     return f"a folder without metadata.yaml; name a file in it: {', '.join(files)}" if files else "is a directory"
 
 
 class Rules(NamedTuple):
-    """How frames are taken that move, and rotations that are not quite rotations.
+    """How moving frames are read, and rotations that are not exact.
 
-    moving: an edge with one stamp answers only that instant, as in tf2; otherwise it stands still
-    keep_ns: as TransformBuffer has it
-    normalize: any non-zero quaternion and any matrix near a rotation is taken
-    earth: what the Earth's frame is called; "" as it is said first, `ecef` or `earth`
+    moving: an edge with one stamp is valid only at that time, as in tf2; otherwise it is static
+    keep_ns: as for TransformBuffer
+    normalize: accept any non-zero quaternion and any matrix near a rotation
+    earth: the name of the Earth's frame; "" for the first one used, `ecef` or `earth`
     """
 
     moving: bool = False
@@ -230,7 +230,7 @@ class Rules(NamedTuple):
 
 
 class Replaced(NamedTuple):
-    """A sample that took the place of another one at the same stamp."""
+    """A sample that replaced another one at the same stamp."""
 
     parent: str
     child: str
@@ -240,49 +240,49 @@ class Replaced(NamedTuple):
 
 
 class TreeBuilder:
-    """What has been read so far, and where the first word on each frame stood."""
+    """The edges read so far, and the place where each frame was first defined."""
 
-    has_cameras = False  # whether files are worth a look for them
+    has_cameras = False  # whether files need to be searched for them
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
-        """Create an empty builder; `name` says in messages where they come from."""
+        """Create an empty builder; `name` is that of the source, for messages."""
         self.name = name
         self.rules = rules or Rules()
-        self.earth, self._one_earth = self.rules.earth, False  # its name, and whether an edge to itself was told
+        self.earth, self._one_earth = self.rules.earth, False  # the Earth's name; warned of an edge to itself
         self.tree = FrameTree(name)
         self.buffer: TransformBuffer | None = None
-        self._first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> what was said first
-        self._places: dict[str, dict[int, EdgePlace]] = {}  # child -> stamp -> where that sample stood
+        self._first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
+        self._places: dict[str, dict[int, EdgePlace]] = {}  # child -> stamp -> the place of that sample
         self._replaced: list[Replaced] = []
-        self._stamps: dict[str, int] = {}  # child -> its one stamp, while it has no other
+        self._stamps: dict[str, int] = {}  # child -> its only stamp, while it has no other
         self._moves: set[str] = set()
-        self._late: set[str] = set()  # children whose samples are told to go back in time
-        self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were taken in one piece
-        self.axes: dict[str, str] = {}  # frame -> the axes of the camera it is
-        self.covariances: dict[str, Components] = {}  # child -> how uncertain its edge is
-        self.drawn: dict[str, str] = {}  # child -> what a drawing says of its edge
+        self._late: set[str] = set()  # children with a warning that their samples go back in time
+        self._whole: dict[str, list[SamplesOfFile]] = {}  # child -> samples that were read in one piece
+        self.axes: dict[str, str] = {}  # frame -> the axes of its camera
+        self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
+        self.drawn: dict[str, str] = {}  # child -> the label of its edge in a drawing
 
     @property
     def places(self) -> dict[str, EdgePlace]:
-        """Return where each frame that has a parent was first said to hang from it."""
+        """Return the place where each frame was first defined with its parent."""
         return {child: place for child, (_, _, place) in self._first.items()}
 
     def add_root(self, frame: str) -> None:
-        """Make a frame known that has no parent (yet)."""
+        """Add a frame that has no parent (yet)."""
         (self.tree if self.buffer is None else self.buffer).add_root(frame)
 
     def renames(self, *names: str | None) -> bool:
-        """Return True if the Earth's frame is among names by that of its two that did not come first."""
+        """Return True if names include the second of the two names of the Earth's frame."""
         if not self.earth:
             self.earth = next((name for name in names if name and name in EARTH_FRAMES), "")
         return any(name in EARTH_FRAMES and name != self.earth for name in names)
 
     def one_name(self, frame: str) -> str:
-        """Return a name, the Earth's as it is here."""
+        """Return a name, that of the Earth's frame as in this tree."""
         return self.earth if frame in EARTH_FRAMES else frame
 
     def add_edge(self, edge: Edge, place: EdgePlace) -> None:
-        """Add an edge, or a root; one between the two names of the Earth's frame must be nothing."""
+        """Add an edge, or a root; an edge between the two names of the Earth's frame must be the identity."""
         parent, child = edge.parent, edge.child
         if (parent in EARTH_FRAMES or child in EARTH_FRAMES) and self.renames(parent, child):
             parent, child = parent and self.one_name(parent), self.one_name(child)
@@ -319,7 +319,7 @@ class TreeBuilder:
             self._keep_covariance(parent, child, place)
 
     def _keep_covariance(self, parent: str, child: str, place: EdgePlace) -> None:
-        """Keep the covariance of an edge; raises BadTopology with both places where it is not the one said before."""
+        """Store the covariance of an edge; raises BadTopology with both places if it differs from the previous one."""
         first = self._first[child][2]
         if place.edge.covariance != first.edge.covariance:
             error = topology.two_covariances(parent, child, first.edge.covariance, place.edge.covariance)
@@ -328,7 +328,7 @@ class TreeBuilder:
             self.covariances[child] = place.edge.covariance
 
     def add_samples(self, placed: SamplesOfFile) -> None:
-        """Add the poses of one frame: in one piece where nothing can be wrong with their order, else one by one."""
+        """Add the poses of one frame: in one piece if their order is known to be correct, else one by one."""
         parent, child, stamps_ns, components, _ = placed.samples
         if not stamps_ns:
             return
@@ -350,14 +350,14 @@ class TreeBuilder:
             self.add(parent, child, pose, stamp_ns, placed.place(at))
 
     def add_columns(self, file: FrameFile, columns: EdgeColumns) -> None:
-        """Add edges: what only goes on with its frame comes in whole, frame by frame, the rest one by one."""
+        """Add edges: samples of known frames in bulk, frame by frame, the others one by one."""
         pairs = [*zip(columns.parents, columns.children, strict=True)]
         rows: dict[tuple[str, str], list[tuple[int, Rigid, int]]] = {pair: [] for pair in pairs}
         for pair, row in zip(pairs, zip(*columns[2:5], strict=True), strict=True):
             rows[pair].append(row)
         found = {pair: Samples(*pair, *zip(*each, strict=True)) for pair, each in rows.items()}
         whole = {}
-        if all(self._goes_on(*pair) for pair in found):  # with a new edge among them their order decides on cycles
+        if all(self._goes_on(*pair) for pair in found):  # the order of new edges matters for cycles
             whole = {pair: samples for pair, samples in found.items() if self._takes_whole(samples)}
         for samples in whole.values():
             self.add_samples(SamplesOfFile(file, samples))
@@ -366,12 +366,12 @@ class TreeBuilder:
                 self.add(*pair, edge.components, edge.stamp_ns, EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
-        """Return True if a frame is known to move, now in this parent."""
+        """Return True if a frame is known to move and is in this parent now."""
         track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
         return track is not None and not track.is_static and track.parent == parent
 
     def _takes_whole(self, samples: Samples) -> bool:
-        """Return True if samples can only follow what is known: of a frame that is new or moves in the same parent."""
+        """Return True if samples are all later than known ones: of a new frame, or one moving in the same parent."""
         if self.rules.keep_ns is not None or len(samples.stamps_ns) == 1 or samples.child in self.covariances:
             return False
         track = None if self.buffer is None else self.buffer.track(samples.child)
@@ -383,7 +383,7 @@ class TreeBuilder:
         return follows and all(map(lt, samples.stamps_ns, islice(samples.stamps_ns, 1, None)))
 
     def _place_before(self, child: str, stamp_ns: int) -> EdgePlace | None:
-        """Find where the sample of a stamp stood among those taken in one piece."""
+        """Return the place of the sample at a stamp among those read in one piece."""
         for placed in self._whole.get(child, ()):
             at = bisect_left(placed.samples.stamps_ns, stamp_ns)
             if at < len(placed.samples.stamps_ns) and placed.samples.stamps_ns[at] == stamp_ns:
@@ -408,7 +408,7 @@ class TreeBuilder:
         return made
 
     def _moving(self) -> TransformBuffer:
-        """Return the buffer; at the first stamp it takes over what stands still."""
+        """Return the buffer; at the first stamp it receives the static edges."""
         if self.buffer is None:
             from frametool.frames.buffer import TransformBuffer
 
@@ -423,11 +423,11 @@ class TreeBuilder:
         self, buffer: TransformBuffer, parent: str, child: str, components: Rigid, stamp_ns: int | None,
         place: EdgePlace,
     ) -> None:
-        """Add a sample, or a standing edge beside samples."""
+        """Add a sample, or a static edge next to samples."""
         track = buffer.track(child)
         settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
         if track is not None and settled and (track.parent, track.components) == (parent, components):
-            return  # said again, once with and once without a stamp
+            return  # a duplicate, once with and once without a stamp
         self._first.setdefault(child, (parent, components, place))
         if stamp_ns is not None and self._stamps.setdefault(child, stamp_ns) != stamp_ns:
             self._moves.add(child)
@@ -440,7 +440,7 @@ class TreeBuilder:
             places[stamp_ns] = place
 
     def _tell_replaced(self, standing: set[str], most: int = 10) -> None:
-        """Refuse standing frames with two values; warn of moving ones with two poses at one stamp."""
+        """Refuse static frames with two values; warn about moving ones with two poses at one stamp."""
         from frametool.frames.stamps import format_stamp
 
         for each in self._replaced:
@@ -455,7 +455,7 @@ class TreeBuilder:
             warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
 
     def _standing_tree(self, buffer: TransformBuffer) -> FrameTree:
-        """Return all that stands still as a tree, held to a tree's rules."""
+        """Return all static edges as a tree, which checks its rules."""
         tree = FrameTree(self.name)
         for frame in buffer.frames:
             tree.add_root(frame)
@@ -468,7 +468,7 @@ class TreeBuilder:
         return tree
 
     def _placed(self, error: BadTopology, parent: str, child: str, place: EdgePlace) -> FormatError:
-        """Make the error for a place; where it contradicts what was said before, both places are named."""
+        """Return the error for a place; if it contradicts an earlier definition, both places are named."""
         known = self._first.get(child)
         if error.rule in ("cycle", "self") or known is None or known[2] is place:
             return place.error(str(error), BadTopology)
@@ -479,19 +479,19 @@ class TreeBuilder:
 
 
 class EdgePlace(NamedTuple):
-    """Where an edge was read."""
+    """The place where an edge was read."""
 
     file: FrameFile
     edge: Edge
 
     def error(self, message: str, kind: type[FormatError]) -> FormatError:
-        """Make the error for this place."""
+        """Return the error for this place."""
         if self.edge.path:
             return format_error(self.file.source, self.edge.path, message, error=kind)
         return kind(message, source=self.file.name, line=self.edge.line)
 
     def seen_from(self, other: EdgePlace) -> str:
-        """Name this place beside another one: `line 7`, or `other.yaml:7` in another file."""
+        """Format this place relative to another one: `line 7`, or `other.yaml:7` in another file."""
         line = locate(self.file.text, self.edge.path)[0] if self.edge.path else self.edge.line
         return f"line {line}" if other.file.name == self.file.name else f"{self.file.name}:{line}"
 
@@ -503,7 +503,7 @@ class SamplesOfFile(NamedTuple):
     samples: Samples
 
     def place(self, at: int) -> EdgePlace:
-        """Return where one of them was read."""
+        """Return the place of one of them."""
         parent, child, stamps_ns, _, lines = self.samples
         return EdgePlace(self.file, Edge(parent, child, IDENTITY, stamps_ns[at], lines[at]))
 
@@ -521,13 +521,13 @@ def load(
 ) -> FrameTree | TransformBuffer:
     """Read one or several files of frames and merge them: a FrameTree, or a TransformBuffer if anything moves.
 
-    paths: files in any form that `frametool.FORMATS` reads a tree from; `-` is standard input.  format: its name there.
-    moving: an edge with a single stamp answers only that instant; otherwise it counts as standing.
-    keep_ns: as TransformBuffer has it.  topics: those of a recording that are read  [default: all].
-    normalize: take any non-zero quaternion and any matrix near a rotation.
-    joints: values by name (radians, metres, or text with a unit), or a file of them.  frames: names of those that a
-    form does not name, as (world, body).  answers: direction, camera_axes, dh, stamps as in `frametool.formats.table`.
-    Raises FormatError, Unanswered and BadTopology with file, line and column; FileProblem.
+    paths: files in any format of `frametool.FORMATS` that has trees; `-` is standard input.  format: its name there.
+    moving: an edge with a single stamp is valid only at that time; otherwise it is static.
+    keep_ns: as for TransformBuffer.  topics: of a recording, to be read  [default: all].
+    normalize: accept any non-zero quaternion and any matrix near a rotation.
+    joints: values by name (radians, metres, or text with a unit), or a file of them.  frames: names of frames that the
+    format does not name, as (world, body).  answers: direction, camera_axes, dh, stamps as in
+    `frametool.formats.table`. Raises FormatError, Unanswered and BadTopology with file, line and column; FileProblem.
     """
     rules = Rules(moving=moving, keep_ns=keep_ns, normalize=normalize)
     chosen = tuple(topics)
@@ -553,7 +553,7 @@ def load_sources(
 ) -> FrameTree | TransformBuffer:
     """Merge the frames of several texts and files; otherwise as `load`.
 
-    places: is filled with where each frame was first said to hang from its parent
+    places: is filled with the place where each frame was first defined
     """
     builder = TreeBuilder(", ".join(source.name for source in sources), rules)
     try:
@@ -571,7 +571,7 @@ def load_sources(
 
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
-    """Add to a tree the robots of its files, and cameras: of trees of ours now, of others when one is asked for."""
+    """Add to a tree the robots of its files, and cameras: those of frametool trees now, others on demand."""
     others = [file for file in files if FORMATS[file.form].cameras]
     tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
@@ -586,7 +586,7 @@ def _read_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile])
 
 
 def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
-    """Return file and line of many places, each file walked once; 0 where a line says nothing."""
+    """Return file and line of many places; each file is scanned once; 0 if the line is unknown."""
     lines: dict[int, int] = {}
     for file in {id(each.file): each.file for each in places}.values():
         inside = [each for each in places if each.file is file and each.edge.path]

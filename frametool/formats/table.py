@@ -1,4 +1,4 @@
-"""Bytes to records and back: one file a form of text, and the one table of them."""
+"""The table of all file formats, and their modules."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 
 class Poses(NamedTuple):
-    """How a form writes its poses.
+    """How a format writes its poses.
 
-    rotation: the notation of the numbers behind the position
-    inverse: what is written is the pose of the world in the thing, not of the thing in the world
-    axes: those of a camera, `optical` or `opengl`
-    frames: how the two are called where nothing says so
-    counted: what the numbers are that stand in for stamps; "" where rows have stamps
+    rotation: the notation of the numbers after the position
+    inverse: the file has the pose of the world in the body, not of the body in the world
+    axes: of a camera, `optical` or `opengl`
+    frames: default names of world and body
+    counted: what the numbers are that replace stamps; "" if rows have stamps
     """
 
     rotation: str
@@ -24,26 +24,25 @@ class Poses(NamedTuple):
 
 
 class Format(NamedTuple):
-    """A form of text: what it holds, how it is recognised, and the modules that read and write it.
+    """A file format: its content, how it is recognised, and the modules that read and write it.
 
-    summary: what it is, in a line
-    suffixes: of files in this form; names: what files are called to which it is written
+    summary: a description in one line
+    suffixes: of files in this format; names: file names for which it is written
     reads: what is read from it: `tree` by `read` of `reader`, `joints` (values by name) by its `read_joints`;
         `records` and `rows` by the streams, columns of numbers as `arrays` by its `open_columns`; `trajectory`: it
-        holds one frame that moves; a `drawing`: who hangs under whom without poses, by `read`, for `tree` alone
+        holds one moving frame; a `drawing`: edges without poses, by `read`, for `tree` alone
     writes: what is written in it, by `write_poses` (also a `trajectory`: the poses of one frame over time),
-        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; where all poses
-        are written alike, `ROWS` of `writer` (a RowForm, or one for each format) says how, in the place of
-        `write_poses`; as messages of a
-        `recording`, whose trees `tree_pieces` of `writer` yields
-    magic: how it begins, as (kind, what); `frametool.formats.detect` knows the kinds
-    conventions: what its numbers mean (which frame in which, units, order), told when such a file was read
-    required_options: the options that say what it leaves open
-    not_stored: what a tree written in it may have had and it does not hold, told then
-    delimiter: what stands between the cells of its rows, "" for blanks; None where it has no such rows
-    columns: what its rows hold, in order, where no header says so; widths: how many of them, where others are refused
-    poses: what its rows mean
-    texts: whether columns of texts have a place among its `arrays`; cameras: whether it may hold intrinsics too
+        `write_points` (also for a `report`), `write_tree` of `writer`; as `arrays` by its `create`; if all poses
+        are written alike, `ROWS` of `writer` (a RowForm, or one for each format) replaces `write_poses`; as messages
+        of a `recording`, whose trees are written by `tree_pieces` of `writer`
+    magic: how it begins, as (kind, what); `frametool.formats.detect` defines the kinds
+    conventions: the meaning of its numbers (frames, units, order)
+    required_options: the options for what it does not specify
+    not_stored: what a tree loses in this format, for a warning
+    delimiter: between the cells of its rows, "" for blanks; None if it has no such rows
+    columns: of its rows, in order, if there is no header; widths: allowed numbers of columns, if others are refused
+    poses: the meaning of its rows
+    texts: whether its `arrays` may have text columns; cameras: whether it may hold intrinsics too
     """
 
     summary: str
@@ -71,24 +70,24 @@ class Format(NamedTuple):
 
 
 def _trajectory(summary: str, reader: str, **fields: Any) -> Format:
-    """Return the row of a form that lists poses of one frame, all written alike."""
+    """Return the row of a format that lists poses of one frame, all written alike."""
     known: dict[str, Any] = {"reader": reader, "required_options": ("frames", "stamps", "camera_axes")}
     known |= {"reads": ("tree", "trajectory", "rows"), "writes": ("poses", "trajectory")}
     return Format(summary, writer="frametool.formats.rows.pose_rows", **known | fields)
 
 
 def _tree(summary: str, module: str, **fields: Any) -> Format:
-    """Return the row of a form of trees that one module reads and writes."""
+    """Return the row of a format of trees that one module reads and writes."""
     return Format(summary, reads=("tree",), reader=module, writes=("tree",), writer=module, **fields)
 
 
 def _read_tree(summary: str, module: str, **fields: Any) -> Format:
-    """Return the row of a form of trees that one module reads and none writes."""
+    """Return the row of a format of trees that is only read."""
     return Format(summary, reads=("tree",), reader=module, **fields)
 
 
 def _drawing(summary: str, module: str, **fields: Any) -> Format:
-    """Return the row of a form that says how frames hang together and nothing of where they are."""
+    """Return the row of a format with edges but without poses."""
     conventions = "parent -> child, no poses"
     return Format(
         summary, reads=("drawing",), reader=module, writes=("tree",), writer=module, conventions=conventions, **fields
@@ -98,11 +97,11 @@ def _drawing(summary: str, module: str, **fields: Any) -> Format:
 def _arrays(
     summary: str, module: str, *, writes: tuple[str, ...] = ("poses", "points", "arrays"), **fields: Any
 ) -> Format:
-    """Return the row of a form of columns of numbers that one module reads and writes."""
+    """Return the row of a format of columns of numbers that one module reads and writes."""
     return Format(summary, reads=("arrays",), reader=module, writes=writes, writer=module, **fields)
 
 
-# what options say about files whose form leaves it open
+# options for what the format of a file does not specify
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
 DH = ("standard", "modified")
@@ -168,8 +167,8 @@ FORMATS = {
         reader=_TREE, writes=("poses", "points", "tree", "report"), writer="frametool.formats.trees.written_poses",
         magic=(
             ("own key", "frames|children"),
-            ("line", r"\{ *[A-Za-z_][\w.]*: "),  # no JSON, whatever the suffix says: its keys have quotes
-            # a header of CSV whose first column ends in a colon is no key
+            ("line", r"\{ *[A-Za-z_][\w.]*: "),  # not JSON, whatever the suffix: its keys have quotes
+            # a CSV header whose first column ends in a colon is not a key
             ("header", r"""(?!(?!.*(?:[{\[]|: )).*,)(?:---(?:\s|$)|%YAML|- |(?:[\w./-]+|"[^"\n]*"):(?:\s|$)|[\[{])"""),
         ),
     ),
@@ -406,47 +405,47 @@ FORMATS = {
 
 
 def readers(*what: str) -> tuple[str, ...]:
-    """Name the forms from which any of `tree`, `records` and `rows` is read."""
+    """Return the formats from which any of `tree`, `records` and `rows` is read."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
 
 
 def writers(*what: str) -> tuple[str, ...]:
-    """Name the forms in which any of `poses`, `points`, a `trajectory`, a `tree` or a `report` is written."""
+    """Return the formats in which any of `poses`, `points`, a `trajectory`, a `tree` or a `report` is written."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.writes))
 
 
 def is_trajectory(name: str) -> bool:
-    """Return True if a form is that of the poses of one frame over time, and of nothing else."""
+    """Return True if a format holds the poses of one frame over time, and nothing else."""
     return name in FORMATS and "trajectory" in FORMATS[name].reads
 
 
 def holds_arrays(name: str) -> bool:
-    """Return True if a form holds columns of numbers and no text."""
+    """Return True if a format holds columns of numbers and no text."""
     return name in FORMATS and "arrays" in (*FORMATS[name].reads, *FORMATS[name].writes)
 
 
 def is_recording(name: str) -> bool:
-    """Return True if a form is written as a recording of messages."""
+    """Return True if a format is written as a recording of messages."""
     return name in FORMATS and "recording" in FORMATS[name].writes
 
 
 def has_no_text(name: str) -> bool:
-    """Return True if a form holds numbers, in columns or messages, and nothing of how its input was written."""
+    """Return True if a format holds numbers, in columns or messages, without the notation of its input."""
     return holds_arrays(name) or is_recording(name)
 
 
 def is_folder(name: str) -> bool:
-    """Return True if a form is written as a folder of files."""
+    """Return True if a format is written as a folder of files."""
     return is_recording(name) and any(kind == "folder" for kind, _ in FORMATS[name].magic)
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
-    """Return which of some forms is written to a file of this name: by the whole name, then by its suffix."""
+    """Return which of several formats is written to a file of this name: by the whole name, then by its suffix."""
     last = os.path.basename(path or "")
     return next((name for name in names if last in FORMATS[name].names), None) or by_suffix(path, names)
 
 
 def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
-    """Return which of some forms the suffix of a file stands for, if any."""
+    """Return which of several formats has the suffix of a file, if any."""
     told = os.path.splitext(path or "")[1].lower()
     return next((name for name in names if told in FORMATS[name].suffixes), None)

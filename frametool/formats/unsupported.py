@@ -1,6 +1,6 @@
-"""Files that are recognised and not read: by which sign, and what to do instead.
+"""Formats that are recognised but not supported: their signs, and what to do instead.
 
-The one table of them: forms that frametool never read, and those that it read or wrote before 0.2.0.
+The only table of them: formats that were never supported, and those that were before 0.2.0.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from frametool.errors import ValueInvalid
 
 
 class Unsupported(NamedTuple):
-    """A form that is neither read nor written.
+    """A format that is neither read nor written.
 
-    summary: what it is; remedy: what to do instead
+    summary: a description; remedy: what to do instead
     magic, suffixes: how it is recognised, as in `frametool.formats.table`
     was_written: files with its suffix were written before 0.2.0
     """
@@ -26,7 +26,7 @@ class Unsupported(NamedTuple):
     was_written: bool = False
 
     def __str__(self) -> str:
-        """Return what it is and what to do, in one line."""
+        """Return the description and the remedy in one line."""
         return f"{self.summary}: {self.remedy}"
 
 
@@ -140,13 +140,13 @@ UNSUPPORTED = {
 
 
 def unsupported_by_suffix(path: str) -> str | None:
-    """Return the form that the suffix of a file stands for, if it is one of these."""
+    """Return the unsupported format with the suffix of a file, if any."""
     suffix = os.path.splitext(path)[1].lower()
     return next((name for name, row in UNSUPPORTED.items() if suffix in row.suffixes), None)
 
 
 def refuse_suffix(path: str) -> None:
-    """Raise ValueInvalid for a file to be written whose suffix stands for a form that was written before 0.2.0."""
+    """Raise ValueInvalid for an output file whose suffix belongs to a format that was written before 0.2.0."""
     name = unsupported_by_suffix(path)
     if name and UNSUPPORTED[name].was_written:
         raise ValueInvalid(f"{path}: {UNSUPPORTED[name]}")

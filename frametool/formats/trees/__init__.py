@@ -1,1 +1,1 @@
-"""Forms that hold a few poses of named frames, one file a form: read into edges of a tree, some of them written too."""
+"""Formats with a few poses of named frames, one file per format: read into edges of a tree, some also written."""

@@ -1,4 +1,4 @@
-"""Autoware's calibration of sensors: a map of frames, in it the poses of others, six numbers each.
+"""Autoware's sensor calibration: a map of frames with the poses of others in them, six numbers each.
 
     base_link:
       sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}
@@ -32,7 +32,7 @@ KEYS = (*XYZ, *_RPY.columns)
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a pose."""
+    """Yield one edge per pose."""
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
         for parent, children in as_mapping(value, "frames with the poses of others in them").items():
@@ -60,7 +60,7 @@ def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a map a parent; raises ValueInvalid for frames that move."""
+    """Return one map per parent; raises ValueInvalid for moving frames."""
     precision = Precision(NAME, "x y z roll pitch yaw")
     texts: dict[str, list[str]] = {}
     for parent, child, pose in static_edges(tree, NAME):

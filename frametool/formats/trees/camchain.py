@@ -1,15 +1,15 @@
-"""Camera chains of Kalibr, OpenVINS and okvis, sensors of EuRoC: 4x4 matrices; what they do stands in their key.
+"""Camera chains of Kalibr, OpenVINS and okvis, sensors of EuRoC: 4x4 matrices whose keys state the frames.
 
     cam0:
-      T_cam_imu: [[..], [..], [..], [0.0, 0.0, 0.0, 1.0]]     Kalibr: takes points of the IMU to the camera
+      T_cam_imu: [[..], [..], [..], [0.0, 0.0, 0.0, 1.0]]     Kalibr: maps points of the IMU to the camera
       T_imu_cam: ..                                           OpenVINS: its inverse, the pose of the camera in the IMU
     cam1:
-      T_cn_cnm1: ..                                           from cam0 to cam1; beside T_cam_imu only a check
+      T_cn_cnm1: ..                                           from cam0 to cam1; only a check if T_cam_imu is there
     cameras: [{T_SC: [16 numbers]}, ..]                       okvis: the pose of the camera in the sensor, its IMU
     T_BS: {rows: 4, cols: 4, data: [16 numbers]}              EuRoC: the pose of the sensor in the body
 
-Metres, row-major.  The cameras hang under the IMU: `imu`, or okvis' `body`.  The sensor of a sensor.yaml is called as
-its folder: mav0/cam0/sensor.yaml.
+Metres, row-major.  The parent of the cameras is the IMU: `imu`, or okvis' `body`.  The sensor of a sensor.yaml has the
+name of its folder: mav0/cam0/sensor.yaml.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _CAMERA = r"cam([0-9]+)"
 
 
 def read(file: FrameFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a camera, and check what is stated twice; of a sensor.yaml the one edge."""
+    """Yield one edge per camera, and check duplicates; of a sensor.yaml the only edge."""
     frames = options.answers.frames
     naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames, blocks=frames[1:])
     expected, nothing = "blocks of cameras", "a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC"
@@ -58,7 +58,7 @@ def read(file: FrameFile, options: Options) -> Iterator[Edge]:
 
 
 def sensor_name(path: str) -> str:
-    """Return what a sensor is called by its file: the folder of a sensor.yaml, else the name of the file."""
+    """Return the name of a sensor from its file: the folder of a sensor.yaml, else the name of the file."""
     if path == "-":
         return "sensor"
     folder, name = os.path.split(os.path.abspath(path))
@@ -67,9 +67,9 @@ def sensor_name(path: str) -> str:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a block a camera; raises ValueInvalid for several trees, and for frames that move.
+    """Return one block per camera; raises ValueInvalid for several trees, and for moving frames.
 
-    Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of cameras alone,
+    Cameras of an IMU get both directions: Kalibr reads T_cam_imu, OpenVINS T_imu_cam.  A tree of only cameras,
     cam0, cam1 .., gets T_cn_cnm1.
     """
     edges = static_edges(tree, NAME)
@@ -87,7 +87,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def _tell(root: str, edges: list[tuple[str, str, Rigid]]) -> None:
-    """Warn of what a camchain does not say or Kalibr does not read."""
+    """Warn about what a camchain does not store or Kalibr does not read."""
     if root != "imu":
         warn(f"{NAME} has no name for its root {shown(root)}; read it back with --frames {root}")
     if deeper := [child for parent, child, _ in edges if parent != root]:
@@ -97,7 +97,7 @@ def _tell(root: str, edges: list[tuple[str, str, Rigid]]) -> None:
 
 
 def _star(tree: Frames, root: str, precision: Precision, style: Style) -> str:
-    """Write every frame as seen from the root, in both directions."""
+    """Write every frame relative to the root, in both directions."""
     text = ""
     for frame in tree.frames:
         if frame != root:
@@ -110,7 +110,7 @@ def _star(tree: Frames, root: str, precision: Precision, style: Style) -> str:
 
 
 def _chain(tree: Frames, cameras: list[str], precision: Precision, style: Style) -> str:
-    """Write every camera as seen from the next; Kalibr's first camera has no pose."""
+    """Write every camera relative to the next; Kalibr's first camera has no pose."""
     text, before = "", ""
     for frame in sorted(cameras, key=lambda name: int(name[3:])):
         text += f"{frame}:\n"

@@ -1,10 +1,10 @@
-r"""Drawings of trees for graphviz and mermaid: a node a frame, an arrow from parent to child with its pose.
+r"""Drawings of trees for graphviz and mermaid: one node per frame, an arrow from parent to child with its pose.
 
     "base" -> "camera" [label="xyz 0.1 0.0 1.2\nrpy 0.0 15.0 0.0 deg"];               dot
     n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]             mermaid
 
-Metres and degrees.  In graphviz, frames that move are drawn as ROS's view_frames does: who is whose parent, how often,
-and over which time.  That is also read of graphviz: an arrow goes from parent to child, and poses there are none.
+Metres and degrees.  In graphviz, moving frames are drawn as ROS's view_frames does: parents, rates and time spans.
+Graphviz can also be read: an arrow goes from parent to child; there are no poses.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 _WORD = r"""("(?:[^"\\]|\\.)*+"|[A-Za-z_\d./]++)"""
 _ARROW = rf"""{_WORD}\s*->\s*(?={_WORD}\s*(\[(?:[^\]"]|"(?:[^"\\]|\\.)*+")*+\])?)"""
-_SETTING = ("graph", "node", "edge")  # words of graphviz that are no names
+_SETTING = ("graph", "node", "edge")  # words of graphviz that are not names
 _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most recent transform:\s*([\d.]+)")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the frames and edges of a digraph; what it says of each goes to the tally, the poses are none."""
+    """Yield the frames and edges of a digraph; their labels are recorded in the tally, there are no poses."""
     text = re.sub(r"(?m)^[^\S\n]*//.*$", "", file.text)
     if not text.rstrip().endswith("}"):
         raise FormatError("the drawing ends before its last }; is the file whole?", source=file.name)
@@ -46,7 +46,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _with_lines(pattern: str, text: str) -> Iterator[tuple[re.Match[str], int]]:
-    """Yield what a pattern finds in a text, and the line in which its first group begins."""
+    """Yield the matches of a pattern in a text, and the line in which the first group of each begins."""
     line, before = 1, 0
     for match in re.finditer(pattern, text):
         line += text.count("\n", before, match.start(1))
@@ -59,7 +59,7 @@ def _unquoted(word: str) -> str:
 
 
 def _about(attributes: str) -> str:
-    """Return what the label of an arrow says: how often its edge comes, of view_frames; else its words."""
+    """Return the label of an arrow: the rate of its edge, for view_frames; else its text."""
     numbers = [float(found[1]) for pattern in _FACTS if (found := re.search(pattern, attributes))]
     if len(numbers) == len(_FACTS):
         return listed_motion(*numbers)
@@ -82,7 +82,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def _flowchart(tree: Frames, style: Style) -> str:
-    """Return a flowchart; nodes are numbered, because mermaid's ids take few characters."""
+    """Return a flowchart; nodes are numbered, because mermaid's ids allow few characters."""
     ids = {frame: f"n{index}" for index, frame in enumerate(tree.frames)}
     lines = ["flowchart TD"]
     lines += [f'  {ids[frame]}["{_escaped(frame)}"]' for frame in tree.frames]
@@ -93,14 +93,14 @@ def _flowchart(tree: Frames, style: Style) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Write what mermaid or HTML would take for its own as character codes (`#quot;`)."""
+    """Write characters with a meaning in mermaid or HTML as character codes (`#quot;`)."""
     return "".join(
         character if character.isalnum() or character in " _-/.:,+" else f"#{ord(character)};" for character in text
     )
 
 
 def _view_frames(tree: Frames) -> str:
-    """Return the digraph; the legend, which graphviz must hang somewhere, stands above the first root."""
+    """Return the digraph; the legend, which graphviz must attach to something, is above the first root."""
     edges = cache_entries(tree)
     newest = max((each.newest for each in edges), default=0.0)
     lines = ["digraph G {", *map(_edge, edges), "edge [style=invis];"]

@@ -1,4 +1,4 @@
-"""Hand-eye calibrations of easy_handeye and easy_handeye2: where a camera sits on a robot's hand, or beside its base.
+"""Hand-eye calibrations of easy_handeye and easy_handeye2: the pose of a camera on a robot's hand, or at its base.
 
     parameters: {eye_on_hand: true, robot_effector_frame: tool0, tracking_base_frame: camera_link, ..}
     transformation: {x: .., y: .., z: .., qx: .., qy: .., qz: .., qw: ..}
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NAME = "handeye"
 CHILD = "tracking_base_frame"
 EFFECTOR, BASE = "robot_effector_frame", "robot_base_frame"
-# what the parameters say -> which of their frames the camera is seen from
+# a parameter -> the reference frame of the camera
 MOUNTS = {
     "eye_on_hand": {"true": EFFECTOR, "false": BASE},
     "calibration_type": {"eye_in_hand": EFFECTOR, "eye_on_hand": EFFECTOR, "eye_on_base": BASE, "eye_to_hand": BASE},
@@ -44,7 +44,7 @@ _XYZW = notation("xyzw")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the one edge."""
+    """Yield the only edge."""
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
         calibration = as_mapping(value, "parameters and transformation")
@@ -66,7 +66,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _mount(parameters: dict[str, Any]) -> str:
-    """Return the key of the frame that the camera is seen from."""
+    """Return the key of the reference frame of the camera."""
     key = next((key for key in MOUNTS if key in parameters), None)
     if key is None:
         raise Misfit("missing eye_on_hand (easy_handeye) or calibration_type (easy_handeye2)")
@@ -78,7 +78,7 @@ def _mount(parameters: dict[str, Any]) -> str:
 
 
 def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
-    """Read either spelling."""
+    """Read either notation."""
     if "rotation" in pose or "translation" in pose:
         only(pose, ("translation", "rotation"))
         position, rotation = read_rigid(pose, ("translation", "rotation"), reading)
@@ -88,7 +88,7 @@ def _pose(pose: dict[str, Any], reading: Reading) -> Rigid:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return the one edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
+    """Return the only edge of a tree as easy_handeye has it, as if on the hand; raises ValueInvalid for other trees."""
     edges = static_edges(tree, NAME)
     if len(edges) != 1:
         children = listing(child for _, child, _ in edges)
@@ -100,7 +100,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: bool) -> str:
-    """Return the pose of a camera on the hand, or beside the base, as easy_handeye has it."""
+    """Return the pose of a camera on the hand, or fixed to the base, as easy_handeye has it."""
     turned = quaternion.from_quaternion(*pose[3:], floats)
     numbers = zip((*XYZ, *_XYZW.columns), (*pose[:3], *turned), strict=True)
     lines = "".join(f"  {key}: {flow(number, style.number)}\n" for key, number in numbers)

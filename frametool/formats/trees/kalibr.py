@@ -1,14 +1,14 @@
-r"""What Kalibr prints and keeps as results-cam-*.txt and results-imucam-*.txt: poses between cameras and IMUs.
+r"""Kalibr's text results, results-cam-*.txt and results-imucam-*.txt: poses between cameras and IMUs.
 
     baseline T_1_0:
         q: [-0.00087935 -0.00270995 -0.0008824 0.99999555] +- [..]    x y z w, of the inverse rotation
-        t: [-0.02997144 -0.00027389 0.00036353] +- [..]               cam0 as seen from cam1, metres
-    T_ci:  (imu0 to cam0):                                            takes points of imu0 to cam0
+        t: [-0.02997144 -0.00027389 0.00036353] +- [..]               cam0 in cam1, metres
+    T_ci:  (imu0 to cam0):                                            maps points of imu0 to cam0
     Transformation T_cam0_imu0 (imu0 to cam0, T_ci):                  the same
     [[ 0.00852045 .. ]]                                               four rows of four
 
-The q of a baseline turns the other way than the matrix T_cn_cnm1 of the same camchain does: Kalibr's quaternions are
-those of JPL.  Read is what the matrix says; t is the same in both.
+The q of a baseline is the inverse of the matrix T_cn_cnm1 in the same camchain: Kalibr's quaternions are
+those of JPL.  The result agrees with the matrix; t is the same in both.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Edge, Options
 
-# a baseline by its two numbers; a matrix between two frames; one below the number of its IMU
+# a baseline by its two numbers; a matrix between two frames; a matrix below the number of its IMU
 _HEAD = re.compile(
     r"(?im)^[ \t]*(?:(?P<name>baseline T_(?P<to>\d+)_(?P<of>\d+)):|(?:Transformation[ \t]+)?(?P<key>T_\w+|Baseline):?"
     r"[ \t]*\((?P<source>\w+) to (?P<target>\w+)(?:, T_\w+)?\)|(?P<imu>IMU\d+):[ \t\r]*$|(?P<own>T_i_b)[ \t\r]*$)"
@@ -40,7 +40,7 @@ _VECTOR = r"[^\n]*\n(?:[^\n]*\n)??[ \t]*{}:\s*\[([^\[\]]*)\]"
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a camera and IMU; what is stated twice is a check."""
+    """Yield one edge per camera and IMU; duplicates are checked."""
     reading = Reading(file.source, normalize=options.normalize)
     text, lines, stated, imu = file.text, dict[str, int](), list[Stated](), ""
     for head in _HEAD.finditer(text):
@@ -58,7 +58,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             pose = _baseline(text, head, reading) if head["name"] else _matrix(text, head, reading)
         except ValueInvalid as error:
             raise FormatError(f"{label}: {error}", source=file.name, line=lines[label]) from None
-        if target != source:  # as the first IMU says of itself
+        if target != source:  # as the first IMU relative to itself
             child = max(target, source, key=lambda name: (name[:3] == "cam", name[:3], len(name), name))
             both = target[:3] == source[:3] == "cam"
             stated.append(Stated(target, source, child, pose, (label,), chained=both))
@@ -95,7 +95,7 @@ def _matrix(text: str, head: re.Match[str], reading: Reading) -> Rigid:
 
 
 def _named(edges: list[Edge], options: Options, lines: dict[str, int]) -> Iterator[Edge]:
-    """Yield edges under the names that were told: of the IMUs, then of the cameras, by their numbers."""
+    """Yield edges with the names of --frames: of the IMUs, then of the cameras, by their numbers."""
     found = {name: None for each in edges for name in (each.parent or "", each.child)}
     frames = sorted(found, key=lambda name: (name[:3] == "cam", len(name), name))
     if len(told := options.answers.frames) > len(frames):

@@ -1,4 +1,4 @@
-"""Calibrations of KITTI: cameras, lidar and IMU, a name and its numbers a line.
+"""Calibrations of KITTI: cameras, lidar and IMU, a name and its numbers per line.
 
     P0: 718.856 0 607.193 0 0 718.856 185.216 0 0 0 1 0       odometry, object: projection of a rectified camera
     Tr: 12 numbers                                            odometry: cam0<-velo, cam0 rectified
@@ -6,7 +6,7 @@
     R: 9    T: 3                                              raw: cam0<-velo of calib_velo_to_cam, velo<-imu
     R_01: 9    T_01: 3    R_rect_01: 9                        raw calib_cam_to_cam: cam1<-cam0, cam1_rect<-cam1
 
-Metres, row-major; cameras have optical axes.  A projection K [I t] says where its camera stands: at -t.
+Metres, row-major; cameras have optical axes.  A projection K [I t] contains the position of its camera: -t.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ POSES = {
 }
 RECTIFICATIONS = ("R0_rect", "R_rect")
 _NO_NUMBERS = ("calib_time",)
-_COUNTS = (  # pattern of a name, how many numbers it has
+_COUNTS = (  # pattern of a name, number of values
     (r"P[0-3]|P_rect_0\d|Tr\w*", 12),
     (r"R|R_0\d|R0_rect|R_rect(?:_0\d)?|K_0\d", 9),
     (r"T|T_0\d", 3),
@@ -70,7 +70,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 class Calibration:
-    """One file: its lines by name, and what they say."""
+    """One file: its lines by name, and their poses."""
 
     def __init__(self, file: InputFile, options: Options) -> None:
         """Read the lines; raises FormatError."""
@@ -86,12 +86,12 @@ class Calibration:
                     options.report(error)
 
     def named(self, frame: str) -> str:
-        """Return what a frame is called."""
+        """Return the name of a frame."""
         base, rest = (frame[:-5], "_rect") if frame.endswith("_rect") else (frame, "")
         return self.names.get(base, base) + rest
 
     def edges(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield parent, child, pose and line; raises FormatError where there is none."""
+        """Yield parent, child, pose and line; raises FormatError if there are none."""
         if "R" in self.fields or "T" in self.fields:
             yield self._single()
             return
@@ -103,7 +103,7 @@ class Calibration:
         yield from found
 
     def _take(self, line: int, text: str) -> None:
-        """Keep the numbers of a line; raises FormatError with the place."""
+        """Store the numbers of a line; raises FormatError with the place."""
         match = re.fullmatch(_LINE, text)
         if match is None:
             raise line_error(self.file, line, 1, f"expected NAME: numbers, found {text.strip()[:40]!r}")
@@ -127,7 +127,7 @@ class Calibration:
         self.fields[name] = Field(line, tuple(numbers), [word[0] for word in words])
 
     def _turn(self, name: str, texts: list[str]) -> Quaternion:
-        """Check a matrix of nine numbers to be a rotation; what is odd is noted."""
+        """Check that a matrix of nine numbers is a rotation; warnings are recorded."""
         line = self.fields[name].line
         try:
             turned = rotation_of(MATRIX, texts, [()] * 9, self.reading)
@@ -139,7 +139,7 @@ class Calibration:
         return turned
 
     def _single(self) -> tuple[str, str, Rigid, int]:
-        """Read the pose of R: and T: of the raw recordings; which it is says the name of the file, or what it holds."""
+        """Read the pose of R: and T: of the raw recordings; the file's name, or its contents, identify the frames."""
         for name, other in (("R", "T"), ("T", "R")):
             if name not in self.fields:
                 raise FormatError(f"missing {name}: beside {other}:", source=self.file.name)
@@ -171,7 +171,7 @@ class Calibration:
                 yield parent, child, (x, y, z, *turned), line
 
     def _between(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield the cameras of calib_cam_to_cam: R_01 and T_01 take points of cam0 to cam1."""
+        """Yield the cameras of calib_cam_to_cam: R_01 and T_01 map points of cam0 to cam1."""
         for index, camera in enumerate(CAMERAS):
             turn, shift = self.fields.get(f"R_0{index}"), self.fields.get(f"T_0{index}")
             if turn is not None and shift is not None and index:
@@ -179,14 +179,14 @@ class Calibration:
                 yield "cam0", camera, rigid.inverse(x, y, z, *self._turn(f"R_0{index}", turn.texts)), turn.line
 
     def _rectified(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield the rectified cameras: R_rect takes points of a camera to the rectified one."""
+        """Yield the rectified cameras: R_rect maps points of a camera to the rectified one."""
         names = dict.fromkeys(RECTIFICATIONS, "cam0") | {f"R_rect_0{i}": name for i, name in enumerate(CAMERAS)}
         for name, camera in names.items():
             if field := self.fields.get(name):
                 yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *self._turn(name, field.texts)), field.line
 
     def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield where projections have their cameras, with the axes of the rectified first one: the centre -K^-1 p."""
+        """Yield the cameras of projections, with the axes of the rectified first one: the centre -K^-1 p."""
         rect = "_rect" if any(name in self.fields for name in RECTIFICATIONS) else ""
         for index, camera in enumerate(CAMERAS):
             field = self.fields.get(f"P{index}")

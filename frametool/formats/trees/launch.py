@@ -1,12 +1,12 @@
-"""The transforms that launch files publish: the calls of static_transform_publisher in them, of ROS 1 and ROS 2.
+"""The transforms that launch files publish: calls of static_transform_publisher, of ROS 1 and ROS 2.
 
     <node pkg="tf" type="static_transform_publisher" name="a" args="0.1 0 0.2 1.57 0 0 base cam 100"/>
     <node pkg="tf2_ros" exec="static_transform_publisher" args="--x 1 --frame-id base --child-frame-id cam"/>
 
 XML of either ROS, YAML below `launch:`, and Python with `generate_launch_description`, which is parsed and never run.
-The pose of the child in its parent, metres, radians; the arguments are those of `frametool.ros.publisher`. Only what
-stands there literally is read: a call with `$(arg x)`, `LaunchConfiguration("x")` or arithmetic is listed as not
-read, included files are named, and calls that start under a condition are read and listed.
+The pose of the child in its parent, metres, radians; the arguments are those of `frametool.ros.publisher`. Only literal
+values are read: a call with `$(arg x)`, `LaunchConfiguration("x")` or arithmetic is listed as not read, included files
+are named, and calls that start under a condition are read and listed.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ _NO, _YES = ("0", "false"), ("1", "true")
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return XML of ROS 2: one node an edge.
+    """Return XML of ROS 2: one node per edge.
 
-    Raises ValueInvalid for frames that move, and names that have no place there.
+    Raises ValueInvalid for moving frames, and names that cannot be written.
     """
     from html import escape
 
@@ -54,7 +54,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield what each call publishes, and note what could not be read."""
+    """Yield the edge of each call, and record what could not be read."""
     for action in _actions(file):
         if action.unread:
             options.tally.note_each(action.unread, action.line)
@@ -67,7 +67,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _actions(file: InputFile) -> Iterator[Action]:
-    """Choose between the three languages of launch files."""
+    """Select the reader of one of the three languages of launch files."""
     begin = Beginning(file.head())
     if begin.xml:
         return _of_xml(file)
@@ -79,9 +79,9 @@ def _actions(file: InputFile) -> Iterator[Action]:
 
 
 def _of_xml(file: InputFile) -> Iterator[Action]:
-    """Yield the calls and what is included in XML, in order."""
+    """Yield the calls and the included files in XML, in order."""
     xml = XmlFile(file)
-    groups: list[tuple[int, list[str]]] = []  # those around: their depth, their conditions
+    groups: list[tuple[int, list[str]]] = []  # enclosing groups: their depth, their conditions
     for element in xml.elements():
         if element.depth == 1 and element.tag != "launch":
             raise xml.error(element, f"expected <launch>, found <{element.tag}>")
@@ -100,7 +100,7 @@ def _of_xml(file: InputFile) -> Iterator[Action]:
 
 
 def _of_yaml(source: Source) -> Iterator[Action]:
-    """Yield the calls and what is included below `launch:`, in order."""
+    """Yield the calls and the included files below `launch:`, in order."""
     found: list[tuple[Path, Action]] = []
     for document in parse_documents(source.text, source.name):
         top = (document.index, "launch")
@@ -118,7 +118,7 @@ def _of_yaml(source: Source) -> Iterator[Action]:
 
 
 def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[Path, str, dict[str, Any], list[str]]]:
-    """Yield what a list of actions starts: the way to it, its kind, what it says, and its conditions."""
+    """Yield the actions of a list: the path, the kind, the fields, and the conditions of each."""
     if entries is None:
         return
     if type(entries) is not list:
@@ -142,12 +142,12 @@ def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[
 
 
 def _conditions(entry: Mapping[str, Any]) -> list[str]:
-    """Return what the attributes `if` and `unless` say."""
+    """Return the attributes `if` and `unless`."""
     return [f'{key}="{entry[key]}"' for key in ("if", "unless") if type(entry.get(key)) is str]
 
 
 def _action(tag: str, entry: Mapping[str, Any], conditions: list[str], include: str) -> Action | None:
-    """Make of one element or entry what there is to read or to tell of it; None for what starts no publisher."""
+    """Return the action of one element or entry; None if it starts no publisher."""
     command = entry.get("cmd")
     if tag == "include":
         return Action.not_followed(include, entry.get("file", ""))

@@ -1,4 +1,4 @@
-"""What a launch file in any language comes down to: calls of the publisher, and what is said of all else."""
+"""The actions of a launch file in any language: calls of the publisher, and messages about the rest."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
 
 
 class Action(NamedTuple):
-    """One thing in a launch file that is told or read.
+    """One item of a launch file that is read or reported.
 
-    arguments: of a call, as one text that a shell would part or as words
+    arguments: of a call, as one text for a shell or as words
     unread: why there is nothing to read; "" if there is
-    conditions: under which it starts, as they are written
-    key: the attribute that holds the arguments
+    conditions: under which it starts, as written
+    key: the attribute with the arguments
     """
 
     arguments: str | Sequence[str] = ()
@@ -32,12 +32,12 @@ class Action(NamedTuple):
 
     @classmethod
     def not_read(cls, why: str, key: str = "") -> Action:
-        """Make the action for a call that cannot be read."""
+        """Return the action for a call that cannot be read."""
         return cls(unread=f"{CALL} not read: {why}", key=key)
 
     @classmethod
     def not_followed(cls, what: str, named: object) -> Action:
-        """Make the action for a file that is included."""
+        """Return the action for an included file."""
         return cls(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
 
 

@@ -1,9 +1,9 @@
-"""Launch files in Python: their text is parsed into a syntax tree, nothing of it is run.
+"""Launch files in Python: the text is parsed into a syntax tree and never run.
 
-A call counts wherever it stands: `Node(package="tf2_ros", executable="static_transform_publisher", arguments=[..])`,
-or any other name for it, and `ExecuteProcess(cmd=[.., "static_transform_publisher", ..])`.
+A call is read anywhere: `Node(package="tf2_ros", executable="static_transform_publisher", arguments=[..])`,
+or under another name, and `ExecuteProcess(cmd=[.., "static_transform_publisher", ..])`.
 
-Literal are texts, numbers, lists of them, and names bound to such once.
+Literals are strings, numbers, lists of them, and names bound to such once.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ if TYPE_CHECKING:
     Scalar: TypeAlias = str | int | float
     Literal: TypeAlias = Scalar | list[Scalar]
 
-LONGEST = 10_000  # characters or words: doubling a text thirty times is a short text, too
+LONGEST = 10_000  # characters or words: doubling a text thirty times is a short program
 _SCOPES = (ast.Module, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 _CHANGING = frozenset(("append", "extend", "insert", "pop", "remove", "reverse", "sort", "clear"))
 _EXECUTABLE = ("executable", "node_executable")  # the second until Foxy
 
 
 class NotLiteral(ValueError):
-    """An expression whose value the text does not say."""
+    """An expression whose value is not literal."""
 
     def __init__(self, node: ast.expr) -> None:
-        """Keep the expression."""
+        """Store the expression."""
         super().__init__()
         self.node = node
 
 
 class Bindings:
-    """The names that a module, a function or a class binds: each to an expression, or to None if more than once."""
+    """The names bound in a module, a function or a class: each to an expression, or to None if more than once."""
 
     def __init__(self, outer: Bindings | None) -> None:
         """Create an empty scope inside another."""
@@ -51,22 +51,22 @@ class Bindings:
         self._values: dict[str, Literal | NotLiteral] = {}
 
     def bind(self, name: str, value: ast.expr | None = None) -> None:
-        """Take in one binding."""
+        """Add one binding."""
         self.bound[name] = None if name in self.bound else value
 
     def spoil(self, name: str) -> None:
-        """Mark a name, in this scope and those around, as one whose value changes."""
+        """Mark a name, in this scope and the enclosing ones, as one whose value changes."""
         scope: Bindings | None = self
         while scope is not None:
             scope.bound[name] = None
             scope = scope.outer
 
     def find(self, node: ast.Name) -> Literal:
-        """Return the literal that a name stands for; raises NotLiteral."""
+        """Return the literal that a name is bound to; raises NotLiteral."""
         if node.id not in self.bound and self.outer is not None:
             return self.outer.find(node)
         if node.id not in self._values:
-            self._values[node.id] = NotLiteral(node)  # while it is worked out: a name in its own value
+            self._values[node.id] = NotLiteral(node)  # during the evaluation: a name in its own value
             if (value := self.bound.get(node.id)) is not None:
                 try:
                     self._values[node.id] = evaluate(value, self)
@@ -81,8 +81,8 @@ class Bindings:
 def evaluate(node: ast.expr, scope: Bindings) -> Literal:
     """Return the value of a literal expression.
 
-    Texts, numbers with a sign, lists and tuples of them, their concatenation, `str(0.5)`, `"0 0 1".split()`, and names
-    bound once to one of these. Raises NotLiteral, with the smallest expression that is not one.
+    Strings, numbers with a sign, lists and tuples of them, their concatenation, `str(0.5)`, `"0 0 1".split()`, and
+    names bound once to one of these. Raises NotLiteral, with the smallest expression that is not one.
     """
     value: Literal | None = None
     match node:
@@ -96,7 +96,7 @@ def evaluate(node: ast.expr, scope: Bindings) -> Literal:
             number = evaluate(operand, scope)
             if not isinstance(number, str | list):
                 value = -number if isinstance(sign, ast.USub) else number
-        case ast.BinOp(op=ast.Add(), left=left, right=right):  # of texts or lists; sums are arithmetic
+        case ast.BinOp(op=ast.Add(), left=left, right=right):  # of strings or lists; sums are arithmetic
             match evaluate(left, scope), evaluate(right, scope):
                 case str() as one, str() as other:
                     value = one + other
@@ -115,7 +115,7 @@ def evaluate(node: ast.expr, scope: Bindings) -> Literal:
 
 
 def _items(node: ast.expr, scope: Bindings) -> list[Scalar]:
-    """Return what an item of a list puts into it: itself, or the items of `*another`."""
+    """Return the values of an item of a list: itself, or the items of `*another`."""
     value = evaluate(node.value if isinstance(node, ast.Starred) else node, scope)
     if isinstance(value, list) is not isinstance(node, ast.Starred):
         raise NotLiteral(node)
@@ -125,7 +125,7 @@ def _items(node: ast.expr, scope: Bindings) -> list[Scalar]:
 def _text_of(value: Literal) -> str | None:
     try:
         return None if isinstance(value, list) else str(value)
-    except ValueError:  # a whole number of more than 4300 digits
+    except ValueError:  # an integer of more than 4300 digits
         return None
 
 
@@ -146,7 +146,7 @@ def scopes_of(tree: ast.Module) -> dict[ast.AST, Bindings]:
 
 
 def _take(node: ast.AST, scope: Bindings) -> list[ast.Name]:
-    """Take in what one node binds or changes; return the names in it that are bound to a value."""
+    """Record what one node binds or changes; return the names in it that are bound to a value."""
     match node:
         case ast.Assign(targets=targets):
             names = [each for each in targets if isinstance(each, ast.Name)]
@@ -171,7 +171,7 @@ def _take(node: ast.AST, scope: Bindings) -> list[ast.Name]:
 
 
 def actions(source: Source) -> Iterator[Action]:
-    """Yield the calls and what is included, in the order of the text."""
+    """Yield the calls and the included files, in the order of the text."""
     try:
         tree = _parsed(source)
         yield from sorted(_walk(tree, scopes_of(tree)), key=lambda action: (action.line, action.column))
@@ -182,7 +182,7 @@ def actions(source: Source) -> Iterator[Action]:
 def _parsed(source: Source) -> ast.Module:
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of odd escapes in what is not ours
+            warnings.simplefilter("ignore")  # about unknown escapes in the user's code
             return ast.parse(source.text)
     except SyntaxError as error:
         line, column = error.lineno or 1, error.offset or 1
@@ -192,7 +192,7 @@ def _parsed(source: Source) -> ast.Module:
 
 
 def _walk(tree: ast.Module, scopes: dict[ast.AST, Bindings]) -> Iterator[Action]:
-    """Visit all calls, with the conditions around each."""
+    """Visit all calls, with the enclosing conditions of each."""
     pending: list[tuple[ast.AST, Bindings, tuple[str, ...]]] = [(tree, scopes[tree], ())]
     while pending:
         node, scope, conditions = pending.pop()
@@ -205,7 +205,7 @@ def _walk(tree: ast.Module, scopes: dict[ast.AST, Bindings]) -> Iterator[Action]
 
 
 def _below(node: ast.AST) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
-    """Yield what a node holds, each with the condition that an `if` puts on it, as it is written."""
+    """Yield the children of a node, each with the condition of an `if`, as written."""
     for name, held in ast.iter_fields(node):
         under: tuple[str, ...] = ()
         if isinstance(node, ast.If | ast.IfExp) and name != "test":
@@ -217,7 +217,7 @@ def _below(node: ast.AST) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
 
 
 def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Action | None:
-    """Make of one call what there is to read or to tell of it."""
+    """Return the action of one call; None if it starts no publisher."""
     given = {each.arg: each.value for each in node.keywords if each.arg}
     if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
         named = node.args[0] if node.args else given.get("launch_description_source", node.func)

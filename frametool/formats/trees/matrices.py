@@ -1,11 +1,11 @@
-"""Matrices under keys that say what they do, and the edges they make: what camchains, OpenCV and EuRoC files share.
+"""Matrices whose keys state their frames, and the edges they make: shared by camchain, OpenCV and EuRoC files.
 
-    T_cam_imu    Kalibr: takes points of the IMU to the camera in whose block it stands
-    body_T_cam0  VINS: takes points of cam0 to body, the pose of cam0 in body
+    T_cam_imu    Kalibr: maps points of the IMU to the camera of its block
+    body_T_cam0  VINS: maps points of cam0 to body, the pose of cam0 in body
 
-One table says what keys mean; one that no row knows is never guessed: somebody has to tell its direction.  Matrices are
-rows in rows, one long list, or OpenCV's map of rows, cols and data; row-major.  What is stated twice, the other way
-round or along another way, is no edge but a check.
+A table has the meanings of keys; other keys are never guessed: the user has to state their direction.  Matrices are
+nested lists, one long list, or OpenCV's map of rows, cols and data; row-major.  A duplicate, also inverted or along
+another path, is not an edge but a check.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path, Quaternion
 
-# pattern of the key, target, source; <a> and <b> stand for names in it, {..} for what the file or the user names:
-# {me} the block that the key stands in, {before} the camera before it, {imu} {body} what all of them are seen from
+# pattern of the key, target, source; <a> and <b> are names in it, {..} are named by the file or the user:
+# {me} the block of the key, {before} the camera before it, {imu} {body} the common reference frame
 KEYS = (
     ("T_cn_cnm1", "{me}", "{before}"),  # Kalibr: from camera n-1 to camera n
     ("T_i_b", "{me}", "{imu}"),  # Kalibr: from the body, which is its first IMU, to this one
@@ -52,10 +52,10 @@ KEYS = (
     ("T_<a>_<b>", "<a>", "<b>"),  # ORB-SLAM3: IMU.T_b_c1, Stereo.T_c1_c2
     ("T<letter><letter>", "<a>", "<b>"),  # ORB-SLAM3: Tbc
 )
-# these name two frames, and people write both directions so
+# these name two frames, and both directions are in use
 ASKED = (("(?:T_)?<a>_to_<b>", "<a>", "<b>"), ("(?:T_)?<a>2<b>", "<a>", "<b>"))
-# two keys side by side, a rotation (3x3, or a rotation vector of three numbers) and a translation, and the frames they
-# are about: together they take points of the second to the first; without frames their direction is asked for
+# two keys, a rotation (3x3, or a rotation vector of three numbers) and a translation, and their frames: together they
+# map points of the second to the first; without frames, the direction must be set
 PAIRS = (
     (r"rvec(.*)", r"tvec\1", "camera", r"object\1", ""),  # OpenCV's own: solvePnP, calibrateCamera
     (r"extrinsicRotation", "extrinsicTranslation", "imu", "cam0", ""),  # VINS-Mono: from the camera to the IMU
@@ -63,12 +63,12 @@ PAIRS = (
     (r"R", "[Tt]", "", "", ""),
     (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
 )
-# keys beside a matrix that name its frames, target first (OpenLORIS-Scene, tf); what is a source is asked for
+# keys next to a matrix that name its frames, target first (OpenLORIS-Scene, tf); whether they are so must be set
 FRAME_KEYS = (
     ("parent_frame", "child_frame"), ("parent_frame_id", "child_frame_id"), ("frame_id", "child_frame_id"),
     ("parent", "child"), ("target_frame", "source_frame"), ("destination_frame", "source_frame"),
 )  # fmt: skip
-# what is no pose, though some of it has the size of one
+# matrices that are not poses, although some have the size of one
 NO_POSE = (
     (r"P|P[0-9]|.*[Pp]rojection.*|P_rect.*", "projection"),
     (r"R|R[0-9]|.*[Rr]ectif.*|R_rect.*", "rectification"),
@@ -81,9 +81,9 @@ NO_POSE = (
 
 
 class Meaning(NamedTuple):
-    """What a matrix does: it takes points of `source` to `target`; in a tree `child` hangs under the other one.
+    """The meaning of a matrix: it maps points of `source` to `target`; in a tree `child` is below the other one.
 
-    said: whether the key says so; else it is only how `--direction parent-from-child` would have it
+    said: the key states it; otherwise it is the meaning with `--direction parent-from-child`
     """
 
     target: str
@@ -93,16 +93,16 @@ class Meaning(NamedTuple):
 
 
 class Ambiguous(NamedTuple):
-    """The ways in which the names of two frames can be told apart in one key."""
+    """The ways to split a key into the names of two frames."""
 
     names: tuple[tuple[str, str], ...]
 
 
 def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Ambiguous | None:
-    """Return what a key says; None if no row of the table knows it.
+    """Return the meaning of a key; None if it is not in the table.
 
-    key: without what stands before its last point (`IMU.T_b_c1`).
-    known: names for what stands in braces; frames: names that the user told, which may be parts of the key.
+    key: without the part before its last point (`IMU.T_b_c1`).
+    known: names for the braces; frames: names set by the user, which may be parts of the key.
     """
     last = key.rpartition(".")[2]
     for row in (*ASKED, *KEYS):
@@ -117,7 +117,7 @@ def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -
 
 
 def _ways(pattern: str, key: str, frames: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the pairs of names that a pattern finds in a key, those that the user told if they fit."""
+    """Return the pairs of names that a pattern finds in a key, those set by the user if they fit."""
     if "<" not in pattern:
         return [("", "")] if key == pattern else []
     told = [(a, b) for a in frames for b in frames if re.fullmatch(_filled(pattern, re.escape(a), re.escape(b)), key)]
@@ -137,7 +137,7 @@ def _filled(pattern: str, a: str, b: str) -> str:
 
 
 def no_pose(key: str) -> str:
-    """Return what a matrix is that is no pose, by its key; "" if that does not say it."""
+    """Return what a matrix is that is not a pose, by its key; "" if the key does not state it."""
     last = key.rpartition(".")[2]
     return next((what for pattern, what in NO_POSE if re.fullmatch(pattern, last)), "")
 
@@ -151,11 +151,11 @@ class Pair(NamedTuple):
 
 
 def partner_of(key: str, others: Collection[str]) -> Pair | None:
-    """Return what belongs to the key of a rotation among the keys beside it; None if nothing does."""
+    """Return the translation that belongs to the key of a rotation among the other keys; None if there is none."""
     for rotation, translation, target, source, needed in PAIRS:
         if not (match := re.fullmatch(rotation, key)):
             continue
-        if match.groups():  # one key belongs to it, and is not looked for among all
+        if match.groups():  # a single key belongs to it, which is looked up directly
             wanted, child = match.expand(translation), match.expand(source)
             found = wanted if wanted in others else None
         else:
@@ -167,13 +167,13 @@ def partner_of(key: str, others: Collection[str]) -> Pair | None:
 
 MATRIX = notation("matrix")
 ROTVEC = notation("rotvec")
-WHOLE = ((4, 4), (3, 4))  # rows and columns of what holds a whole pose
+WHOLE = ((4, 4), (3, 4))  # rows and columns of a whole pose
 LAST_ROW = ("0", "0", "0", "1")
-_NUMBER_TYPE = r"(\d*)[ucwsifdh]"  # OpenCV's dt: how many numbers an element has, and of which type
+_NUMBER_TYPE = r"(\d*)[ucwsifdh]"  # OpenCV's dt: the number of values per element, and their type
 
 
 class Grid(NamedTuple):
-    """A matrix in text: rows and columns (0 where they differ in length), one text a number, and where each stands."""
+    """A matrix in text: rows and columns (0 if rows differ in length), one text per number, and the path of each."""
 
     rows: int
     columns: int
@@ -182,18 +182,18 @@ class Grid(NamedTuple):
 
     @property
     def size(self) -> str:
-        """Return how large it is."""
+        """Return its size as text."""
         return f"{self.rows} x {self.columns}" if self.columns else f"{self.rows} rows of different lengths"
 
     def holds(self, count: int) -> bool:
-        """Return True if it is a row or a column of so many numbers."""
+        """Return True if it is a row or a column of this many numbers."""
         return 1 in (self.rows, self.columns) and len(self.texts) == count
 
 
 def grid_of(value: Any) -> Grid | None:
-    """Return a value as a matrix; None if it is none.
+    """Return a value as a matrix; None if it is not one.
 
-    Raises Misfit for one whose data does not have the size that it says.
+    Raises Misfit if its data do not have the stated size.
     """
     if type(value) is dict:
         return _stored(value) if {"rows", "cols", "data"} <= value.keys() else None
@@ -212,7 +212,7 @@ def _flat(rows: int, columns: int, texts: list[Any], path: Path) -> Grid:
 
 
 def _stored(value: dict[str, Any]) -> Grid:
-    """Take OpenCV's map apart."""
+    """Parse OpenCV's map."""
     rows, columns = (_whole(value, key) for key in ("rows", "cols"))
     known = re.fullmatch(_NUMBER_TYPE, str(value.get("dt", "d")))
     if known is None:
@@ -233,9 +233,9 @@ def _whole(value: dict[str, Any], key: str) -> int:
 
 
 def whole_pose(grid: Grid | None, *, twelve: bool) -> Grid | None:
-    """Return a matrix that has the size of a whole pose with the four rows of it; None for any other.
+    """Return a matrix that has the size of a whole pose with its four rows; None for any other.
 
-    twelve: twelve numbers in a row are one, too
+    twelve: twelve numbers in a row are a pose too
     """
     if grid is not None and grid.holds(16):
         grid = grid._replace(rows=4, columns=4)
@@ -274,9 +274,9 @@ _TIGHT_KEY = r"(?m)^( *(?:- +)*[\w.-]+):(?=[^\s:/])"
 
 
 def made_ordinary(file: InputFile) -> InputFile:
-    """Make a text with OpenCV's head one that YAML reads: the head a comment, a blank behind each colon.
+    """Convert a text with OpenCV's header into plain YAML: the header a comment, a blank after each colon.
 
-    Places in the text stay where they are, but one to the right behind a colon without a blank.
+    Places in the text are preserved, except one to the right after a colon without a blank.
     """
     if match := re.match(_HEAD, file.text):
         at = match.end() - 1
@@ -284,13 +284,13 @@ def made_ordinary(file: InputFile) -> InputFile:
     return file
 
 
-TOLERATED = 1e-3  # metres, radians: how far a pose and its stated inverse may lie apart, with a warning
+TOLERATED = 1e-3  # metres, radians: the largest difference between a pose and its stated inverse, with a warning
 
 
 class Stated(NamedTuple):
-    """One pose as it is stated: target_from_source; in a tree `child` hangs under the other one.
+    """One stated pose: target_from_source; in a tree `child` is below the other one.
 
-    chained: it is about neighbours in a chain, and only a check where both are known otherwise
+    chained: it relates neighbours in a chain, and is only a check if both are known otherwise
     """
 
     target: str
@@ -307,9 +307,9 @@ class Stated(NamedTuple):
 
 
 def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
-    """Return the edges, and check what is stated again against them.
+    """Return the edges, and check duplicates against them.
 
-    Raises Misfit where a pose and its inverse contradict each other; other contradictions are noted.
+    Raises Misfit if a pose and its inverse contradict each other; other contradictions are recorded as warnings.
     """
     tree = FrameTree()
     first: dict[frozenset[str], Stated] = {}
@@ -334,7 +334,7 @@ def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
 
 
 def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading) -> None:
-    """Check a pose that is stated again."""
+    """Check a duplicate pose."""
     metres, radians = rigid.distance(*known, *each.components, floats)
     if metres <= AGREEMENT and radians <= AGREEMENT:
         return
@@ -346,12 +346,12 @@ def _compare(known: Rigid, each: Stated, first: Stated | None, reading: Reading)
     reading.note(f"{message}; {other} {'is' if first else 'are'} used", *each.path)
 
 
-MOST_TOLD = 3  # matrices that are no poses
+MOST_TOLD = 3  # matrices that are not poses
 BLOCK_NAMES = {"cameras": "cam", "imu_params": "imu", "imu_parameters": "imu"}  # of okvis
 
 
 class MatrixBlock(NamedTuple):
-    """A map of a document that may hold matrices: what it is called, and the way to it."""
+    """A map of a document that may hold matrices: its name and its path."""
 
     name: str
     entries: dict[str, Any]
@@ -359,10 +359,10 @@ class MatrixBlock(NamedTuple):
 
 
 class FrameNames(NamedTuple):
-    """How frames are called that no key names.
+    """Names of frames that no key names.
 
-    base: what all is seen from; alone: what a matrix outermost in the file belongs to; told: all names of `--frames`
-    blocks: names of blocks by their place in the file, where they were told
+    base: the reference frame; alone: the frame of a matrix at the top of the file; told: all names of `--frames`
+    blocks: names of blocks by their position in the file, if they were set
     """
 
     base: str
@@ -372,7 +372,7 @@ class FrameNames(NamedTuple):
 
 
 def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -> Meaning:
-    """Return the direction that was told for two frames; raises Unclear if none was."""
+    """Return the direction set for two frames; raises Unclear if none was."""
     if not answers.direction:
         one, other = DIRECTIONS
         a, b = bare(parent), bare(child)
@@ -383,10 +383,10 @@ def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -
 
 
 class Matrices:
-    """The poses of one document, and which of its matrices are none."""
+    """The poses of one document, and its matrices that are not poses."""
 
     def __init__(self, document: dict[str, Any], naming: FrameNames, answers: Answers, reading: Reading) -> None:
-        """Read all of it; raises Misfit."""
+        """Read the whole document; raises Misfit."""
         self.naming, self.answers, self.reading = naming, answers, reading
         self.left: list[str] = []
         self.asked = 0
@@ -396,9 +396,9 @@ class Matrices:
         self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
 
     def edges(self, tally: Tally, nothing: str) -> list[Edge]:
-        """Return the edges that the poses make, and say how many there are and what was left out.
+        """Return the edges of the poses, and record how many there are and what was omitted.
 
-        Raises Misfit where they contradict each other, and with `nothing` where there is none.
+        Raises Misfit if they contradict each other, and with `nothing` if there are none.
         """
         if not self.poses:
             raise Misfit(nothing)
@@ -449,7 +449,7 @@ class Matrices:
         return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _known(self, block: MatrixBlock) -> dict[str, str]:
-        """Return the names that the templates of the table stand for."""
+        """Return the names for the braces in the table."""
         base = self.naming.base or "imu"
         body = self.naming.base or "body"
         inertial = next((each.name for each in self.bodies if each is not block), body)
@@ -457,9 +457,9 @@ class Matrices:
         return {"me": me, "before": self.before[block.path], "imu": base, "body": body, "sensor": inertial}
 
     def _named(self, block: MatrixBlock, path: Path) -> Meaning | None:
-        """Return what the keys beside a matrix say that name its two frames; None where there are none.
+        """Return the meaning from the keys next to a matrix that name its two frames; None if there are none.
 
-        Raises Misfit where one of the two is missing, and Unclear where nothing says the direction.
+        Raises Misfit if one of the two is missing, and Unclear if nothing states the direction.
         """
         for target, source in FRAME_KEYS:
             if target in block.entries and source in block.entries:
@@ -473,7 +473,7 @@ class Matrices:
         return None
 
     def _directed(self, block: MatrixBlock, key: str, path: Path, ends: Meaning | None) -> Meaning:
-        """Return what a key means that does not say its direction, as options say; raises Unclear if they do not."""
+        """Return the meaning of a key without a direction, as set by options; raises Unclear if they do not."""
         if ends is not None:
             parent, child = ends.target, ends.source
         else:
@@ -484,7 +484,7 @@ class Matrices:
         return directed(dotted(path), path, parent, child, self.answers)
 
     def _pair(self, block: MatrixBlock, key: str, turn: Grid, pair: Pair) -> Stated:
-        """Read a rotation and the translation beside it."""
+        """Read a rotation and its translation."""
         path, place = (*block.path, key), (*block.path, pair.translation)
         shift = within(place, grid_of, block.entries[pair.translation])
         if shift is None:
@@ -492,7 +492,7 @@ class Matrices:
             raise Misfit(f"{pair.translation}: expected 3 numbers, found {found}", place)
         if named_by_keys := self._named(block, path):
             meaning = named_by_keys
-        elif pair.target == "cam1":  # of two cameras cam0 is told first
+        elif pair.target == "cam1":  # of two cameras cam0 is named first
             source, target = self.answers.names(pair.source, pair.target)
             meaning = Meaning(target, source, target)
         elif pair.target:
@@ -522,7 +522,7 @@ def _before(blocks: Sequence[MatrixBlock]) -> dict[Path, str]:
 
 
 def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBlock]:
-    """Return the blocks, those of cameras under the names that were told: cam0 has the first of them."""
+    """Return the blocks, with the names set for cameras: cam0 has the first of them."""
 
     def is_camera(block: MatrixBlock) -> bool:  # the first in a chain has no pose
         return block.name.startswith("cam") or any(key.startswith("T_") for key in block.entries)
@@ -535,7 +535,7 @@ def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBl
 
 
 def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[MatrixBlock]:
-    """Yield a map and the maps in it; those of a list by its name and their number."""
+    """Yield a map and its nested maps; those of a list by its name and their number."""
     yield MatrixBlock(name, entries, path)
     for key, value in entries.items():
         here = (*path, key)

@@ -1,14 +1,14 @@
-"""Extrinsics as people write them by hand: a map of names, or a list under `transforms:`, each with one pose.
+"""Handwritten extrinsics: a map of names, or a list under `transforms:`, each with one pose.
 
     lidar: {x: 0.9, y: 0.0, z: 2.0, roll: 0.0, pitch: 0.0, yaw: 1.57}
     camera: {parent: lidar, translation: [0.1, 0, -0.2], quaternion: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
     imu: {trans_x: 0.1, trans_y: 0.0, trans_z: 0.0, rot_x: 0.0, rot_y: 0.0, rot_z: 0.0, rot_w: 1.0}
-    base_to_left: {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}         asks for --direction
-    left: {R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], t: [0.1, 0.0, 0.0]}                      asks for --direction
-    gps: {value: [0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0]}                                     asks for --from
+    base_to_left: {x: 0.1, y: 0.0, z: 0.0, ax: 0.0, ay: 0.0, az: 1.0, theta: 0.1}         needs --direction
+    left: {R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], t: [0.1, 0.0, 0.0]}                      needs --direction
+    gps: {value: [0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.0]}                                     needs --from
 
-Metres, radians unless a key says degrees.  The pose is that of the name, or of `child`, in `parent`; where none is
-said, in `base` (--frames).  A list of four or seven does not say where w stands: --from xyzw|wxyz does, for all.
+Metres, radians unless a key states degrees.  The pose is that of the name, or of `child`, in `parent`, by default in
+`base` (--frames).  The order of a list of four or seven is ambiguous: --from xyzw|wxyz sets it, for all.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
 
 NAME = "named"
-WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is none of the names
+WRAPPERS = ("transforms", "extrinsics")  # an outermost key that is not a name
 PARENTS, CHILDREN = (tuple(dict.fromkeys(keys[at] for keys in FRAME_KEYS[:4])) for at in (0, 1))
-_OF_CAMERAS = ("rvec", "qvec", "tvec", "R", "T", "t")  # camera<-world in OpenCV and COLMAP, often the other way
+_OF_CAMERAS = ("rvec", "qvec", "tvec", "R", "T", "t")  # camera<-world in OpenCV and COLMAP, often the inverse
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a name."""
+    """Yield one edge per name."""
     frames = options.answers.frames
     base = options.answers.names("base")[0]
     count, told, said, left = 0, False, True, dict[str, None]()
@@ -85,7 +85,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 def _entry(
     name: str | int, entry: Any, reading: Reading, options: Options, left: dict[str, None]
 ) -> tuple[Rigid, tuple[str, str, str] | None]:
-    """Read one pose, and the frames that it is between: target, source and the child; None where only its own name is.
+    """Read one pose, and its frames: target, source and the child; None if only its own name is known.
 
     Raises Misfit.
     """
@@ -120,7 +120,7 @@ _SELF = {"me": "cam", "imu": "imu", "body": "body"}
 
 
 def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
-    """Take the name of a frame out of an entry; raises Misfit for two of them."""
+    """Remove the name of a frame from an entry; raises Misfit for two of them."""
     there = [key for key in keys if key in fields]
     if len(there) > 1:
         raise Misfit(f"{' and '.join(there)} in one entry; keep one", (there[1],), key=True)
@@ -131,12 +131,12 @@ def _frame(fields: dict[str, Any], keys: tuple[str, ...]) -> str | None:
 
 
 def _is_remark(key: str, value: Any) -> bool:
-    """Tell a text beside a pose, a topic or a model, from what may be a misspelt number."""
+    """Return True for a text of an entry, such as a topic or a model; False for what may be a misspelt number."""
     return key not in WORDS and type(value) is str and re.match(r"[-+.]*\d", value) is None
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a map of names; raises ValueInvalid for frames that move."""
+    """Return a map of names; raises ValueInvalid for moving frames."""
     texts = []
     for parent, child, pose in static_edges(tree, NAME):
         x, y, z, w = quaternion.from_quaternion(*pose[3:], floats)

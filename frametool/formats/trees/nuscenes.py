@@ -1,11 +1,11 @@
-"""Tables of nuScenes: where sensors sit on the vehicle, and where the vehicle was.
+"""Tables of nuScenes: the poses of sensors on the vehicle, and of the vehicle.
 
     calibrated_sensor.json   [{"token": .., "sensor_token": .., "translation": [x, y, z], "rotation": [w, x, y, z]}, ..]
     ego_pose.json            [{"token": .., "timestamp": 1531883530449377, "translation": .., "rotation": ..}, ..]
     sensor.json              [{"token": .., "channel": "CAM_FRONT", "modality": "camera"}, ..]
 
-Metres, w first, microseconds.  ego<-sensor, and global<-ego, which moves.  What a sensor is called stands in
-sensor.json, in the same folder or named with the other files.  Some forks keep rotations as 3x3 matrices.
+Metres, w first, microseconds.  ego<-sensor, and global<-ego, which moves.  Names of sensors are in sensor.json, in the
+same folder or passed with the other files.  Some forks have rotations as 3x3 matrices.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _WXYZ = notation("wxyz")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a sensor, or a sample an ego pose; of sensor.json only the frame that sensors hang from."""
+    """Yield one edge per sensor, or one sample per ego pose; of sensor.json only the frame above the sensors."""
     world, ego = options.answers.names("global", "ego")
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
@@ -63,7 +63,7 @@ def _records(value: Any) -> list[Any]:
 def _sensors(
     records: list[Any], ego: str, channels: dict[str, str] | None, reading: Reading, options: Options
 ) -> Iterator[Edge]:
-    """Yield an edge for each pose of each sensor; of several poses each is called by its token too."""
+    """Yield an edge for each pose of each sensor; if it has several, each name includes the token."""
     poses: dict[str, dict[Rigid, tuple[str, Path]]] = {}
     for index, record in enumerate(records):
         reading.here = (index,)
@@ -123,7 +123,7 @@ def _rotation(value: Any, reading: Reading) -> Quaternion:
 
 
 def _channels(file: InputFile) -> dict[str, str] | None:
-    """Return what sensors are called, by their tokens; None without the table of them."""
+    """Return the names of sensors, by their tokens; None without the table of them."""
     table = next((each for each in file.beside if os.path.basename(each.path) == NAMES), None)
     if table is None:
         path = os.path.join(os.path.dirname(file.path), NAMES)

@@ -1,15 +1,15 @@
-"""OpenCV's FileStorage as YAML, JSON or XML: matrices by name, of which those are poses whose name says two frames.
+"""OpenCV's FileStorage as YAML, JSON or XML: matrices by name; a name with two frames is a pose.
 
     %YAML:1.0
     ---
-    body_T_cam0: !!opencv-matrix            takes points of cam0 to body: the pose of cam0 in body
+    body_T_cam0: !!opencv-matrix            maps points of cam0 to body: the pose of cam0 in body
        rows: 4
        cols: 4
        dt: d
        data: [ 1., 0., 0., 0.05, .. ]       row-major
 
-A pair rvec, tvec takes points of the object to the camera, as all of OpenCV does.  Lengths are in metres if the board's
-squares were.
+A pair rvec, tvec maps points of the object to the camera, as everywhere in OpenCV.  Lengths are in metres if the
+board's squares were.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
 
 NAME = "opencv"
-_KEY = r"[A-Za-z_][\w-]*"  # what FileStorage takes for a name, without blanks
+_KEY = r"[A-Za-z_][\w-]*"  # names in FileStorage, without blanks
 DEEPEST = 100  # elements
 _NO_NAMES = dict.fromkeys(("me", "before", "imu", "body", "sensor"), "")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a pose, and check what is stated twice."""
+    """Yield one edge per pose, and check duplicates."""
 
     def take(value: Any, reading: Reading) -> list[Edge]:
         frames = options.answers.frames
@@ -58,7 +58,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
-    """Read the XML form."""
+    """Read the XML variant."""
     xml = XmlFile(file)
     try:
         stored = StoredXml(xml)
@@ -77,10 +77,10 @@ def _read_xml(file: InputFile, options: Options, take: Any) -> Iterator[Edge]:
 
 
 class StoredXml:
-    """A `<opencv_storage>` as one document: its value, and the element in which each path of it begins."""
+    """The `<opencv_storage>` as one document: its value, and the element at which each path begins."""
 
     def __init__(self, xml: XmlFile) -> None:
-        """Read all of it; raises FormatError."""
+        """Read the whole text; raises FormatError."""
         self.xml = xml
         self.value: dict[str, Any] = {}
         self._elements: dict[Path, Element] = {}
@@ -90,11 +90,11 @@ class StoredXml:
         self.value = inside if type(inside) is dict else {}
 
     def element(self, path: Path) -> Element:
-        """Return the element of a path, or the nearest around it."""
+        """Return the element of a path, or the nearest enclosing one."""
         return next(self._elements[path[:end]] for end in range(len(path), -1, -1) if path[:end] in self._elements)
 
     def _inside(self, elements: Iterator[Element], path: Path) -> Any:
-        """Return what stands in an element up to its end: a map, a list of `_`, the words of a matrix, or a text."""
+        """Return the contents of an element up to its end: a map, a list of `_`, the words of a matrix, or a text."""
         found: dict[str, Any] = {}
         items: list[Any] = []
         for element in elements:
@@ -118,7 +118,7 @@ class StoredXml:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a matrix an edge, called `parent_T_child`; raises ValueInvalid for names that OpenCV does not take."""
+    """Return one matrix per edge, named `parent_T_child`; raises ValueInvalid for names that OpenCV does not accept."""
     precision = Precision(NAME, "matrices")
     text = f"{HEAD}\n---\n"
     for parent, child, pose in static_edges(tree, NAME):

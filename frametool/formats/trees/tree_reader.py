@@ -4,11 +4,11 @@
     frames: [{name: lidar, parent: base, xyz: [0.9, 0, 2]}]                   list, any order
     frames: {lidar: {parent: base, xyz: [0.9, 0, 2]}}                         by name, any order
     {name: lidar, parent: base, xyz: [0.9, 0, 2]}                             one edge, as `lookup` prints it
-    {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a frame that moves; seconds
-    {name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}              a place on the Earth, in `ecef`
+    {name: base, parent: odom, samples: [{stamp: 0.5, xyz: [1, 0, 0]}]}       a moving frame; seconds
+    {name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}              a position on the Earth, in `ecef`
 
-Metres, radians unless a key says degrees; every pose is that of the frame in its parent: parent_from_child.  What other
-forms in YAML and JSON read their documents with stands below, and knows nothing of their keys.
+Metres, radians unless a key states degrees; every pose is that of the frame in its parent: parent_from_child.
+Functions for documents that other YAML and JSON formats share are below; they know nothing of their keys.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
 NO_NAME = "stands where a frame's name is expected: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
-LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # numbers one by one
+LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # single numbers
 CHILDREN = frozenset(("children", *TIMED))
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a text of trees, then tell of what was odd in it."""
+    """Yield the edges of a text of trees, then emit its warnings."""
     source = file.source
     notes: list[Finding] = []
     for document in parse_documents(source.text, source.name):
@@ -65,7 +65,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def without_slashes(edge: Edge, reading: Reading) -> Edge:
-    """Take one leading `/` off the names, which tf2 has given up, and note it."""
+    """Remove one leading `/` from the names, as tf2 does, and note it."""
     if edge.child[0] != "/" and (edge.parent or "")[:1] != "/":
         return edge
     reading.here = edge.path
@@ -96,7 +96,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
 
 
 def shown_keys(value: dict[str, Any]) -> str:
-    """Name the first keys of a mapping in quotes, within some sixty characters."""
+    """Return the first keys of a mapping in quotes, within about sixty characters."""
     named = ""
     for key in value:
         if len(more := f"{named}{', ' * bool(named)}{shown(key)}") > MOST_SHOWN and named:
@@ -105,7 +105,7 @@ def shown_keys(value: dict[str, Any]) -> str:
     return named
 
 
-MOST_SHOWN = 70  # characters of the keys found
+MOST_SHOWN = 70  # characters of the keys that were found
 
 
 def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
@@ -126,7 +126,7 @@ def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
 
 
 def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[Edge]:
-    """Walk one nested tree, parents before children; a stack, so that no tree is too deep."""
+    """Iterate over one nested tree, parents before children; with a stack, so that any depth works."""
     pending = [(root, children, path)]
     while pending:
         parent, entries, path = pending.pop()
@@ -162,7 +162,7 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
 
 
 def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
-    """Walk a list of entries, ours or ROS messages."""
+    """Iterate over a list of entries, frametool's or ROS messages."""
     for index, entry in enumerate(entries):
         here = (*path, index)
         reading.here = here
@@ -170,7 +170,7 @@ def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]
             yield from _messages(entry, here, reading)
         else:
             yield from _entry(entry, here, reading)
-        entries[index] = None  # a million of them need no room beside their edges
+        entries[index] = None  # frees the memory of a million entries
 
 
 def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
@@ -188,7 +188,7 @@ def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
 
 
 def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pose:
-    """Read the pose of an entry; axes beside samples are what these are given in."""
+    """Read the pose of an entry; axes next to samples are those of the samples."""
     if AXES_KEY in entry and "samples" in entry:
         entry = {key: value for key, value in entry.items() if key != AXES_KEY}
     if "camera" in entry:
@@ -210,7 +210,7 @@ def _check_camera(value: Any) -> None:
 
 
 def camera_fields(value: Any) -> dict[str, Any]:
-    """Return what `Camera` takes of `camera: {..}`; raises Misfit."""
+    """Return the arguments of `Camera` from `camera: {..}`; raises Misfit."""
     known = as_mapping(value, "a camera as {K: [fx, fy, cx, cy], ..}")
     for key in known:
         if key not in CAMERA_KEYS:
@@ -222,7 +222,7 @@ def camera_fields(value: Any) -> dict[str, Any]:
 
 
 def numbers_of(value: Any) -> Any:
-    """Return the numbers of a text, of lists of such, and of matrices that say their rows."""
+    """Return the numbers of a text, of lists of such, and of matrices with rows."""
     if isinstance(value, dict):
         return numbers_of(value.get("data", []))
     if isinstance(value, list):
@@ -231,10 +231,10 @@ def numbers_of(value: Any) -> Any:
 
 
 def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
-    """Return the frame that a pose is given in: that around it, or of its own; raises Misfit for a place elsewhere."""
+    """Return the reference frame of a pose: the enclosing one, or its own; raises Misfit if they conflict."""
     if pose.parent is None or "parent" in entry:
         return pose.parent or parent
-    if parent not in (None, *EARTH_FRAMES):  # a place says its frame
+    if parent not in (None, *EARTH_FRAMES):  # a position on the Earth implies its frame
         key = next(filter(may_be_on_earth, entry))
         raise Misfit(f"{key} places a frame in ecef; it stands under {shown(parent)}", (key,), key=True)
     return parent or pose.parent
@@ -243,7 +243,7 @@ def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
 def _edges(
     entry: dict[str, Any] | None, pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
 ) -> list[Edge]:
-    """Return what one entry says: an edge that stands still or has one stamp, or the samples of one that moves."""
+    """Return the edges of one entry: a static edge or one with a stamp, or the samples of a moving frame."""
     if entry is not None and "samples" in entry:
         return read_samples(entry, pose, parent, child, path, reading)
     if parent is not None and pose.position is None and pose.rotation is None:
@@ -260,13 +260,13 @@ def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[E
             yield Edge(parent, child, (*position, *rotation), stamp_ns, path=here)
         except Misfit as misfit:
             reading.refuse(misfit.below(*here))
-        message.clear()  # a million of them need no room beside their edges
+        message.clear()  # frees the memory of a million messages
 
 
 def read_samples(
     entry: dict[str, Any], pose: Pose, parent: str | None, child: str, path: Path, reading: Reading
 ) -> list[Edge]:
-    """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name a parent of its own."""
+    """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name another parent."""
     if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
         message = f"frame {shown(child)} has samples and a pose or a stamp beside them; put all into samples"
         raise Misfit(message, ("samples",), key=True)
@@ -296,7 +296,7 @@ def read_samples(
 
 
 def _given_in(entry: dict[str, Any], reading: Reading) -> Earth:
-    """Return what is said of all places among samples: the axes beside them."""
+    """Return the options for all positions among samples: the axes next to them."""
     from frametool.geometry.place import Earth
     from frametool.grammar.place import take_axes
 
@@ -324,7 +324,7 @@ def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, in
 
 
 def stamp_of(entry: dict[str, Any]) -> int | None:
-    """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None where there is neither."""
+    """Read `stamp: 12.5` in seconds or `stamp_ns: 12500000000`, exactly; None if there is neither."""
     if STAMP_KEYS.isdisjoint(entry):
         return None
     keys = [key for key in ("stamp", "stamp_ns") if key in entry]
@@ -334,7 +334,7 @@ def stamp_of(entry: dict[str, Any]) -> int | None:
 
 
 def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
-    """Read the time under a key: seconds, or nanoseconds where the key ends so; raises Misfit."""
+    """Read the time under a key: seconds, or nanoseconds if the key ends in _ns; raises Misfit."""
     text = entry[key]
     if type(text) is not str:
         raise Misfit(f"expected a time{example}, found {kind(text)}", (key,))
@@ -345,7 +345,7 @@ def read_time(entry: dict[str, Any], key: str, example: str = "") -> int:
 
 
 def named(fields: dict[str, Any], key: str) -> str:
-    """Return the name under a key; raises Misfit where there is none."""
+    """Return the name under a key; raises Misfit if there is none."""
     name = read_name(fields, key)
     if name is None:
         raise Misfit(f"missing {key}")
@@ -353,7 +353,7 @@ def named(fields: dict[str, Any], key: str) -> str:
 
 
 def read_flat_pose(pose: dict[str, Any], rotation: Notation, reading: Reading) -> Rigid:
-    """Read a pose whose numbers stand under x, y, z and the names of the rotation's, in any order; raises Misfit."""
+    """Read a pose whose numbers are under x, y, z and the names of a rotation, in any order; raises Misfit."""
     keys = (*XYZ, *rotation.columns)
     if missing := [key for key in keys if key not in pose]:
         raise Misfit(f"missing {', '.join(missing)}; a pose has {', '.join(keys)}")
@@ -363,7 +363,7 @@ def read_flat_pose(pose: dict[str, Any], rotation: Notation, reading: Reading) -
 
 
 def line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:
-    """Make the error for a place in a text that is read line by line."""
+    """Return the error for a place in a text that is read line by line."""
     text = file.text.split("\n")[line - 1].rstrip("\r")
     return FormatError(message, source=file.name, line=line, column=column, snippet=pointer(text, column))
 
@@ -371,9 +371,10 @@ def line_error(file: InputFile, line: int, column: int, message: str) -> FormatE
 def document_edges(file: InputFile, options: Options, take: Take, tags: Collection[str] = ()) -> Iterator[Edge]:
     """Yield the edges that `take` finds in each document of a file, with their paths from the top of the text.
 
-    take: (value, reading) to edges whose paths begin in the document; raises Misfit, or keeps it with `reading.refuse`.
-    tags: of YAML, that the form has.
-    Errors go to `options.report`, what is odd to `options.tally`.
+    take: (value, reading) to edges with paths relative to the document; raises Misfit, or collects it with
+    `reading.refuse`.
+    tags: of YAML, for this format.
+    Errors go to `options.report`, warnings to `options.tally`.
     """
     source = file.source
     try:
@@ -398,7 +399,7 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
 
 
 def _placed(faults: Sequence[Misfit], source: Source, document: int) -> Iterator[FormatError]:
-    """Yield the errors for what is wrong in a document; those behind the first are looked for all at once."""
+    """Yield the errors in a document; those after the first are located all at once."""
     for fault in faults[:1]:
         yield fault.placed(source, document)
     others = faults[1:]
@@ -413,11 +414,11 @@ def _placed(faults: Sequence[Misfit], source: Source, document: int) -> Iterator
 
 
 def remember(notes: Iterable[Finding], lines: Iterable[int], tally: Tally) -> None:
-    """Keep what was odd, each with its line and behind the keys that lead to it."""
+    """Record warnings, each with its line and after the keys that lead to it."""
     for note, line in zip(notes, lines, strict=True):
         tally.note_each(f"{bare(dotted(note.path))}: {note.message}" if note.path else note.message, line, note.rule)
 
 
 def dotted(path: Path) -> str:
-    """Name a place in a document by its keys: `cam0.T_cam_imu`."""
+    """Return the keys of a place in a document: `cam0.T_cam_imu`."""
     return ".".join(str(step) for step in path)

@@ -1,8 +1,9 @@
-"""Poses and trees written: in YAML and JSON, in the grammar they are read in; and as the numbers of other formats.
+"""Write poses and trees in YAML and JSON, in the grammar in which they are read; and as the numbers of other formats.
 
-A document or a line a result; metres, radians unless the key says degrees; numbers as Python's repr.  Angles and
-matrices are those that read back to the same rotation where such ones exist: a quaternion has more bits than three
-angles or nine entries give back.  What then differs is told, once and how much.
+One document or line per result; metres, radians unless the key states degrees; numbers as Python's repr.  Angles and
+matrices are chosen so that they read back to the same rotation if possible: a quaternion has more bits than three
+angles or nine entries preserve.  A remaining difference is reported once.
+
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ if TYPE_CHECKING:
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return a document or a line a result."""
+    """Return one document or line per result."""
     return write_points((result.mapping(style) for result in results), style)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return one line a record in JSON, else the records as documents parted by `---`."""
+    """Return one line per record in JSON, else the records as documents separated by `---`."""
     if style.form == "json":
         from frametool.documents import json
 
@@ -40,7 +41,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return the tree in the list form, roots first; JSON on one line."""
+    """Return the tree in list form, roots first; JSON on one line."""
     if style.form == "json":
         from frametool.documents import json
 
@@ -65,17 +66,17 @@ def static_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
 
 
 def warn_lonely_roots(tree: Frames, form: str) -> None:
-    """Warn of frames that a form cannot name because nothing is connected with them."""
+    """Warn about frames that a format cannot name because nothing is connected to them."""
     parents = {track.parent for track in tree.tracks()}
     if lonely := [frame for frame in tree.roots if frame not in parents]:
         warn(f"{form} has no place for frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
 
 
 class Precision:
-    """How far what was written lies from what is read back."""
+    """The largest difference between the poses and what is read back."""
 
     def __init__(self, form: str, notation: str) -> None:
-        """Start with nothing written; `notation` says in what rotations are written."""
+        """Start with nothing written; `notation` is that of the rotations."""
         self.form, self.notation = form, notation
         self.metres = 0.0
         self.radians = 0.0
@@ -88,7 +89,7 @@ class Precision:
             self.metres, self.radians = max(self.metres, metres), max(self.radians, radians)
 
     def tell(self, style: Style) -> None:
-        """Warn if anything differs that could be written better; fixed decimals were asked for."""
+        """Warn if anything differs that could be written more exactly; fixed decimals are the user's choice."""
         if style.precision is None and (self.metres or self.radians):
             off = " and ".join(
                 f"{value:.1g} {unit}" for value, unit in ((self.metres, "m"), (self.radians, "rad")) if value
@@ -100,7 +101,7 @@ def angles_of(rotation: Quaternion) -> tuple[Three[float], Quaternion]:
     """Return roll, pitch, yaw of a rotation, and the rotation that they read back to.
 
     The angles with the fewest decimals that give the same bits, which are those of a file the rotation came from;
-    without such ones the nearest angles.  Each angle is tried the other way round too.
+    otherwise the nearest angles.  The equivalent angles on the other side are tried too.
     """
     given = quaternion.from_quaternion(*rotation, floats)
     exact: Three[float] = euler.from_quaternion(*given, "sxyz", floats)
@@ -121,7 +122,7 @@ def of_angles(angles: Iterable[float]) -> Quaternion:
 def rows_of(pose: Rigid) -> tuple[list[list[float]], Rigid]:
     """Return the rows of the 4x4 matrix of a pose, and the pose that they read back to."""
     position, given = pose[:3], quaternion.from_quaternion(*pose[3:], floats)
-    numbers = [number + 0.0 for number in rigid.to_homogeneous(*position, *given, floats)]  # none is -0.0
+    numbers = [number + 0.0 for number in rigid.to_homogeneous(*position, *given, floats)]  # avoids -0.0
     turn = matrix.check(*numbers[0:3], *numbers[4:7], *numbers[8:11])
     back = quaternion.canonical(*matrix.to_quaternion(*turn, floats), floats)
     return [list(numbers[at : at + 4]) for at in (0, 4, 8, 12)], (*position, *back)
