@@ -105,7 +105,7 @@ class FrameFile(InputFile):
 
     @property
     def required_options(self) -> tuple[str, ...]:
-        """Return what the file does not specify; of tables also frames without columns, of recordings those of poses."""
+        """Return what the file does not specify; of tables also frames without columns, of recordings poses."""
         row = FORMATS[self.form]
         if self.form in ("csv", "tsv", "semicolon"):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}

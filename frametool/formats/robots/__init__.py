@@ -1,1 +1,1 @@
-"""Robot descriptions: links and joints, and what moves the joints; one file a form, one model for all of them."""
+"""Robot descriptions: links, joints, and joint values; one file per format, one model for all of them."""

@@ -1,12 +1,12 @@
-"""Tables of Denavit-Hartenberg parameters: a row a joint, in CSV, TSV or between blanks, in YAML or JSON.
+"""Tables of Denavit-Hartenberg parameters: one row per joint, in CSV, TSV or between blanks, in YAML or JSON.
 
     joint,theta,d,a,alpha_deg
     1,q1,0.089159,0,90
 
-standard: turn by theta about z and shift by d along it, then shift by a along x and turn by alpha about it.
-modified (Craig): alpha and a first, of the joint before, then theta and d.  Nothing in a table says which: `--dh` does.
-Metres and radians; a column that ends in deg or mm has that unit, a cell may have its own.  Joints stand at 0, which is
-added to what theta says, or d of a sliding one.  link0 carries link1 and so on: parent<-child.
+standard: rotate by theta about z and translate by d along it, then translate by a along x and rotate by alpha about it.
+modified (Craig): alpha and a first, of the previous joint, then theta and d.  Tables do not state which: `--dh` does.
+Metres and radians; a column that ends in deg or mm has that unit, a cell may have its own.  Joints are at 0, which is
+added to theta, or to d of a prismatic joint.  link0 is the parent of link1 and so on: parent<-child.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     Fail = Callable[[str], FormatError]
     FoundRow = tuple[str, Path, dict[str, tuple[Any, Path]]]
 
-# what people call a column, without its unit and the number of the joint
+# names of columns in use, without unit and joint number
 COLUMNS = {
     "theta": ("theta", "\u03b8", "th", "joint_angle", "q"),
     "d": ("d", "link_offset"),
@@ -48,7 +48,7 @@ COLUMNS = {
     "type": ("type", "joint_type", "kind", "sigma"),
     "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
 }
-# keys about something else, which are told and left out; any other key is an error, as it may be a misspelt one
+# other keys, which are omitted with a note; any unknown key is an error, as it may be misspelt
 OTHERS = (
     r"q?_?(?:min|max|lim)|lower|upper|limits?|range|home|axis|mass|m|com|inertia|jm|b|tc|g|velocity|effort|parent|child"
     r"|flip|mdh|convention|comment|note|description|model|robot|color"
@@ -71,7 +71,7 @@ _STARRED = r"(.*?) *\*"
 
 
 class Column(NamedTuple):
-    """Which column it is, and its unit, "" where it says none."""
+    """A column and its unit, "" if it states none."""
 
     name: str
     unit: str
@@ -81,7 +81,7 @@ NAME = Column("name", "")
 
 
 class Cell(NamedTuple):
-    """One number as text, the unit of its column, and what makes the error for its place."""
+    """One number as text, the unit of its column, and a function that returns the error for its place."""
 
     text: str
     unit: str
@@ -89,14 +89,14 @@ class Cell(NamedTuple):
 
 
 class Amount(NamedTuple):
-    """An angle or a length, in degrees or in radians and metres; `variable` is the name of the joint's value in it."""
+    """An angle or a length, in degrees or in radians and metres; `variable` is the name of the joint value in it."""
 
     number: float = 0.0
     degrees: bool = False
     variable: str | None = None
 
     def plus(self, other: Amount) -> Amount:
-        """Add another one."""
+        """Add another amount."""
         if self.degrees == other.degrees or not other.number:
             return self._replace(number=self.number + other.number)
         one, two = (radians(each.number) if each.degrees else each.number for each in (self, other))
@@ -116,7 +116,7 @@ class DhRow(NamedTuple):
 
 
 def rows_of(file: InputFile, tally: Tally) -> list[DhRow]:
-    """Return the rows of a table, and note what else stands in them; raises FormatError with the place."""
+    """Return the rows of a table, and note its other contents; raises FormatError with the place."""
     text = file.text
     is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
     cells = _of_documents(file, tally) if is_document else _of_lines(file, tally)
@@ -132,7 +132,7 @@ def rows_of(file: InputFile, tally: Tally) -> list[DhRow]:
 
 
 def column_of(written: str) -> Column | None:
-    """Return which column a header names, by any of the names in use; None if it is no other's business."""
+    """Return the column with a header name, by any of the names in use; None for other names."""
     base, unit = written.strip().lower(), ""
     for pattern in (_BRACKETED, _SUFFIXED):
         if (match := re.fullmatch(pattern, base)) and match[2] in UNITS:
@@ -172,7 +172,7 @@ def _row(number: int, cells: dict[str, Cell], fail: Fail) -> DhRow:
 
 
 def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
-    """Read a number, or the joint's variable with what is added to it; raises the error of the cell."""
+    """Read a number, or the joint's variable and an offset; raises the error of the cell."""
     text = cell.text
     try:
         return read(text, cell.unit)
@@ -207,19 +207,19 @@ def _length(text: str, unit: str) -> Amount:
 
 
 def _tell_others(names: Iterable[str], line: int, tally: Tally) -> None:
-    """Note the columns or keys that are about something else."""
+    """Note the columns or keys that are not used."""
     if others := [name for name in dict.fromkeys(names) if column_of(name) is None]:
         tally.note_each(f"left out, about something else: {listing(others)}", line)
 
 
 def _misspelt(name: str) -> str:
-    """Return the nearest of the known names for what is none of them, as ` did you mean 'x'?`."""
+    """Return a suggestion for an unknown name, as ` did you mean 'x'?`."""
     known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
     return did_you_mean(name.strip().lower(), known, cutoff=0.75)
 
 
 def _of_lines(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
-    """Yield the rows of a text with a line a row, below a header."""
+    """Yield the rows of a text with one row per line, below a header."""
     lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
     begin = next((at for at, (_, line) in enumerate(lines) if _columns(line)), None)
     if begin is None:
@@ -249,13 +249,13 @@ def _of_lines(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], 
 
 
 def _columns(line: str) -> dict[int, Column]:
-    """Return the columns that a header names, by their places; nothing for a line that is no header."""
+    """Return the columns of a header, by their positions; empty for a line that is not a header."""
     found = {at: column for at, word in enumerate(_split(line)) if (column := column_of(word.text))}
     return found if {"a", "alpha"} <= {column.name for column in found.values()} else {}
 
 
 def _split(line: str) -> list[LineCell]:
-    """Return the cells of a line between tabs, semicolons, commas or blanks; a # before them counts for nothing."""
+    """Split a line at tabs, semicolons, commas or blanks; a # before them is ignored."""
     line = re.sub("^( *)#", r"\1 ", line.rstrip())
     mark = next((mark for mark in "\t;," if mark in line), "")
     if mark == ",":
@@ -299,7 +299,7 @@ def _of_documents(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cel
 
 
 def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterator[list[FoundRow]]:
-    """Yield each table as its rows: name, place, and key -> value and its place; raises what `fail` makes."""
+    """Yield each table as its rows: name, place, and key -> value and its place; raises the error made by `fail`."""
     if len(path) > 4 or type(value) not in (dict, list) or not value:
         return
     items = list(value.items() if type(value) is dict else enumerate(value))
@@ -318,7 +318,7 @@ def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterato
         for key, each in columns.items():
             if len(each) != size and column_of(key) not in (None, NAME):
                 raise fail(f"{key}: expected {size} numbers, as another has, found {len(each)}", *path, key)
-        # one name beside columns is that of the robot
+        # a single name next to the columns is that of the robot
         kept = {key: each or [None] for key, each in columns.items() if len(each) == size or column_of(key) != NAME}
         yield [
             ("", path, {key: ((each[at:] or each)[0], (*path, key, at)) for key, each in kept.items()})
@@ -339,7 +339,7 @@ TURN = 6.283185307179586
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield an edge a row, its joint as options say, else at 0."""
+    """Yield one edge per row, with joint values from options, default 0."""
     rows = rows_of(file, options.tally)
     if not options.answers.dh:
         choice = "--dh standard (a and alpha behind the joint) or --dh modified (Craig: before it)"
@@ -352,7 +352,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:
-    """Make a link of one row; its joint turns about z or shifts along it."""
+    """Return the link of one row; its joint rotates about z or translates along it."""
     for name, amount in (("theta", row.theta), ("alpha", row.alpha)):
         if not amount.degrees and abs(amount.number) > TURN:
             message = f"{name} {amount.number:g} is more than a full turn in radians; degrees? write {name}_deg"

@@ -1,12 +1,12 @@
-"""Where the joints of one robot stand, at one time or over time: as options and files say, else at rest.
+"""Joint values of a robot, at one time or over time, from options and files; by default at rest.
 
-    {shoulder: 30deg, gripper: 2cm, base: {xyz: [1, 0, 0]}}          with `stamp`, one of many: the joints move
+    {shoulder: 30deg, gripper: 2cm, base: {xyz: [1, 0, 0]}}          with `stamp`, one sample of many
     {name: [shoulder, gripper], position: [0.5, 0.02]}               JointState, of either ROS, one or many
-    t,shoulder_deg,elbow [deg],finger (mm)                           a table; without a stamp its last row counts
+    t,shoulder_deg,elbow [deg],finger (mm)                           a table; without stamps its last row is used
     scene.xml:ready                                                  a key of MJCF
 
-A joint that mimics another follows it, in chains too; only its own name overrides that.  Each statement keeps its
-place; what it means is for those who know the joint.
+A joint that mimics another follows it, also in chains; only a value of its own overrides that.  Each value keeps its
+place in the file; its meaning depends on the joint.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
     Series = Mapping[int, Value]
 
-SLACK = 1e-9  # by which a value may lie beyond a limit: printed with fewer digits than it has
+SLACK = 1e-9  # tolerance of limits: values are printed with fewer digits than they have
 HALF_TURN = 3.141592653589793
 STATES = "--joint NAME=VALUE"
 
@@ -62,17 +62,18 @@ class JointState:
     """The values of all joints of a robot: one each, or samples over time.
 
     still, moving: values by name, or by name and stamp
-    given: names of the joints told of; the others follow them, or are at rest
+    given: names of the joints with a value; the others follow them, or are at rest
+
     """
 
     def __init__(self, joints: Iterable[Joint], options: Options, fail: Fail, *, fixed: Collection[str] = ()) -> None:
-        """Take what options and files say.
+        """Read the values in options and files.
 
         joints: those that move, each name once
-        options: `answers` holds what was told; `tally` takes the names nobody here has, and what is odd
-        fail: makes the error for the place of a joint
+        options: `answers` has the values; `tally` collects unknown names, and warnings
+        fail: returns the error for the place of a joint
         fixed: names of joints that do not move
-        Raises FormatError: a value that is none, mimics in a circle or of no joint.
+        Raises FormatError: an invalid value, a mimic of itself or of a missing joint.
         """
         self.joints = {joint.name: joint for joint in joints}
         self.still: dict[str, Value] = {}
@@ -91,13 +92,13 @@ class JointState:
 
     @classmethod
     def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> JointState:
-        """Find out where the joints of some links stand."""
+        """Return the joint values for the joints of some links."""
         joints = (joint for link in links for joint in link.joints)
         fail = fail or (lambda joint, problem: FormatError(problem, line=joint.line))
         return cls(joints, options, fail, fixed=[link.fixed for link in links if link.fixed])
 
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
-        """Yield an edge a link: for good, or a sample at each time at which one of its joints has a value."""
+        """Yield one edge per link: static, or a sample at each time at which one of its joints has a value."""
         links = [*links]
         self._options.tally.robot = self.still, links, [name for name in self.joints if name not in self.told]
         for link in links:
@@ -126,7 +127,7 @@ class JointState:
         return sorted({at for name in moving for at in self.moving[name] if begin <= at <= end})
 
     def _at(self, name: str, stamp_ns: int) -> Value:
-        """Return the value of a joint at a time between its first and last sample, or the one it has always."""
+        """Return the value of a joint at a time between its first and last sample, or its only value."""
         if name in self.still:
             return self.still[name]
         series = self.moving[name]
@@ -138,7 +139,7 @@ class JointState:
         return _between(series[begin], series[end], (stamp_ns - begin) / (end - begin))
 
     def _take_files(self) -> None:
-        """Read all files; the later one counts, and of one file all its samples."""
+        """Read all files; later ones override earlier ones, and all samples of a file are used."""
         for path in self._options.answers.joint_files:
             found: dict[str, list[tuple[int | None, Value]]] = {}
             setting = None
@@ -163,7 +164,7 @@ class JointState:
             raise setting.refuse(str(error), ()) from None
 
     def _take(self, name: str, values: Sequence[tuple[int | None, Value]]) -> None:
-        """Keep the samples of one joint; one that stays where it is stands still, and without times the last counts."""
+        """Store the samples of one joint; constant ones are a single value, and without times the last counts."""
         self.still.pop(name, None)
         self.moving.pop(name, None)
         series = {stamp_ns: value for stamp_ns, value in values if stamp_ns is not None}
@@ -174,7 +175,7 @@ class JointState:
             self.moving[name] = dict(sorted(series.items()))
 
     def _take_options(self) -> None:
-        """Read what `--joint` says; it wins over files."""
+        """Read the values of `--joint`, which override files."""
         for name, text in self._options.answers.joints.items():
             joint = self.joints.get(name)
             if joint is None:
@@ -189,7 +190,7 @@ class JointState:
             self._take(name, [(None, value)])
 
     def _follow(self, fail: Fail) -> None:
-        """Settle each joint that has no value yet: at its leader's, along chains of any length, or at rest."""
+        """Set each joint without a value: from its leader, along chains of any length, or at rest."""
         for name in self.joints:
             chain = {name: None}
             last = name
@@ -204,7 +205,7 @@ class JointState:
                 self._settle(self.joints[follower])
 
     def _leader(self, name: str, fail: Fail) -> str | None:
-        """Return the joint that decides over one which is not settled yet."""
+        """Return the joint that determines one without a value."""
         mimic = self.joints[name].mimic
         if name in self.still or name in self.moving or mimic is None or mimic.joint in self._fixed:
             return None
@@ -215,7 +216,7 @@ class JointState:
         return mimic.joint
 
     def _settle(self, joint: Joint) -> None:
-        """Find the value of a joint whose leader has one."""
+        """Compute the value of a joint whose leader has one."""
         name, mimic = joint.name, joint.mimic
         if name in self.still or name in self.moving:
             return
@@ -230,7 +231,7 @@ class JointState:
             self.told.add(name)
 
     def _tell_limits(self) -> None:
-        """Note the values told that lie beyond limits, and steps that a pose cannot follow."""
+        """Record values beyond limits, and steps that a pose cannot follow."""
         for name in (*self.still, *self.moving):
             joint, tally = self.joints[name], self._options.tally
             series = self.moving.get(name) or {0: self.still[name]}
@@ -245,7 +246,7 @@ class JointState:
                 tally.note(f"{far}; poses between go the shorter way", joint.line)
 
     def _about(self) -> str:
-        """Return how many joints stand where nobody said."""
+        """Return how many joints are at rest because no value was set."""
         free = [joint for joint in self.joints.values() if joint.name not in self.told]
         if not free:
             return ""
@@ -255,7 +256,7 @@ class JointState:
 
 
 def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:
-    """Return the sentence that values of a joint lie beyond its limits."""
+    """Return the warning that values of a joint are beyond its limits."""
     unit = "rad" if joint.kind in TURNING else "m"
     limits = f"its limits {joint.lower:g} .. {joint.upper:g} {unit}"
     samples = f" in {len(beyond)} of {count} samples, first" if count > 1 else ","
@@ -263,7 +264,7 @@ def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:
 
 
 def _between(one: Value, two: Value, fraction: float) -> Value:
-    """Return the value of a joint between two samples: on the line, and by slerp where it is a pose."""
+    """Interpolate the value of a joint between two samples: linearly, and by slerp for a pose."""
     if not (isinstance(one, JointValue) and isinstance(two, JointValue)):
         begin, end = cast("Rigid", one), cast("Rigid", two)
         return rigid.interpolate(*begin, *end, fraction, floats)
@@ -277,9 +278,9 @@ _UNIT = re.compile(rf"_({'|'.join((*ANGLES, *filter(None, LENGTHS)))})$")
 
 
 class JointColumn(NamedTuple):
-    """A column that holds the value of a joint: radians or metres, unless its name says degrees or another length.
+    """A column with the value of a joint: radians or metres, unless its name states degrees or another unit.
 
-    per_metre: how many of its units make a metre
+    per_metre: its units per metre
     """
 
     place: int
@@ -289,9 +290,9 @@ class JointColumn(NamedTuple):
 
 
 def find_joint_columns(names: Sequence[str], joints: Mapping[str, Joint]) -> list[JointColumn]:
-    """Return the columns that are called as joints, one a joint.
+    """Return the columns with names of joints, one per joint.
 
-    Raises ValueInvalid: a unit that the joint cannot have, two columns for one joint, a joint whose value is a pose.
+    Raises ValueInvalid: an impossible unit, two columns for one joint, a joint whose value is a pose.
     """
     found: dict[str, JointColumn] = {}
     for place, name in enumerate(names):
@@ -320,7 +321,7 @@ def _joint_column(place: int, name: str, joints: Mapping[str, Joint]) -> JointCo
 
 
 def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
-    """Part a column's name into a joint and a unit; a joint's own name is taken whole."""
+    """Split a column's name into a joint and a unit; a joint's own name is not split."""
     if name in joints:
         return name, ""
     holder, dot, rest = name.partition(".")
@@ -331,7 +332,7 @@ def _with_unit(name: str, joints: Mapping[str, Joint]) -> tuple[str, str]:
 
 
 def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int, str] | None:
-    """Find the column of stamps: its place, and the unit that its name says, if any; None if there is none."""
+    """Return the index of the column of stamps and the unit in its name, if any; None if there is none."""
     from frametool.grammar import names as known
 
     place = known.stamp_column("" if name.strip() in joints else name.strip() for name in names)
@@ -339,7 +340,7 @@ def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int
 
 
 def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
-    """Return what is wrong with the first column that is nearly called as a joint which no other column holds."""
+    """Return the error for the first column whose name resembles a joint that no other column has."""
     held = {column.joint for column in find_joint_columns(names, joints)}
     for name in names:
         bare_name = _with_unit(name.strip(), joints)[0]
@@ -348,11 +349,11 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
     return ""
 
 
-DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of other tables than CSV
+DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of tables other than CSV
 
 
 class JointSample(NamedTuple):
-    """What a file says of one joint: its value as written, and when; `refuse` makes the error for the value's place."""
+    """One value of a joint in a file: its text, and its stamp; `refuse` returns the error for its place."""
 
     joint: str
     value: Any
@@ -362,10 +363,10 @@ class JointSample(NamedTuple):
 
 
 class JointFile:
-    """One file of joint values, and the joints of the robot that it may speak of."""
+    """One file of joint values, and the joints that it may contain."""
 
     def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
-        """Open it: a file, or FILE:STATE for a state that it has a name for; raises FileProblem."""
+        """Open a file, or FILE:STATE for a named state; raises FileProblem."""
         file, colon, state = path.rpartition(":")
         has_state = colon and file and not os.path.exists(path) and os.path.exists(file)
         self.path, self.state = (file, state) if has_state else (path, "")
@@ -374,7 +375,7 @@ class JointFile:
         self.file = InputFile(self.path)
 
     def settings(self) -> Iterator[JointSample]:
-        """Yield what it says, in order, and close it.
+        """Yield the values in the order of the file, and close it.
 
         Raises FormatError.
         """
@@ -404,7 +405,7 @@ class JointFile:
     def _messages(
         self, messages: Iterable[Message | FormatError], state_of: Callable[[Any], Any] | None = None
     ) -> Iterator[JointSample]:
-        """Yield what documents or rows say; `state_of` makes a JointState of a row."""
+        """Yield the values in documents or rows; `state_of` makes a JointState of a row."""
         for message in messages:
             if isinstance(message, FormatError):
                 raise message
@@ -414,7 +415,7 @@ class JointFile:
                 raise message.error(misfit) from None
 
     def _values(self, value: Any, path: Path, message: Message) -> Iterator[JointSample]:
-        """Yield the settings of a plain value: a JointState, a map, or a list of either."""
+        """Yield the values in a plain value: a JointState, a map, or a list of either."""
         if type(value) is list:
             for index, each in enumerate(value):
                 yield from self._values(each, (*path, index), message)
@@ -434,7 +435,7 @@ class JointFile:
                 raise misfit.below(*path) from None
 
     def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[JointSample]:
-        """Yield what a map says, or the one map in it, as under `joints:`."""
+        """Yield the values of a map, or of the only map in it, as under `joints:`."""
         from frametool.grammar.names import STAMP_KEYS
 
         times = [key for key in STAMP_KEYS if key in mapping and key not in self.joints]
@@ -447,7 +448,7 @@ class JointFile:
             yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
 
     def _table(self, form: str, head: str) -> Iterator[JointSample]:
-        """Yield the settings of a table: a column a joint, or what the echo tools write."""
+        """Yield the values of a table: one column per joint, or the output of the echo tools."""
         first = next((line for line in head.split("\n") if line.strip()), "")
         name = self.file.name
         if first.startswith("%time,"):
@@ -466,7 +467,7 @@ class JointFile:
         return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(form))]
 
     def _columns(self, form: str) -> Iterator[JointSample]:
-        """Yield the settings of a table whose header names joints."""
+        """Yield the values of a table whose header names joints."""
         rows = line_texts(self.file.stream, self.file.name, self.tally)
         number, header = next(rows, (1, ""))
         names = self._cells(form, header.strip("\r\ufeff"))
@@ -508,7 +509,7 @@ class JointFile:
 
 
 def _finite(value: Any, path: Path) -> JointValue:
-    """Read a position in a message: radians or metres, no units."""
+    """Read a position in a message: radians or metres, without units."""
     try:
         if type(value) is not str:
             raise ValueInvalid(f"expected a number, found {kind(value)}")
@@ -522,7 +523,7 @@ def _refused(message: Message, path: Path, problem: str, below: Path) -> FormatE
 
 
 def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:
-    """Return the sentence that a robot has no such joint, or that it does not move."""
+    """Return the error that a robot has no such joint, or that it is fixed."""
     if joint in fixed:
         return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(joints)}"
     return f"no joint {shown(joint)}{alternatives(joint, joints, 'joints')}"

@@ -1,16 +1,17 @@
-"""MJCF, the models of MuJoCo, read; their joints take values.
+"""Read MJCF, MuJoCo's models; their joints take values.
 
     <body name="arm" pos="0 0 1" quat="1 -1 0 0"><joint name="elbow" axis="0 1 0" pos="0 0 .1" ref="30"/> ..
 
-parent_from_child = pose * the motions of the body's joints, in order: hinges turn about `axis` through `pos`, by their
-value less `ref`; so a joint that nobody tells of stands at `ref`, where the file shows the body. Bodies hang on the
-body around them, the outermost on `world`; sites and cameras are `site:NAME`, `camera:NAME` (looking along -z).
-Metres; degrees unless the compiler says radian; quaternions w first, of any length; eulerseq with moving axes in lower
-and fixed ones in upper case. Values of a key: --joints FILE.xml:KEY. <include>, <replicate>, <attach> are refused.
+parent_from_child = pose * the motions of the body's joints, in order: hinges rotate about `axis` through `pos`, by
+their value minus `ref`; so a joint without a value is at `ref`, where the file has the body. The parent of a body is
+the enclosing one, of the outermost `world`; sites and cameras are `site:NAME`, `camera:NAME` (looking along -z).
+Metres; degrees unless the compiler states radian; quaternions w first, of any length; eulerseq with moving axes in
+lower and fixed ones in upper case. Values of a key: --joints FILE.xml:KEY. <include>, <replicate>, <attach> are
+refused.
 Source: MuJoCo 3 and 4, XML reference and engine_core_smooth.c (mj_kinematics).
 
-Of the five ways to write an orientation (quat, axisangle, euler, xyaxes, zaxis) an element has one at most, and its own
-puts aside that of its class.
+An element has at most one of the five orientations (quat, axisangle, euler, xyaxes, zaxis), and its own overrides
+that of its class.
 """
 
 from __future__ import annotations
@@ -54,13 +55,13 @@ HELD = {
 TYPES = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "floating"}
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 MAIN = "main"
-STRAIGHT = ("capsule", "cylinder", "box", "ellipsoid")  # sites that may be written from end to end
-LEAST = 1e-14  # what MuJoCo takes for a vector without a direction
+STRAIGHT = ("capsule", "cylinder", "box", "ellipsoid")  # sites that may be defined by two ends
+LEAST = 1e-14  # below this length MuJoCo treats a vector as zero
 SAME_LINE = 1e-10  # what MuJoCo takes for a zaxis along z
 
 
 class _Inside(NamedTuple):
-    """What surrounds an element: its body, the default class, and the frames in the body that it stands in."""
+    """The context of an element: its body, the default class, and the enclosing frames in the body."""
 
     body: str
     around: str
@@ -68,7 +69,7 @@ class _Inside(NamedTuple):
 
 
 class MjcfModel:
-    """The frames of a model, bodies before what they hold."""
+    """The frames of a model, parents before children."""
 
     def __init__(self, root: XmlNode, options: Options) -> None:
         """Read a model; raises FormatError."""
@@ -85,12 +86,12 @@ class MjcfModel:
             self._walk(section)
 
     def _refuse(self, node: XmlNode) -> None:
-        """Refuse what MuJoCo would have to expand first."""
+        """Refuse elements that MuJoCo would have to expand first."""
         for child in node.all(*REFUSED):
             raise child.error(f"<{child.tag}> is not expanded here; {WHOLE}")
 
     def _walk(self, section: XmlNode) -> None:
-        """Read what stands in a world in the order of the file; a stack, for bodies may be deep."""
+        """Read the contents of a world in the order of the file; with a stack, because bodies may be deep."""
         self._refuse(section)
         pending = [(child, _Inside(WORLD, "", IDENTITY)) for child in reversed(section.children)]
         while pending:
@@ -100,7 +101,7 @@ class MjcfModel:
                 pending += [(child, inside) for child in reversed(node.children)]
 
     def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
-        """Read one element; of a body or frame return what surrounds that which it holds."""
+        """Read one element; for a body or frame return the context of its children."""
         if node.tag in MADE:
             self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
         elif node.tag == "frame":
@@ -116,7 +117,7 @@ class MjcfModel:
         return None
 
     def _class(self, node: XmlNode, around: str) -> str:
-        """Return the class that a body or frame gives to what stands in it."""
+        """Return the default class for the children of a body or frame."""
         name = node.attribute("childclass")
         if name:
             self.classes.check(name, node, "childclass")
@@ -134,9 +135,9 @@ class MjcfModel:
             self.options.tally.note_each(message, node.line)
 
     def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> str:
-        """Hang a body, site or camera where it is at rest; return its name, which shows whether it is a body."""
+        """Add a body, site or camera at its rest pose; return its name, whose prefix shows whether it is a body."""
         name = node.attribute("name")
-        if not name:  # counted in its body
+        if not name:  # numbered in its body
             count = self._counts[inside.body, node.tag] = self._counts.get((inside.body, node.tag), 0) + 1
             name = f"{inside.body}/{node.tag}{count}"
         name = name if node.tag == "body" else f"{node.tag}:{name}"
@@ -175,7 +176,7 @@ class MjcfModel:
         self.links[link.child] = link._replace(origin=origin, joints=(*link.joints, joint))
 
     def _hinged(self, joint: Joint, attributes: Attributes, frame: Rigid) -> Joint:
-        """Read the axis, anchor, limits and reference of a joint; frames around it move axis and anchor."""
+        """Read the axis, anchor, limits and reference of a joint; enclosing frames transform axis and anchor."""
         anchor = rigid.apply(*frame, *self.poses.vector(attributes, "pos"))
         if joint.kind == "ball":
             return joint._replace(anchor=anchor)
@@ -193,20 +194,20 @@ SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others hav
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a model, its joints as options say, else at their references."""
+    """Yield the edges of a model, with joint values from options, default at their references."""
     model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
     yield from JointState.of(model.links.values(), options).edges(model.links.values())
 
 
 def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
-    """Yield what a key of the model says of its joints: `state` is its name, or its number from 0.
+    """Yield the joint values of a key of the model: `state` is its name, or its number from 0.
 
     Raises FormatError.
     """
     xml = XmlFile(file)
     root = read_nodes(xml, HELD)
     links = MjcfModel(root, Options(Tally(), Topics())).links.values()
-    joints = [joint for link in links for joint in link.joints]  # a body's before those of the bodies in it
+    joints = [joint for link in links for joint in link.joints]  # a body's before those of its children
     key = _key(root, state)
     if not key.attribute("qpos"):
         raise key.error(f"key {shown(state)} has no qpos")
@@ -238,7 +239,7 @@ def _key(root: XmlNode, state: str) -> XmlNode:
 
 
 def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], FormatError]) -> Any:
-    """Return the value of a joint as files have it: a number, or the mapping that is a pose; quaternions w first."""
+    """Return the value of a joint: a number, or a mapping with a pose; quaternions w first."""
     if joint.kind not in SIZES:
         return JointValue(numbers[0])
     w, x, y, z = numbers[-4:]
@@ -249,7 +250,7 @@ def _value(joint: Joint, numbers: list[float], refuse: Callable[[str, Path], For
 
 
 class Attribute(NamedTuple):
-    """The text of an attribute, and the element that has it: maybe a default."""
+    """The text of an attribute, and its element or default."""
 
     name: str
     text: str
@@ -261,19 +262,19 @@ class Attribute(NamedTuple):
 
 
 def own_attributes(node: XmlNode) -> dict[str, Attribute]:
-    """Return the attributes of an element; those that are empty count as missing."""
+    """Return the attributes of an element; empty ones count as missing."""
     return {name: Attribute(name, text, node) for name, text in node.element.attributes.items() if text.strip()}
 
 
 def over(inner: Attributes, outer: Attributes) -> dict[str, Attribute]:
-    """Return the attributes of an element on top of those of its class: one orientation puts all others aside."""
+    """Return the attributes of an element merged over those of its class: one orientation replaces all others."""
     turned = any(name in inner for name in ORIENTATIONS)
     kept = {name: each for name, each in outer.items() if not (turned and name in ORIENTATIONS)}
     return {**kept, **inner}
 
 
 class Classes:
-    """The default classes of a model: class -> kind of element -> attributes; nested ones have those around them too.
+    """The default classes of a model: class -> kind of element -> attributes; nested ones inherit the enclosing ones.
 
     A class may be used before it is defined.
     """
@@ -288,7 +289,7 @@ class Classes:
             self._take(section)
 
     def _take(self, section: XmlNode) -> None:
-        """Read one section, then those in it, each from a copy; a stack, for they may be deep."""
+        """Read one section, then its children, each from a copy; with a stack, because they may be deep."""
         pending = [(section, MAIN)]
         while pending:
             node, name = pending.pop()
@@ -305,23 +306,23 @@ class Classes:
                 pending.append((child, inner))
 
     def attributes(self, node: XmlNode, around: str) -> dict[str, Attribute]:
-        """Return the attributes of an element; `around` is the class that the bodies around it give it, if any."""
+        """Return the attributes of an element; `around` is the class inherited from the enclosing bodies, if any."""
         own = own_attributes(node)
         name = own["class"].text if "class" in own else around or MAIN
         self.check(name, node, "class")
         return over(own, self.classes[name].get(node.tag, {}))
 
     def check(self, name: str, node: XmlNode, attribute: str) -> None:
-        """Raise FormatError for a class that is nowhere defined."""
+        """Raise FormatError for an undefined class."""
         if name not in self.classes:
             raise node.error(f"no default class {shown(name)}{alternatives(name, self.classes, 'classes')}", attribute)
 
 
 class PoseReader:
-    """Reads numbers, angles and poses as the compiler section of a model says."""
+    """Reads numbers, angles and poses according to the compiler section of a model."""
 
     def __init__(self, root: XmlNode) -> None:
-        """Read the compiler sections, wherever they stand: the last word on each setting counts; raises FormatError."""
+        """Read the compiler sections, anywhere in the file: the last value of a setting counts; raises FormatError."""
         said: dict[str, Attribute] = {}
         for section in root.all("compiler"):
             said.update(own_attributes(section))
@@ -337,7 +338,7 @@ class PoseReader:
             raise said["coordinate"].error(message)
 
     def word(self, attributes: Attributes, name: str, default: str, words: tuple[str, ...]) -> str:
-        """Return an attribute that is one of some words."""
+        """Return an attribute with one of several values."""
         if name not in attributes:
             return default
         text = attributes[name].text.strip()
@@ -346,7 +347,7 @@ class PoseReader:
         return text
 
     def numbers(self, attributes: Attributes, name: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
-        """Read an attribute as so many numbers; without it the default."""
+        """Read an attribute of this many numbers; without it the default."""
         if name not in attributes:
             return default
         text, node = attributes[name][1:]
@@ -372,7 +373,7 @@ class PoseReader:
         return x, y, z
 
     def pose_of_site(self, attributes: Attributes) -> Rigid:
-        """Read the pose of a site, which may be written from end to end: its z axis looks to the first end."""
+        """Read the pose of a site, which may be defined by two ends: its z axis points to the first end."""
         if "fromto" not in attributes:
             return self.pose(attributes)
         fromto = attributes["fromto"]
@@ -404,7 +405,7 @@ class PoseReader:
         return vectors.from_axis_angle(*axis, angle, floats, degrees=self.degrees)
 
     def _euler(self, attributes: Attributes) -> Quaternion:
-        """Multiply the turns about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
+        """Multiply the rotations about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
         turned = (0.0, 0.0, 0.0, 1.0)
         for letter, angle in zip(self.eulerseq, self.numbers(attributes, "euler", 3, ()), strict=True):
             sine, cosine = half_sincos_deg(angle, floats) if self.degrees else half_sincos(angle, floats)
@@ -414,7 +415,7 @@ class PoseReader:
         return turned
 
     def _xyaxes(self, attributes: Attributes) -> Quaternion:
-        """Read x and y axes: x counts, of y what is at right angles to it."""
+        """Read x and y axes: x is used, and the part of y orthogonal to it."""
         numbers = self.numbers(attributes, "xyaxes", 6, ())
         x = self._unit(attributes, "xyaxes", numbers[:3])
         along = sum(a * b for a, b in zip(x, numbers[3:], strict=True))
@@ -427,7 +428,7 @@ class PoseReader:
 
 
 def _turning_z(x: float, y: float, z: float) -> Quaternion:
-    """Return the shortest turn of the z axis into a direction; about x where that is -z, as MuJoCo does."""
+    """Return the shortest rotation from the z axis to a direction; about x if that is -z, as in MuJoCo."""
     if z < 0.0 and quaternion.length(x, y, 0.0, floats) < SAME_LINE:
         return 1.0, 0.0, 0.0, 0.0
     return quaternion.between(0.0, 0.0, 1.0, x, y, z, floats)

@@ -1,14 +1,14 @@
-"""One model of a robot, whatever form described it: links, the joints between them, and the values those take.
+"""The model of a robot for all formats: links, the joints between them, and joint values.
 
     Link("base", "arm", origin, (Joint("elbow", "revolute", (0.0, 1.0, 0.0), lower=-2.0, upper=2.0),))
 
-Radians, metres, poses.  A value is text as people write it (`0.5`, `30deg`, `pi/2`, `2cm`), a number, or a pose where a
-joint has no single one.  A link is where its joints put it; `Robot.fk` and the edges of a tree ask the same function.
+Radians, metres, poses.  A value is text as people write it (`0.5`, `30deg`, `pi/2`, `2cm`), a number, or a pose for a
+joint with several degrees of freedom.  `Robot.fk` and the edges of a tree use the same function for the pose of a link.
 
     robot = frametool.load_robot("arm.urdf")
     base_from_tip = robot.fk("base", "tip", {"shoulder": 0.3, "elbow": numpy.linspace(0.0, 1.0, 1000)})
 
-Knows neither files of values nor times: those are `frametool.formats.robots.joints`.
+Knows neither files of values nor times: those are in `frametool.formats.robots.joints`.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ if TYPE_CHECKING:
     Fail: TypeAlias = Callable[["Joint", str], FormatError]
 
 TURNING = ("revolute", "continuous")
-POSED = ("planar", "floating", "ball")  # no single number says where these stand
+POSED = ("planar", "floating", "ball")  # their value is a pose, not a number
 OUT_OF_PLANE = 1e-9
 
 
 def read_quaternion(
     xml: XmlFile, element: Element, texts: Sequence[str], options: Options, attribute: str = ""
 ) -> Quaternion:
-    """Read x, y, z, w of an element by the rules of the grammar; what is odd is noted.  Raises FormatError."""
+    """Read x, y, z, w of an element by the rules of the grammar; warnings are recorded.  Raises FormatError."""
     reading = Reading(Source(xml.name, ""), normalize=options.normalize)
     try:
         rotation = rotation_of(notation("xyzw"), texts, INDICES, reading)
@@ -78,10 +78,10 @@ class Joint(NamedTuple):
     kind: one of TURNING or POSED, or prismatic
     axis: unit, in the frame of the joint; of a planar one the normal of its plane
     lower, upper: limits in radians or metres, if it has any
-    rest: the value where nothing has moved, which it has by default (MJCF's `ref`)
-    rest_pose: the same where the value is a pose
-    anchor: the point of its frame that it turns about
-    line: on which it was written
+    rest: the default value, of the pose in the file (MJCF's `ref`)
+    rest_pose: the same if the value is a pose
+    anchor: the point of its frame about which it rotates
+    line: line number in the file
     """
 
     name: str
@@ -102,14 +102,14 @@ class Joint(NamedTuple):
 
     @property
     def start(self) -> Value:
-        """Return the value it has by default."""
+        """Return the default value."""
         return self.rest_pose if self.posed else JointValue(self.rest)
 
 
 class JointValue(NamedTuple):
-    """The value of a joint that turns or slides: a float or an array; radians or metres, or degrees, which stay exact.
+    """The value of a revolute or prismatic joint: a float or an array; radians or metres, or degrees, which are exact.
 
-    An angle in degrees is never turned into radians on its way: quarter turns have exact poses.
+    An angle in degrees is never converted to radians: quarter turns have exact poses.
     """
 
     number: Number
@@ -117,12 +117,12 @@ class JointValue(NamedTuple):
 
     @property
     def plain(self) -> Number:
-        """Return it in radians or metres."""
+        """Return the value in radians or metres."""
         return self.number * DEGREE if self.degrees else self.number
 
 
 def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
-    """Return what a joint does to the frame behind it."""
+    """Return the motion of the frame after the joint."""
     if isinstance(value, JointValue):
         number, degrees = value
         if joint.rest:
@@ -139,7 +139,7 @@ def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
 
 
 def _is_at_rest(joint: Joint, value: Value) -> Condition:
-    """Tell whether, or where, a joint moves nothing."""
+    """Return True, or an array, where a joint does not move anything."""
     if not isinstance(value, JointValue):
         return value == IDENTITY
     at_rest: Condition = value.number == (joint.rest * RADIAN if value.degrees else joint.rest)
@@ -147,13 +147,13 @@ def _is_at_rest(joint: Joint, value: Value) -> Condition:
 
 
 class Link(NamedTuple):
-    """How a frame hangs in its parent; None for a root.
+    """The connection of a frame to its parent; None for a root.
 
-    origin: the pose in front of the joints; after: behind them
+    origin: the pose before the joints; after: after them
     joints: those that move it, outermost first
-    rest: its pose where no joint has moved, to the bits that the file has
+    rest: its pose with all joints at rest, with exactly the numbers of the file
     inverted: origin, joints and after lead from the frame to its parent
-    fixed: the name of the joint that holds it, if that does not move
+    fixed: the name of the fixed joint to its parent, if there is one
     """
 
     parent: str | None
@@ -167,7 +167,7 @@ class Link(NamedTuple):
     fixed: str = ""
 
     def pose(self, values: Sequence[Value], xp: Namespace = floats) -> Rigid:
-        """Return its pose in its parent for values of its joints; where none of them has moved the bits of `rest`."""
+        """Return its pose in its parent for joint values; exactly `rest` if no joint has moved."""
         rest = self.rest or _product(self.origin, self.after)
         if not self.joints:
             return rest
@@ -193,7 +193,7 @@ def _product(*poses: Rigid) -> Rigid:
 
 
 def followed(joint: Joint, leader: Value) -> Value:
-    """Return the value of a joint that mimics another one; it is not held back by limits."""
+    """Return the value of a joint that mimics another one; limits are not applied."""
     if joint.mimic is None or not isinstance(leader, JointValue):
         return joint.start
     _, multiplier, offset = joint.mimic
@@ -203,9 +203,9 @@ def followed(joint: Joint, leader: Value) -> Value:
 
 
 def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = False) -> Value:
-    """Read the value of a joint: a number, text with or without a unit, a mapping that is a pose.
+    """Read the value of a joint: a number, text with or without a unit, a mapping with a pose.
 
-    source: where it stands, for messages.  Raises Misfit with the path below the value, and ValueInvalid.
+    source: where it is, for messages.  Raises Misfit with the path below the value, and ValueInvalid.
     """
     if joint.posed:
         return _read_posed(joint, value, source, normalize=normalize)
@@ -240,7 +240,7 @@ def _read_posed(joint: Joint, value: Any, source: Source, *, normalize: bool) ->
 
 
 def _check_freedom(joint: Joint, components: Rigid) -> None:
-    """Refuse a pose that the joint cannot take."""
+    """Refuse a pose outside of the joint's degrees of freedom."""
     tx, ty, tz, x, y, z, _ = components
     ax, ay, az = joint.axis
     if joint.kind == "ball" and (tx or ty or tz):
@@ -254,14 +254,14 @@ def _check_freedom(joint: Joint, components: Rigid) -> None:
 
 
 class Robot:
-    """Frames, and joints between them; answers where a frame is seen from another.
+    """Frames and the joints between them; computes the pose of one frame in another.
 
     frames: names, in the order of the file
     joints: those that move, by name
     """
 
     def __init__(self, name: str, links: Mapping[str, Link], frames: Iterable[str]) -> None:
-        """Take the frames, and how those hang that are no roots; `name` is for messages."""
+        """Store the frames, and the links of those that are not roots; `name` is for messages."""
         self.name = name
         self.frames = tuple(frames)
         self.links = dict(links)
@@ -269,11 +269,11 @@ class Robot:
 
     @property
     def roots(self) -> tuple[str, ...]:
-        """Return the frames that hang nowhere."""
+        """Return the frames without a parent."""
         return tuple(frame for frame in self.frames if frame not in self.links)
 
     def chain(self, base: str, tip: str) -> Chain:
-        """Return the joints and fixed pieces between two frames.
+        """Return the joints and fixed segments between two frames.
 
         Raises UnknownFrame, NotConnected.
         """
@@ -284,17 +284,17 @@ class Robot:
         return Chain([self.links[child] for child in down], [self.links[child] for child in reversed(up)], self.joints)
 
     def __repr__(self) -> str:
-        """Return how many frames and joints there are, and the roots."""
+        """Show the number of frames and joints, and the roots."""
         counts = f"{len(self.frames)} frames, {len(self.joints)} joints"
         return f"Robot({counts}, roots: {', '.join(self.roots) or 'none'})"
 
     def fk(self, base: str, tip: str, joints: Mapping[str, Any] | Numbers) -> Transform:
-        """Return base_from_tip, the pose of `tip` in `base`, for one posture or for many at once.
+        """Return base_from_tip, the pose of `tip` in `base`, for one set of joint values or many at once.
 
         joints: values by name, numbers or arrays of one shape: radians and metres, text like "30deg", a pose for a
-        planar or floating joint; or an array (..., n) of the joints in the order of `chain(base, tip).needs`.
+            planar or floating joint; or an array (..., n) of the joints in the order of `chain(base, tip).needs`.
         A joint that mimics another one follows it unless it has a value of its own.
-        Raises UnknownFrame, NotConnected; ValueInvalid for joints that are missing or not there.
+        Raises UnknownFrame, NotConnected; ValueInvalid for missing or unknown joints.
         """
         chain = self.chain(base, tip)
         values = self._values(joints) if hasattr(joints, "keys") else _of_array(joints, chain.needs)
@@ -303,7 +303,7 @@ class Robot:
         return Transform.of(*chain.run(values))
 
     def _values(self, joints: Any) -> dict[str, Value]:
-        """Check what is told of joints."""
+        """Check the joint values."""
         values: dict[str, Value] = {}
         for name, value in joints.items():
             joint = self.joints.get(name)
@@ -321,7 +321,7 @@ class Robot:
 
 
 def _of_array(joints: Numbers, names: Sequence[str]) -> dict[str, Value]:
-    """Take the last axis of an array apart."""
+    """Split the last axis of an array."""
     array = as_numbers(joints, "joints")
     if array.ndim == 0 or array.shape[-1] != len(names):
         wanted = f"(..., {len(names)}) for {listing(names)}"
@@ -330,32 +330,32 @@ def _of_array(joints: Numbers, names: Sequence[str]) -> dict[str, Value]:
 
 
 class Chain:
-    """The way between two frames of a robot: the links on it, and which joints decide over it.
+    """The path between two frames of a robot: its links, and the joints that determine it.
 
-    needs: the joints whose values decide, those that mimic others left out
+    needs: the joints whose values are needed, without those that mimic others
     """
 
     def __init__(self, down: Sequence[Link], up: Sequence[Link], joints: Mapping[str, Joint]) -> None:
-        """Take the links from the common ancestor down to either end, topmost first."""
+        """Store the links from the common ancestor down to either end, topmost first."""
         self._joints = joints
         self._down, self._up = down, up
         self._between = [joint.name for link in (*down, *up) for joint in link.joints]
         self.needs = self._deciding(())
 
     def uses(self, joint: str) -> bool:
-        """Return True if a joint moves anything on the way, by itself or through those that follow it."""
+        """Return True if a joint moves anything on the path, by itself or through joints that mimic it."""
         return any(joint in self._followed(name, ()) for name in self._between)
 
     def missing(self, told: Collection[str]) -> list[str]:
-        """Name the joints without a value, neither told nor followed."""
+        """Return the joints without a value, neither set nor by mimicking."""
         return [name for name in self._deciding(told) if name not in told]
 
     def _deciding(self, told: Collection[str]) -> tuple[str, ...]:
-        """Name the joints that decide: those told of, and those that follow no other."""
+        """Return the joints that are needed: those with a value, and those that mimic no other."""
         return tuple(dict.fromkeys(self._followed(name, told)[-1] for name in self._between))
 
     def _followed(self, name: str, told: Collection[str]) -> list[str]:
-        """Return a joint and those it follows, up to one that is told or follows none."""
+        """Return a joint and those it mimics, up to one that has a value or mimics none."""
         line = [name]
         while line[-1] not in told:
             mimic = self._joints[line[-1]].mimic
@@ -380,7 +380,7 @@ class Chain:
         return arrays.run(kernel, 7, numbers)
 
     def pose(self, values: Values, xp: Namespace) -> Rigid:
-        """Return base_from_tip for values of the joints that are needed: all floats, or arrays of one block."""
+        """Return base_from_tip for values of the needed joints: all floats, or arrays of one block."""
         top_from_base, top_from_tip = (self._along(links, values, xp) for links in (self._down, self._up))
         if not self._down:
             return top_from_tip
@@ -389,7 +389,7 @@ class Chain:
         return rigid.compose(*rigid.inverse(*top_from_base), *top_from_tip)
 
     def _along(self, links: Sequence[Link], values: Values, xp: Namespace) -> Rigid:
-        """Go along one branch, as `frametool.frames.path` does."""
+        """Compose one branch, as `frametool.frames.path` does."""
         product = None
         for link in links:
             pose = link.pose([self._value(joint.name, values) for joint in link.joints], xp)
@@ -397,10 +397,10 @@ class Chain:
         return product or IDENTITY
 
     def _value(self, name: str, values: Values) -> Value:
-        """Return the value of a joint: told, followed, or at rest."""
+        """Return the value of a joint: set, mimicked, or at rest."""
         *followers, leader = self._followed(name, values)
         value = values[leader] if leader in values else self._joints[leader].start
-        if leader not in values and self._joints[leader].mimic:  # of a joint that is fixed
+        if leader not in values and self._joints[leader].mimic:  # of a fixed joint
             value = followed(self._joints[leader], JointValue(0.0))
         for each in reversed(followers):
             value = followed(self._joints[each], value)

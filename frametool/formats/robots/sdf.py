@@ -1,17 +1,18 @@
-"""SDF, the models and worlds of Gazebo, read; its joints take values.
+"""Read SDF, the models and worlds of Gazebo; their joints take values.
 
     <model name="arm"><link name="tip"><pose relative_to="wrist" degrees="true">0 0 0.1 0 0 90</pose></link> ..
 
 Frames are named `model::link`, `model::joint`, `model::frame`, `outer::inner::link`; those of sensors
 `model::link::sensor`. Metres and radians unless `degrees`; roll pitch yaw about fixed axes, or `quat_xyzw`.
-parent_from_child: a link hangs on the link its joint connects it to, a joint's frame on its child, an explicit frame
-on what it is attached to, a model's frame on its canonical link where a joint moves that, else the links on it.
-Without `relative_to` a pose is that in the model; of a joint in its child, of a frame in what it is attached to.
-A model outside of any world has a parent, `world`, if it has a pose. `<include>` is left out, and said.
+parent_from_child: the parent of a link is the other link of its joint, of a joint's frame its child, of an explicit
+frame the frame it is attached to, of a model's frame its canonical link if a joint moves that, else of the links the
+model's frame.
+Without `relative_to` a pose is relative to the model; of a joint to its child, of a frame to what it is attached to.
+A model outside of any world has a parent, `world`, if it has a pose. `<include>` is omitted, with a warning.
 Source: sdformat.org, Pose Frame Semantics and Model Composition, SDF 1.4 to 1.12.
 
-Every model is a scope: a pose is relative to a frame of the model it stands in, or of one nested in that, named with
-`::`.  Which frame a frame is attached to is another matter, and says how it moves.
+Every model is a scope: a pose is relative to a frame of its model, or of a nested one, named with `::`.  The frame that
+a frame is attached to is independent of that, and determines its motion.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ HELD = {
 def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
     """Read the pose of an element: x y z roll pitch yaw, or x y z qx qy qz qw.
 
-    What is empty or missing is the identity.  Returns it with what it is relative to, "" for the default.
+    Missing or empty is the identity.  Returns the pose and the frame it is relative to, "" for the default.
     Raises FormatError.
     """
     pose = holder.first("pose")
@@ -90,10 +91,10 @@ TRUE = ("true", "1")
 
 
 class SdfFrame:
-    """One frame: of a world, model, link, joint, sensor, or one that is only a frame.
+    """One frame: of a world, model, link, joint, sensor, or an explicit one.
 
-    name: with its scopes, as the tree has it; local: as the file has it
-    scope: the model, or the world, in which it stands; of the world itself
+    name: with its scopes, as in the tree; local: as in the file
+    scope: the enclosing model or world; of a world itself
     attached_to: the frame that it moves with, unless it is a link
     pose: as written, in `relative_to`; of `placement`, if it has one
     """
@@ -101,7 +102,7 @@ class SdfFrame:
     __slots__ = ("attached_to", "holder", "kind", "local", "name", "placement", "pose", "relative_to", "scope")
 
     def __init__(self, kind: str, local: str, scope: SdfFrame | None, holder: XmlNode) -> None:
-        """Create a frame whose pose is not read yet."""
+        """Create a frame without a pose."""
         self.kind, self.local = kind, local
         self.scope: SdfFrame = scope or self
         self.name: str = local if scope is None or scope.kind == WORLD else f"{scope.name}::{local}"
@@ -111,7 +112,7 @@ class SdfFrame:
         self.placement: SdfFrame | None = None
 
     def below(self, scope: SdfFrame) -> list[SdfFrame]:
-        """Return the frames on the way up from this one to a scope around it, that excluded."""
+        """Return the frames on the path up from this one to an enclosing scope, without that."""
         way, frame = [], self
         while frame is not scope:
             way.append(frame)
@@ -131,12 +132,12 @@ class SdfFrames:
         self.top = SdfFrame(WORLD, WORLD, None, worlds[0] if worlds else root)
         self.all: dict[str, SdfFrame] = {WORLD: self.top}
         self.sensors: list[SdfFrame] = []
-        parts = root.attribute("version").split(".")  # what is not a number counts as the newest
+        parts = root.attribute("version").split(".")  # other words count as the newest version
         self.version = tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
-        self.missing: FormatError | None = None  # the last error about a name that was left out
+        self.missing: FormatError | None = None  # the last error about a name that was omitted
         self.gone: set[str] = set()
         self._take([self.top])
-        while self._read_all():  # as long as names are lost with what was left out
+        while self._read_all():  # until no more names are lost with omitted frames
             pass
         self.tree = FrameTree()
         for frame in self.all.values():
@@ -144,8 +145,8 @@ class SdfFrames:
                 self._hang(frame)
 
     def _take(self, scopes: list[SdfFrame]) -> None:
-        """Register what stands in some scopes, and in those below."""
-        for scope in scopes:  # which grows
+        """Register the contents of some scopes, and of those below."""
+        for scope in scopes:  # grows during the loop
             if len(scope.below(self.top)) > DEEPEST_MODEL:
                 raise scope.holder.error(f"more than {DEEPEST_MODEL} models inside one another")
             for holder in scope.holder.children:
@@ -163,7 +164,7 @@ class SdfFrames:
                         self.sensors.append(SdfFrame("sensor", self._name(sensor), frame, sensor))
 
     def note(self, holder: XmlNode, message: str) -> None:
-        """Note what is odd about an element."""
+        """Record a warning about an element."""
         self.options.tally.note_each(message, holder.line)
 
     def _name(self, holder: XmlNode) -> str:
@@ -189,7 +190,7 @@ class SdfFrames:
         return frame
 
     def _read_all(self) -> bool:
-        """Read every frame; return whether some were left out because they build on what is included."""
+        """Read every frame; return True if some were omitted because they depend on included models."""
         lost: list[SdfFrame] = []
         for frame in [*self.all.values(), *self.sensors]:
             try:
@@ -206,18 +207,18 @@ class SdfFrames:
         return bool(lost)
 
     def _is_gone(self, frame: SdfFrame) -> bool:
-        """Return True if a frame, or a scope around it, was left out."""
+        """Return True if a frame, or an enclosing scope, was omitted."""
         return any(each.name in self.gone for each in (frame, *frame.below(self.top)))
 
     def _read(self, frame: SdfFrame) -> None:
-        """Read the pose of a frame and find what it is relative to."""
+        """Read the pose of a frame and find its reference frame."""
         holder, scope = frame.holder, frame.scope
         frame.pose, relative_to = read_pose(holder, self.options)
         if frame.kind == "frame" and (name := holder.attribute("attached_to")):
             frame.attached_to = self.find(name, scope, holder, "attached_to")
-        elif frame.kind == "joint":  # both ends must be there
+        elif frame.kind == "joint":  # both ends must exist
             _, frame.attached_to = self.end(frame, "parent"), self.end(frame, "child")
-        elif frame.kind == "sensor":  # which stands in its link, but sees the names around that
+        elif frame.kind == "sensor":  # in its link, but names are those of the enclosing model
             scope = scope.scope
         frame.relative_to = frame.attached_to
         if relative_to:
@@ -237,7 +238,7 @@ class SdfFrames:
     def find(self, name: str, scope: SdfFrame, holder: XmlNode, attribute: str) -> SdfFrame:
         """Return the frame that a name means in a scope.
 
-        Raises FormatError with the names there are.
+        Raises FormatError with the names that exist.
         """
         if name == (INSIDE if scope.kind == "model" else WORLD):
             return scope
@@ -256,7 +257,7 @@ class SdfFrames:
         raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
 
     def _is_left_out(self, name: str, full: str, scope: SdfFrame) -> bool:
-        """Return True if a name is one that was left out, or begins with that of an included model."""
+        """Return True if a name is one that was omitted, or begins with that of an included model."""
         if any(full == gone or full.startswith(f"{gone}::") for gone in self.gone):
             return True
         for include in scope.holder.all("include"):
@@ -275,7 +276,7 @@ class SdfFrames:
             raise (frame.holder.first("pose") or frame.holder).error(message)
 
     def relative(self, outer: SdfFrame, frame: SdfFrame) -> Rigid:
-        """Return the pose of one frame in another, before anything has moved; as written where it was written so."""
+        """Return the pose of one frame in another with all joints at rest; unchanged if it was written like that."""
         if frame.relative_to is outer and frame.placement is None:
             return frame.pose
         if outer.relative_to is frame and outer.placement is None:
@@ -283,19 +284,20 @@ class SdfFrames:
         return self.tree.near(outer.name, frame.name)
 
 
-KINDS = {  # how many axes each has
+KINDS = {  # number of axes of each
     "revolute": 1, "continuous": 1, "prismatic": 1, "universal": 2, "revolute2": 2, "ball": 0, "fixed": 0,
     "screw": 0, "gearbox": 0,
 }  # fmt: skip
 STILL = ("screw", "gearbox")
-UNLIMITED = 1e15  # the limits that SDF writes for none are 1e16
+UNLIMITED = 1e15  # SDF writes 1e16 for no limit
 
 
 class SdfJoint(NamedTuple):
-    """What connects two bodies, links or the world.
+    """The connection of two bodies, links or the world.
 
-    motions: what moves, outermost first; nothing for a fixed joint
-    hanging: the body that hangs on the other one, `outer`: on the world everything hangs
+    motions: what moves, outermost first; empty for a fixed joint
+    hanging: the child, whose parent is `outer`; the world is always the parent
+
     """
 
     frame: SdfFrame
@@ -309,7 +311,7 @@ class SdfJoint(NamedTuple):
 class SdfJoints:
     """All joints of a file, in its order.
 
-    names: those under which they take values, without scopes where that is enough
+    names: the names for their values, without scopes if these are unique
     """
 
     def __init__(self, frames: SdfFrames) -> None:
@@ -326,7 +328,7 @@ class SdfJoints:
     def body(self, frame: SdfFrame) -> SdfFrame | None:
         """Return the link, or the world, that a frame moves with; None for a model without links.
 
-        Raises FormatError for frames that are attached in a circle.
+        Raises FormatError for a cycle of frames that are attached to each other.
         """
         seen: list[SdfFrame] = []
         current: SdfFrame | None = frame
@@ -339,7 +341,7 @@ class SdfJoints:
         return current
 
     def canonical(self, model: SdfFrame) -> SdfFrame | None:
-        """Return the link that a model's frame is attached to: the one it names, or the first, also of nested ones."""
+        """Return the link that a model's frame is attached to: the named one, or the first, also of nested models."""
         if name := model.holder.attribute("canonical_link"):
             try:
                 return self.frames.find(name, model, model.holder, "canonical_link")
@@ -383,7 +385,7 @@ class SdfJoints:
         return tuple(motions)
 
     def _direction(self, frame: SdfFrame, axis: XmlNode) -> Vector:
-        """Return an axis as the joint's frame sees it."""
+        """Return an axis in the joint's frame."""
         xyz = axis.first("xyz")
         if xyz is None:
             return 0.0, 0.0, 1.0
@@ -394,13 +396,13 @@ class SdfJoints:
         if name := xyz.attribute("expressed_in"):
             outer = self.frames.find(name, frame.scope, xyz, "expressed_in")
         elif version < (1, 5) or (version < (1, 7) and axis.text_of("use_parent_model_frame").lower() in TRUE):
-            outer = frame.scope  # before 1.5 an axis is seen from the model, until 1.6 where it says so
+            outer = frame.scope  # before 1.5 an axis is relative to the model, until 1.6 if it says so
         if outer is not frame:
             x, y, z = quaternion.rotate(*self.frames.relative(frame, outer)[3:], x, y, z)
         return unit_vector(x, y, z, floats)
 
     def _limit(self, limit: XmlNode | None, which: str) -> float | None:
-        """Read one limit; None for none, which SDF writes as 1e16 or inf."""
+        """Read one limit; None for no limit, which SDF writes as 1e16 or inf."""
         held = limit.first(which) if limit is not None else None
         if held is None or held.text.lstrip("+-").lower() in ("inf", "infinity"):
             return None
@@ -408,7 +410,7 @@ class SdfJoints:
         return value if isfinite(value) and abs(value) < UNLIMITED else None
 
     def _mimic(self, frame: SdfFrame, axis: XmlNode) -> Mimic | None:
-        """Read what a joint follows: multiplier * (leader - reference) + offset, of either axis of the leader."""
+        """Read a mimic: multiplier * (leader - reference) + offset, of either axis of the leader."""
         mimic = axis.first("mimic")
         if mimic is None:
             return None
@@ -426,31 +428,31 @@ class SdfJoints:
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a world or model, its joints as options say, else where the file has them."""
+    """Yield the edges of a world or model, with joint values from options, default as in the file."""
     yield from _SdfTree(SdfFrames(read_nodes(XmlFile(file), HELD), options)).edges()
 
 
 class _SdfTree:
-    """Hangs the frames of a file on each other."""
+    """Builds the tree of the frames of a file."""
 
     def __init__(self, frames: SdfFrames) -> None:
         self.frames = frames
         self.joints = joints = SdfJoints(frames)
         self.options = frames.options
-        self.hung: dict[str, SdfJoint] = {}  # link -> the joint that it hangs on
-        self._groups = Groups[str]()  # of links that hang together
+        self.hung: dict[str, SdfJoint] = {}  # link -> the joint above it
+        self._groups = Groups[str]()  # of connected links
         for joint in joints.all:
             self._hang(joint)
         ends = [end for joint in joints.all for end in (joint.parent, joint.child)]
         self.in_world = frames.top.holder.tag == "world" or frames.top in ends
-        self.carried: dict[str, SdfFrame] = {}  # model -> the link on which its frame hangs, not its links on it
+        self.carried: dict[str, SdfFrame] = {}  # model -> the link above its frame, if it is not the other way round
         for model in frames.all.values():
             link = joints.body(model) if model.kind == "model" else None
             if link is not None and link.name in self.hung:
                 self.carried[model.name] = link
 
     def _hang(self, joint: SdfJoint) -> None:
-        """Let a link hang on a joint; one that would close a loop is left out, with a note."""
+        """Make a joint the parent of a link; one that would close a loop is omitted, with a note."""
         link = joint.hanging.name
         if link in self.hung:
             where = f"{shown(link)} hangs on joint {shown(self.hung[link].frame.local)} already"
@@ -463,7 +465,7 @@ class _SdfTree:
         self.options.tally.note_each(message, joint.frame.holder.line)
 
     def edges(self) -> Iterator[Edge]:
-        """Yield every edge, and the root where nothing stands in a world."""
+        """Yield every edge, and the root if there is no world."""
         links = [self._link(frame) for frame in self.frames.all.values() if frame is not self.frames.top]
         for sensor in self.frames.sensors:
             holder = sensor.scope
@@ -472,7 +474,7 @@ class _SdfTree:
         return self._posture().edges(links)
 
     def _link(self, frame: SdfFrame) -> Link:
-        """Return how a frame hangs: on the joint that holds it, if one does."""
+        """Return the connection of a frame: through its joint, if there is one."""
         line = frame.holder.line
         relative = self.frames.relative
         if joint := self.hung.get(frame.name):
@@ -488,18 +490,18 @@ class _SdfTree:
         return Link(outer.name, frame.name, relative(outer, frame), line=line)
 
     def _outer(self, frame: SdfFrame) -> SdfFrame:
-        """Return the frame on which one hangs that no joint holds."""
+        """Return the parent of a frame without a joint."""
         if frame.kind in ("joint", "frame"):
             return frame.attached_to
         if link := self.carried.get(frame.name):
             return link
-        scope = frame.scope  # the nearest model around it that no joint moves, or the world
+        scope = frame.scope  # the nearest enclosing model that no joint moves, or the world
         while scope.name in self.carried:
             scope = scope.scope
         return scope
 
     def _posture(self) -> JointState:
-        """Return where the joints stand; values have the names that we have for joints: `tip` for `arm::tip`."""
+        """Return the joint values; their names are those of the joints here: `tip` for `arm::tip`."""
         places = {motion.name: joint.frame.holder for joint in self.joints.all for motion in joint.motions}
         moving = [motion for joint in self.joints.all for motion in joint.motions]
         fixed = [self.joints.names[joint.frame.name] for joint in self.joints.all if not joint.motions]

@@ -1,14 +1,14 @@
-"""URDF, the robot description of ROS, read; its joints take values.
+"""Read and write URDF, the robot description of ROS; its joints take values.
 
     <joint name="elbow" type="revolute"><origin xyz="0 0 1" rpy="0 0 0"/><parent link="arm"/><child link="tip"/>
       <axis xyz="0 1 0"/><limit lower="-2" upper="2"/><mimic joint="shoulder" multiplier="-1"/></joint>
 
-Metres and radians; rpy about fixed axes x, y, z, or quat_xyzw (URDF 1.1), or both where they agree.  Links are the
-frames.  parent_from_child = origin * motion, the motion in the frame behind the origin, along or about the axis.
+Metres and radians; rpy about fixed axes x, y, z, or quat_xyzw (URDF 1.1), or both if they agree.  Links are the
+frames.  parent_from_child = origin * motion, the motion in the frame after the origin, along or about the axis.
 xacro is refused, not expanded.
 
-Written, each edge is a fixed joint with the name of its child.  Where three angles cannot say the bits of the rotation,
-quat_xyzw stands beside them, which tools pass over in URDF 1.0.
+In output, each edge is a fixed joint with the name of its child.  If no three angles give the exact rotation,
+quat_xyzw is added, which URDF 1.0 tools ignore.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
 class RobotDescription(NamedTuple):
-    """The frames of a robot, each with its line, and how those hang that a joint holds, in the order of the file."""
+    """The frames of a robot with their lines, and the links of those with a joint, in the order of the file."""
 
     frames: dict[str, int]
     links: list[Link]
@@ -61,13 +61,13 @@ class RobotDescription(NamedTuple):
 
     @property
     def roots(self) -> list[str]:
-        """Return the frames that hang nowhere."""
+        """Return the frames without a parent."""
         children = {link.child for link in self.links}
         return [frame for frame in self.frames if frame not in children]
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a robot, its joints as options say, else at 0."""
+    """Yield the edges of a robot, with joint values from options, default 0."""
     robot = describe(file, options)
     for frame in robot.roots:
         yield Edge(None, frame, IDENTITY, line=robot.frames[frame])
@@ -75,12 +75,12 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def describe(file: InputFile, options: Options) -> RobotDescription:
-    """Read the links and joints of a robot, and find out where the joints stand.
+    """Read the links and joints of a robot, and its joint values.
 
-    Raises FormatError for what is no URDF; what is wrong with one joint goes to `options.report`.
+    Raises FormatError if it is not URDF; errors in one joint go to `options.report`.
     """
     xml = XmlFile(file)
-    # few files hold what would have to be looked for in every attribute
+    # few files have xacro, whose expressions would have to be searched for in every attribute
     if b"$" in xml.data or b"xacro" in xml.data or xml.data.startswith(UTF16):
         for element in xml.elements(deepest=3, ends=False):
             _refuse_xacro(xml, element)
@@ -102,7 +102,7 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
 
 
 def _refuse_xacro(xml: XmlFile, element: Element) -> None:
-    """Refuse what xacro would have to expand first: its elements, and expressions in attributes."""
+    """Refuse elements and expressions that xacro would have to expand first."""
     if element.tag.startswith("xacro:"):
         raise xml.error(element, f"<{bare(element.tag)}> is {_XACRO}")
     for name, value in element.attributes.items():
@@ -130,7 +130,7 @@ class _Reader:
         self._link(node.element, parts)
 
     def fail(self, joint: Joint, problem: str) -> FormatError:
-        """Make the error for the place of a joint."""
+        """Return the error for the place of a joint."""
         return self.xml.error(self.joints[joint.name][1], problem)
 
     def _frame(self, node: XmlNode) -> None:
@@ -147,7 +147,7 @@ class _Reader:
         return self.options.tally.names.bare(self.xml.required(element, attribute))
 
     def _link(self, element: Element, parts: dict[str, Element]) -> None:
-        """Read one joint from its parts."""
+        """Read one joint from its child elements."""
         name, kind = self.xml.required(element, "name"), self.xml.required(element, "type")
         if name in self.joints:
             line = self.joints[name][1].line
@@ -179,7 +179,7 @@ class _Reader:
             return x, y, z, *rotation
         numbers(element, "quat_xyzw", 4)
         texts = element.attributes["quat_xyzw"].split()
-        exact = read_quaternion(self.xml, element, texts, self.options, "quat_xyzw")  # it says more digits than angles
+        exact = read_quaternion(self.xml, element, texts, self.options, "quat_xyzw")  # more digits than angles
         if "rpy" in element.attributes:
             try:
                 agreeing_rotation(exact, rotation)
@@ -188,7 +188,7 @@ class _Reader:
         return x, y, z, *exact
 
     def _joint(self, name: str, kind: str, element: Element, parts: dict[str, Element]) -> Joint:
-        """Read what moves: axis, limits, the joint that is followed."""
+        """Read axis, limits, and the joint to mimic."""
         axis = self._axis(name, parts["axis"]) if "axis" in parts and kind in WITH_AXIS else (1.0, 0.0, 0.0)
         lower, upper = self._limits(name, parts["limit"]) if "limit" in parts and kind in LIMITED else (None, None)
         mimic = self._mimic(name, kind, parts["mimic"]) if "mimic" in parts else None
@@ -201,7 +201,7 @@ class _Reader:
         return (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
 
     def _limits(self, name: str, element: Element) -> tuple[float | None, float | None]:
-        """Read lower and upper; one that is missing is 0, and no limits are none."""
+        """Read lower and upper; a missing one is 0, and no limits are None."""
         if not ("lower" in element.attributes or "upper" in element.attributes):
             return None, None
         (lower,), (upper,) = self.xml.numbers(element, "lower", 1, "0"), self.xml.numbers(element, "upper", 1, "0")
@@ -219,7 +219,7 @@ class _Reader:
         return Mimic(leader, multiplier, offset)
 
     def connected(self) -> Iterator[Link]:
-        """Yield the links whose ends are there."""
+        """Yield the links whose ends exist."""
         for name, (link, element) in self.joints.items():
             missing = next((end for end in (link.parent, link.child) if end and end not in self.frames), None)
             if missing is None:
@@ -238,7 +238,7 @@ def load_robot(path: str | PathLike[str]) -> Robot:
 
 
 def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
-    """Return the robot of a file, and where its joints stand as the file's answers say; otherwise as `load_robot`."""
+    """Return the robot of a file, and its joint values from the file's answers; otherwise as `load_robot`."""
     if file.form != "urdf":
         file.close()
         raise FormatError(f"expected a URDF robot, found {FORMATS[file.form].summary}", source=file.name)
@@ -265,7 +265,8 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;",
 def write_tree(tree: Frames, style: Style) -> str:
     """Return the robot.
 
-    Raises ValueInvalid for what URDF cannot hold: frames that move, several roots, names that XML has no letters for.
+    Raises ValueInvalid for what URDF cannot hold: moving frames, several roots, names with characters not allowed in
+    XML.
     """
     if moving := [track.child for track in tree.tracks() if not track.is_static]:
         raise ValueInvalid(f"URDF holds no motion, but these frames move: {listing(moving)}; give --at TIME")

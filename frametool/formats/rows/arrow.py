@@ -1,8 +1,8 @@
-"""Parquet and Arrow IPC (Feather), by pyarrow, the extra `frametool[arrow]`: one way in, one way out, any to any.
+"""Parquet and Arrow IPC (Feather), with pyarrow, the extra `frametool[arrow]`; either can be converted to the other.
 
-Parquet is known by PAR1, a file of Arrow by ARROW1.  Rows are read and written in groups, those of the input or of a
-million: types, metadata and compression stay.  A column that passes is not looked into; a new one stands in the type
-of the one it replaces, with its metadata.  Columns are arrays of numbers and texts: nulls beside them, each type kept.
+Parquet begins with PAR1, an Arrow file with ARROW1.  Rows are read and written in groups, those of the input or of a
+million: types, metadata and compression are preserved.  Unchanged columns are not inspected; a new one has the type
+and metadata of the one it replaces.  Columns are arrays of numbers and texts with null masks.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ if TYPE_CHECKING:
     from frametool.text.spans import Flags, Ints
 
 
-# the types of numbers as Arrow prints them -> how numpy calls them
+# number types in Arrow's notation -> in numpy's
 NUMBERS: dict[str, Kind] = {"double": np.dtype("f8"), "float": np.dtype("f4"), "halffloat": np.dtype("f2")}
 NUMBERS |= {f"{sign}int{bits}": np.dtype(f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)}
 NO_TIME = "no time: null"
-STRUCTURED = ("bool", "decimal", "list", "large_list", "fixed_size_list", "struct", "map")  # no texts
+STRUCTURED = ("bool", "decimal", "list", "large_list", "fixed_size_list", "struct", "map")  # not text
 IS_JSON = {b"ARROW:extension:name": b"arrow.json", b"ARROW:extension:metadata": b""}  # of a column of JSON texts
 
 
 def require_pyarrow(what: str, part: str = "") -> Any:
-    """Return the library, or a part of it; raises FileProblem that says what needs it and how it is installed."""
+    """Return the library, or a part of it; raises FileProblem with the reason and the install command."""
     try:
         return import_module(f"pyarrow.{part}" if part else "pyarrow")
     except ImportError:
@@ -53,7 +53,7 @@ def require_pyarrow(what: str, part: str = "") -> Any:
 
 
 def kind_of(arrow_type: Any) -> Kind | None:
-    """Return the type of a column's numbers as numpy calls it; None for what is not a number."""
+    """Return the type of a column's numbers in numpy's notation; None for other columns."""
     return NUMBERS.get(str(arrow_type))
 
 
@@ -64,14 +64,14 @@ def is_floating(arrow_type: Any) -> bool:
 
 
 def in_one(column: Any) -> Any:
-    """Return a column as one array, without a copy where it is one."""
+    """Return a column as one array, without a copy if it is one."""
     if not hasattr(column, "chunks"):
         return column
     return column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
 
 
 def nulls_of(column: Any) -> Flags | None:
-    """Tell which rows are null, (n,); None where none is."""
+    """Return which rows are null, (n,); None if none is."""
     if not column.null_count:
         return None
     nulls: Flags = column.is_null().to_numpy(zero_copy_only=False)
@@ -79,9 +79,9 @@ def nulls_of(column: Any) -> Flags | None:
 
 
 def stamps_of(column: Any, name: str) -> tuple[Ints, Flags | None, Ints]:
-    """Read times as nanoseconds: timestamps (UTC where they have no zone), integer nanoseconds, or float seconds.
+    """Read times as nanoseconds: timestamps (UTC if they have no zone), integer nanoseconds, or float seconds.
 
-    Returns them, 0 where they are null, which are null (None: none), and the rows of numbers that are not a time.
+    Returns the times (0 for null), the null mask (None: none), and the rows of numbers that are not a time.
     Raises ValueInvalid for another type.
     """
     pa = require_pyarrow("an Arrow column")
@@ -102,24 +102,24 @@ def stamps_of(column: Any, name: str) -> tuple[Ints, Flags | None, Ints]:
 
 
 class ArrowBatch(column_file.Batch):
-    """Some rows of a file.
+    """Rows of a file.
 
     rows: a RecordBatch; ends_group: whether they are the last of a group of rows that is written as one
     """
 
     def __init__(self, rows: Any, bytes_read: int, *, ends_group: bool) -> None:
-        """Take rows, and what they take in the file."""
+        """Store rows, and their size in the file."""
         self.rows = rows
         self.size = int(rows.num_rows)
         self.bytes_read, self.ends_group = bytes_read, ends_group
 
     def numbers(self, place: int) -> column_file.ColumnNumbers:
-        """Return a column as floats, nan where it is null."""
+        """Return a column as floats, nan for null."""
         column = self.rows.column(place)
         return column_file.ColumnNumbers(column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column))
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why rows have none: timestamps, integers by their name, float seconds."""
+        """Return a column as nanoseconds, and why rows have none: timestamps, integers by name, float seconds."""
         column, name = self.rows.column(place), self.rows.schema.names[place]
         if in_ns and is_floating(column.type):
             raise ValueInvalid(f"column {shown(name)} is {column.type}; {SUFFIXES[in_ns]} are integers or timestamps")
@@ -135,12 +135,12 @@ class ArrowBatch(column_file.Batch):
         return stamps, reasons | dict.fromkeys([] if nulls is None else np.flatnonzero(nulls).tolist(), NO_TIME)
 
     def texts(self, place: int) -> list[str]:
-        """Return a column as texts, "" for null; what is nested as JSON, bytes that are not UTF-8 as \\xff."""
+        """Return a column as texts, "" for null; nested values as JSON, bytes that are not UTF-8 as \\xff."""
         values = ["" if value is None else value for value in self.values(place)]
         return [value if isinstance(value, str) else dump(value) for value in values]
 
     def values(self, place: int) -> list[Any]:
-        """Return a column as plain values: numbers, texts, None, and what is nested, as a whole or as JSON."""
+        """Return a column as plain values: numbers, texts, None, and nested values, as objects or as JSON."""
         column, field = self.rows.column(place), self.rows.schema.field(place)
         kind = str(column.type)
         if "arrow.json" in kind or (field.metadata or {}).get(b"ARROW:extension:name") == b"arrow.json":
@@ -152,7 +152,7 @@ class ArrowBatch(column_file.Batch):
         return list(map(column_file.plain_value, column.to_pylist()))
 
     def column(self, place: int) -> Any:
-        """Return a column as it is: numbers and truth values without a null as an array, else plain values."""
+        """Return a column unchanged: numbers and booleans without nulls as an array, else plain values."""
         column = self.rows.column(place)
         if column.null_count or (kind_of(column.type) is None and str(column.type) != "bool"):
             return self.values(place)
@@ -160,7 +160,7 @@ class ArrowBatch(column_file.Batch):
 
 
 def _of_json(text: str | None) -> Any:
-    """Read a text of JSON, numbers as they are written; one that is none stays a text."""
+    """Parse a JSON text, numbers as written; invalid JSON remains a text."""
     try:
         return text and json.loads(text, parse_float=Verbatim, parse_int=Verbatim)
     except (ValueError, RecursionError):
@@ -168,15 +168,15 @@ def _of_json(text: str | None) -> Any:
 
 
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow"}
-NEW_GROUP = 1 << 20  # rows of a group where the input has none
-HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory that writing a group may take: times its size, and bytes beside
-NULLS = True  # its columns have room for them
-AT_ONCE = 1 << 16  # rows of a batch: what is made of it stays near the cache
+NEW_GROUP = 1 << 20  # rows of a group if the input has none
+HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory for writing a group: this multiple of its size, and these additional bytes
+NULLS = True  # its columns may hold nulls
+AT_ONCE = 1 << 16  # rows of a batch: results stay near the cache
 
 
 @contextmanager
 def translated(name: str) -> Iterator[None]:
-    """Turn whatever pyarrow raises for a broken file into one line; raises FormatError."""
+    """Convert any exception of pyarrow for a broken file into one line; raises FormatError."""
     pa = require_pyarrow(name)
     try:
         yield
@@ -186,10 +186,10 @@ def translated(name: str) -> Iterator[None]:
 
 
 class ArrowFile(column_file.ColumnFile):
-    """A file that was opened: its schema is read, its rows are not."""
+    """An opened file: its schema is read, its rows are not."""
 
     gaps = False
-    source: Any  # what pyarrow reads
+    source: Any  # pyarrow's source
 
     def __init__(self, file: InputFile, form: str) -> None:
         """Read the schema; raises FormatError."""
@@ -206,22 +206,22 @@ class ArrowFile(column_file.ColumnFile):
         raise NotImplementedError
 
     def encoding(self) -> dict[str, Any]:
-        """Return how the file is compressed and encoded, for the writer of its own form."""
+        """Return the compression and encoding of the file, for the writer of the same format."""
         raise NotImplementedError
 
     def read(self) -> Iterator[ArrowBatch]:
-        """Yield the rows; raises FormatError where the file is broken."""
+        """Yield the rows; raises FormatError if the file is broken."""
         raise NotImplementedError
 
     def batches(self) -> Iterator[ArrowBatch]:
-        """Yield the rows, and close the file behind them; raises FormatError where it is broken."""
+        """Yield the rows, and close the file; raises FormatError if it is broken."""
         with self.source:  # a thread of pyarrow may hold it longer than its reader
             for batch in self.read():
                 yield batch
-                batch.rows = None  # they keep their whole group in memory
+                batch.rows = None  # frees their group
 
     def guarded(self, found: Iterator[Any]) -> Iterator[Any]:
-        """Yield what pyarrow reads; raises FormatError where the file is broken."""
+        """Yield the items that pyarrow reads; raises FormatError if the file is broken."""
         while True:
             with translated(self.name):
                 rows = next(found, None)
@@ -231,7 +231,7 @@ class ArrowFile(column_file.ColumnFile):
             del rows  # before the next are read
 
     def random_access(self, file: InputFile) -> Any:
-        """Return what pyarrow reads at any place; what comes by a pipe is put into a file without a name first."""
+        """Return a source with random access; a pipe is first copied to an unnamed file."""
         pa = require_pyarrow(self.name)
         if file.path != "-" and os.path.isfile(file.path):
             return pa.OSFile(file.path)
@@ -240,7 +240,7 @@ class ArrowFile(column_file.ColumnFile):
         return pa.PythonFile(stream, mode="r")
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
-        """Return what writes the same schema, compressed in the same way; the form may be another one of Arrow's."""
+        """Return a writer with the same schema and compression; the output may be the other Arrow format."""
         del drops
         form = style.form if style.form in WRITERS else self.form
         same = WRITERS[form] is WRITERS[self.form]
@@ -248,19 +248,19 @@ class ArrowFile(column_file.ColumnFile):
 
 
 class Collected(BytesIO):
-    """A file to write to, whose bytes are taken out piece by piece."""
+    """A file to write to, whose bytes are taken piece by piece."""
 
-    before = 0  # bytes that were taken out
+    before = 0  # bytes that were taken
 
     def tell(self) -> int:
-        """Return how many bytes were written so far."""
+        """Return the number of bytes written so far."""
         return self.before + super().tell()
 
     def close(self) -> None:
-        """Do nothing: what was written is still to be taken."""
+        """Do nothing: the bytes are still to be taken."""
 
     def taken(self) -> bytes:
-        """Return what was written since the last time."""
+        """Return the bytes written since the last call."""
         piece = self.getvalue()
         self.before += len(piece)
         self.seek(0)
@@ -269,10 +269,10 @@ class Collected(BytesIO):
 
 
 class GroupWriter:
-    """Collect rows until a group is whole; a form says how a file begins and how a group is written."""
+    """Collects rows until a group is complete; subclasses define the beginning of a file and the writing of a group."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
-        """Take the columns of the result, the schema of the input if it has one, and how that was encoded."""
+        """Store the columns of the result, the schema of the input if it has one, and its encoding."""
         self.pa = require_pyarrow("Arrow")
         self.form, self.columns, self.how = form, columns, how
         self.sink = Collected()
@@ -284,7 +284,7 @@ class GroupWriter:
         self.size = self.count = self.read = 0
 
     def begin(self) -> Any:
-        """Return what writes to `file`; it can be closed."""
+        """Return the writer for `file`; it can be closed."""
         raise NotImplementedError
 
     def write(self, table: Any) -> None:
@@ -292,7 +292,7 @@ class GroupWriter:
         raise NotImplementedError
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return what is written once a group of rows is whole."""
+        """Return the bytes written once a group of rows is complete."""
         new = self._rows(batch, rows, made)
         self.waiting.append(new)
         self.size += bytes_of(new)
@@ -304,14 +304,14 @@ class GroupWriter:
         return self.sink.taken()
 
     def end(self) -> Iterator[bytes]:
-        """Yield the last group and what stands behind all."""
+        """Yield the last group and the end of the file."""
         if self.waiting or self.writer is None:
             self._write_group()
         self.writer.close()
         yield self.sink.taken()
 
     def _field(self, column: OutColumn, given: Any | None) -> Any:
-        """Return the field of a column: that of the input where it passes or is replaced."""
+        """Return the field of a column: that of the input if it is unchanged or replaced."""
         if given is not None:
             replaced = given.get_all_field_indices(column.name) if column.passed is None else [column.passed]
             if replaced:
@@ -320,7 +320,7 @@ class GroupWriter:
         return self.pa.field(column.name, kind, metadata=IS_JSON if column.is_json else None)
 
     def _rows(self, batch: ArrowBatch | None, rows: Ints | None, made: Sequence[Made]) -> Any:
-        """Return some rows of a batch as a RecordBatch, with what is made for them."""
+        """Return some rows of a batch as a RecordBatch, with the new columns."""
         new = iter(made)
         arrays = []
         for column, field in zip(self.columns, self.schema, strict=True):
@@ -332,7 +332,7 @@ class GroupWriter:
         return self.pa.RecordBatch.from_arrays(arrays, schema=self.schema)
 
     def _made(self, made: Made, field: Any) -> Any:
-        """Return what is made as a column; raises ValueInvalid for a null that the schema does not allow."""
+        """Return a new column; raises ValueInvalid for a null that the schema does not allow."""
         if made.absent is not None and not field.nullable and made.absent.any():
             raise ValueInvalid(f"column {field.name} is declared not to hold nulls, and a row becomes null there")
         if isinstance(made.values, np.ndarray):
@@ -343,9 +343,9 @@ class GroupWriter:
         return texts.cast(field.type)
 
     def _write_group(self) -> None:
-        """Write what waits; a group whose rows were all left out is none."""
+        """Write the collected rows; a group without rows is not written."""
         table = self.pa.Table.from_batches(self.waiting, self.schema)
-        np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, where pyarrow would end the process
+        np.empty(HEADROOM * self.size + LEAST_ROOM, np.uint8)  # raises MemoryError, while pyarrow would end the process
         if self.writer is None:
             self.writer = self.begin()
         if self.count or (self.waiting and not self.read):
@@ -355,8 +355,8 @@ class GroupWriter:
 
 # --- Arrow IPC: batches as a file with a directory at its end (Feather) ---
 
-BODY_AT = 8  # behind the magic and two bytes that fill it up
-MESSAGE = b"\xff\xff\xff\xff"  # what each message begins with
+BODY_AT = 8  # after the magic and two bytes of padding
+MESSAGE = b"\xff\xff\xff\xff"  # the start of each message
 CODECS = ("lz4", "zstd")
 RECORD_BATCH = 3
 
@@ -379,7 +379,7 @@ class IpcFile(ArrowFile):
     def _records(self) -> Iterator[Any]:
         """Yield the batches of the file."""
         for rows in map(self.reader.get_batch, range(self.reader.num_record_batches)):
-            rows.validate(full=True)  # what is broken ends the process where it is touched
+            rows.validate(full=True)  # broken data would end the process later
             yield rows
             del rows
 
@@ -393,7 +393,7 @@ class IpcFile(ArrowFile):
 
 
 def bytes_of(rows: Any) -> int:
-    """Return what rows take; pyarrow before 22 measures no views of texts: about so much."""
+    """Return the memory size of rows; pyarrow before 22 does not measure views of texts: an estimate."""
     try:
         return int(rows.nbytes)
     except TypeError:
@@ -401,9 +401,9 @@ def bytes_of(rows: Any) -> int:
 
 
 def codec_in(data: bytes) -> str | None:
-    """Return how the first batch of rows is compressed, as far as it is among the first bytes.
+    """Return the compression of the first batch of rows, if it is within the first bytes.
 
-    Source: format/Message.fbs and File.fbs of Arrow; a message is a flatbuffer behind its length.
+    Source: format/Message.fbs and File.fbs of Arrow; a message is a flatbuffer after its length.
     """
     at = 0
     with suppress(struct.error, IndexError):
@@ -421,7 +421,7 @@ def codec_in(data: bytes) -> str | None:
 
 
 def _place(message: memoryview, table: int, field: int) -> int:
-    """Return where a field of a table stands; 0 for one that is not there."""
+    """Return the position of a field of a table; 0 if it is missing."""
     directory = table - struct.unpack_from("<i", message, table)[0]
     (size,) = struct.unpack_from("<H", message, directory)
     entry = 4 + 2 * field
@@ -430,13 +430,13 @@ def _place(message: memoryview, table: int, field: int) -> int:
 
 
 def _number(message: memoryview, table: int, field: int, form: str) -> int:
-    """Return a number of a table, 0 if it is not there."""
+    """Return a number of a table, 0 if it is missing."""
     place = _place(message, table, field)
     return int(struct.unpack_from(form, message, place)[0]) if place else 0
 
 
 def _table(message: memoryview, table: int, field: int) -> int:
-    """Return where a table within a table stands."""
+    """Return the position of a table in a table."""
     return _place(message, table, field) + _number(message, table, field, "<i")
 
 
@@ -457,12 +457,12 @@ class IpcWriter(GroupWriter):
 
 # --- Parquet ---
 
-SMALL = 1 << 26  # bytes of a group that may be held beside another one
-BUFFER = 1 << 20  # bytes that are read at once of a group that is not held
-SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of a number as it is
+SMALL = 1 << 26  # bytes of a group that may be in memory together with another one
+BUFFER = 1 << 20  # bytes read at once of a group that is not in memory
+SIZES = {"INT32": 4, "FLOAT": 4, "INT64": 8, "DOUBLE": 8}  # bytes of an uncompressed number
 DICTIONARIES = {"PLAIN_DICTIONARY", "RLE_DICTIONARY"}
 OWN_SCHEMA = b"ARROW:schema"
-OLD_LIST = ".list.item"  # what lists were called before the standard's `.list.element`
+OLD_LIST = ".list.item"  # the name of lists before the standard's `.list.element`
 
 
 class ParquetFile(ArrowFile):
@@ -475,11 +475,11 @@ class ParquetFile(ArrowFile):
         self.about = self.file.metadata
         self.warned = False
         if self.about.num_row_groups:
-            next(self._rows_of(0, 1), None)  # of a damaged group this raises, where its description aborts
+            next(self._rows_of(0, 1), None)  # raises an exception for a damaged group, where reading it would abort
         return self.file.schema_arrow
 
     def read(self) -> Iterator[ArrowBatch]:
-        """Yield the rows, group by group; while a small one is worked on, the next is read."""
+        """Yield the rows, group by group; while a small one is processed, the next is read."""
         from concurrent.futures import ThreadPoolExecutor
 
         count = self.about.num_row_groups
@@ -493,14 +493,14 @@ class ParquetFile(ArrowFile):
                 table = None  # before the next is read
 
     def _table(self, group: int) -> Any:
-        """Read a group, its columns side by side; None for one that is too large to be held."""
+        """Read a whole group; None for one that is too large for memory."""
         if self.about.row_group(group).total_byte_size > sizes.GROUP:
             return None
         with translated(self.name):
             return self.file.read_row_group(group)
 
     def _of_group(self, group: int, table: Any) -> Iterator[ArrowBatch]:
-        """Yield the batches of a group, of its table or, where that would be too large, as they are read."""
+        """Yield the batches of a group, from memory or, if it is too large, as they are read."""
         about = self.about.row_group(group)
         left = about.num_rows
         packed = sum(about.column(at).total_compressed_size for at in range(about.num_columns))
@@ -518,14 +518,14 @@ class ParquetFile(ArrowFile):
             yield ArrowBatch(rows, int(share * rows.num_rows), ends_group=left <= 0)
 
     def _rows_of(self, group: int, count: int) -> Iterator[Any]:
-        """Return what reads so many rows of a group at a time."""
+        """Return an iterator that reads this many rows of a group at a time."""
         parquet = require_pyarrow(self.name, "parquet")
         file = parquet.ParquetFile(self.source, metadata=self.about, buffer_size=BUFFER, pre_buffer=False)
         found: Iterator[Any] = file.iter_batches(batch_size=count, row_groups=[group])
         return found
 
     def encoding(self) -> dict[str, Any]:
-        """Return how the columns are compressed and encoded, as the writer of pyarrow takes it."""
+        """Return the compression and encoding of the columns, as arguments of pyarrow's writer."""
         if not self.about.num_row_groups:
             return {}
         group = self.about.row_group(0)
@@ -541,7 +541,7 @@ class ParquetFile(ArrowFile):
 
 
 def _repeats(column: Any) -> bool:
-    """Return True if a dictionary of the values of a column made it shorter; for others trying costs time."""
+    """Return True if a dictionary made a column smaller; for others trying costs time."""
     plain = SIZES.get(column.physical_type, 0) * column.num_values
     return not DICTIONARIES.isdisjoint(column.encodings) and not 0 < plain <= column.total_uncompressed_size
 
@@ -550,7 +550,7 @@ class ParquetWriter(GroupWriter):
     """Write groups of rows."""
 
     def begin(self) -> Any:
-        """Return the writer of a file; columns that the input does not have are compressed as most of it are."""
+        """Return the writer of a file; new columns are compressed as most columns of the input."""
         how, codecs = self.how, self.how.get("compression")
         if codecs:
             usual = Counter(codecs.values()).most_common(1)[0][0]
@@ -567,7 +567,7 @@ WRITERS: dict[str, type[GroupWriter]] = {"parquet": ParquetWriter, "arrow": IpcW
 
 
 def open_columns(file: InputFile, _options: Options) -> ArrowFile:
-    """Open a file of any of these forms; raises FileProblem without pyarrow, FormatError for a broken file."""
+    """Open a file of either format; raises FileProblem without pyarrow, FormatError for a broken file."""
     require_pyarrow(file.name)
     head = file.head()
     form = next((form for begin, form in BEGINNINGS.items() if head.startswith(begin)), "")
@@ -578,5 +578,5 @@ def open_columns(file: InputFile, _options: Options) -> ArrowFile:
 
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
-    """Return what writes rows made elsewhere."""
+    """Return a writer for new rows."""
     return WRITERS[style.form](style.form, columns, None, {})

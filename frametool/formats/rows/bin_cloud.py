@@ -1,9 +1,9 @@
-"""Clouds of KITTI and nuScenes: points one behind the other, four or five float32 (little-endian) each, no header.
+"""Clouds of KITTI and nuScenes: consecutive points, four or five float32 (little-endian) each, no header.
 
     x y z intensity            KITTI, velodyne/000000.bin
     x y z intensity ring       nuScenes, LIDAR_TOP/*.pcd.bin
 
-Metres, in the frame of the lidar.  Nothing in the file says which of the two it is: `--in` does.
+Metres, in the frame of the lidar.  The file does not state which of the two it is: `--in` does.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class BinCloud(CloudFile):
     """The points of a file without a header."""
 
     def __init__(self, file: InputFile) -> None:
-        """Count the points; raises FormatError where the last one is not whole."""
+        """Count the points; raises FormatError if the last one is incomplete."""
         names = FORMATS[file.form].columns
         record = record_of([SINGLE] * len(names))
         file.stream = seekable(file, self)
@@ -48,7 +48,7 @@ class BinCloud(CloudFile):
         super().__init__(file, names, record, size // record.itemsize)
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the points; raises FormatError for rings that are none."""
+        """Yield the points; raises FormatError for invalid rings."""
         done = 0
         for batch in super().batches():
             rings = batch.column(self.names.index(RING)) if RING in self.names else np.zeros(0)
@@ -60,15 +60,15 @@ class BinCloud(CloudFile):
             yield batch
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> CountedWriter:
-        """Return what writes a cloud of this form or the other one."""
+        """Return a writer for a cloud of either format."""
         return _writer(style.form, columns, None if drops else self.count)
 
 
 class _Encoder:
-    """Make points of columns; `off` is how far rounding to float32 has moved any number."""
+    """Convert columns to points; `off` is the largest rounding error of float32."""
 
     def __init__(self, form: str, columns: Sequence[OutColumn]) -> None:
-        """Find the columns; raises ValueInvalid where one is missing, and warns of those that are left out."""
+        """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
         self.form = form
         self.names = FORMATS[form].columns
         self.columns = columns
@@ -99,7 +99,7 @@ class _Encoder:
         return points.tobytes()
 
     def tell(self) -> Iterator[bytes]:
-        """Warn at the end of what was rounded."""
+        """Warn at the end about rounding."""
         if self.off:
             warn(f"{self.form}: numbers are float32; they were rounded by up to {self.off:.1g}")
         return iter(())
@@ -116,5 +116,5 @@ def open_columns(file: InputFile, _options: Options) -> BinCloud:
 
 
 def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
-    """Return what writes points made elsewhere."""
+    """Return a writer for new points."""
     return _writer(style.form, columns, count)

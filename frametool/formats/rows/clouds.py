@@ -1,7 +1,7 @@
-"""Clouds of points behind a header, as PCD and PLY hold them: records, or lines of numbers between blanks.
+"""Point clouds with a header, as in PCD and PLY: binary records, or lines of numbers between blanks.
 
-What is not changed passes byte for byte: in text blanks, line ends and the digits of other columns too.
-Knows no format: what a header says, and how it is written anew, is theirs.
+Unchanged data are preserved byte for byte: in text, blanks, line ends and the digits of other columns too.
+Knows no format: they parse and write the headers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 Code = TypeVar("Code")
 
-LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times what the longest known has
+LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times the longest known
 _MOST_POINTS = 1 << 62
 _NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
 _EXACT = 2.0**53
@@ -42,13 +42,13 @@ _SINGLE = np.dtype(np.float32)
 
 
 class CloudFile(column_file.ColumnFile):
-    """The points of a file whose header is read."""
+    """The points of a file whose header has been read."""
 
     vectors = NORMALS
     gaps = True
 
     def __init__(self, file: InputFile, names: Sequence[str], record: Kind, count: int, what: str = "points") -> None:
-        """Take the columns, the type of a point as a record, and how many points there are, which are called so."""
+        """Store the columns, the type of a point as a record, and the number of points and their name in messages."""
         self.file = file
         self.names: tuple[str, ...] = tuple(names)
         self.width = len(names)
@@ -56,11 +56,11 @@ class CloudFile(column_file.ColumnFile):
         self.kinds = [record[place] for place in range(len(names))]
         self.count, self.what = count, what
         self.text: TextRows | None = None
-        self.is_last = True  # nothing stands behind the points
+        self.is_last = True  # nothing follows the points
         self.behind = b""
 
     def batches(self) -> Iterator[column_file.Batch]:
-        """Yield the points; raises FormatError where the file ends too early, or holds more."""
+        """Yield the points; raises FormatError if the file ends too early, or has more."""
         if self.text is not None:
             yield from self.text.batches()
             self.behind = self.text.check_end() if self.is_last else b""
@@ -71,19 +71,19 @@ class CloudFile(column_file.ColumnFile):
             raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)
 
     def rest(self) -> Iterable[bytes]:
-        """Yield what stands behind the points."""
+        """Yield the rest of the file after the points."""
         return (self.behind,)
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
-        """Return the header with what changed in it, and all that stands before the points; raises ValueInvalid."""
+        """Return the header with changes, and everything before the points; raises ValueInvalid."""
         raise NotImplementedError
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
-        """Return the type of a point that has other columns; raises ValueInvalid for what the format cannot hold."""
+        """Return the type of a point with other columns; raises ValueInvalid for what the format cannot hold."""
         raise NotImplementedError
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> column_file.CountedWriter:
-        """Return what writes a cloud of the same kind."""
+        """Return a writer for a cloud of the same format."""
         head, count = partial(self.header, columns), None if drops else self.count
         if self.text is None:
             kind = self.record if same_columns(columns, self.width) else self.record_with(columns)
@@ -95,14 +95,14 @@ class CloudFile(column_file.ColumnFile):
 
 
 def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
-    """Return True if the columns of an output are those of the input, each in its place."""
+    """Return True if the columns of an output are those of the input, in the same order."""
     return len(columns) == width and all(column.passed in (None, at) for at, column in enumerate(columns))
 
 
 def head_lines(
     stream: BinaryIO, text: list[bytes], fail: Callable[[str], FormatError], last: str
 ) -> Iterator[list[str]]:
-    """Yield the words of a header's lines, which are added to the text; raises FormatError where it never ends.
+    """Yield the words of a header's lines, which are added to the text; raises FormatError if it does not end.
 
     last: the line that ends it
     """
@@ -119,16 +119,16 @@ def head_lines(
 
 
 def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
-    """Read how many there are of something, which an error calls `what`; raises FormatError."""
+    """Read a count of items, which an error calls `what`; raises FormatError."""
     if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
         raise fail(f"{what} is no count")
     return int(word)
 
 
 def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] = ()) -> str:
-    """Return why a format has no place for a column, "" where it has one.
+    """Return why a format cannot hold a column, "" if it can.
 
-    codes: the types that it has as numpy calls them, without their byte order; taken: names that have a meaning
+    codes: its types in numpy's notation, without byte order; taken: reserved names
     """
     if column.kind is None or column.kind.str[1:] not in codes:
         return f"it has no type for {column.kind}" if column.kind is not None else "it holds numbers"
@@ -137,7 +137,7 @@ def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] 
 
 
 def type_in(form: str, codes: Mapping[str, Code], column: OutColumn, taken: Collection[str] = ()) -> Code:
-    """Return how a format calls the type of a column; raises ValueInvalid for what it cannot hold."""
+    """Return a format's name for the type of a column; raises ValueInvalid if it has none."""
     if (reason := misfit_of(codes, column, taken)) or column.kind is None:
         raise ValueInvalid(f"column {shown(column.name)} does not fit in {form}: {reason}")
     return codes[column.kind.str[1:]]
@@ -147,13 +147,13 @@ def type_in(form: str, codes: Mapping[str, Code], column: OutColumn, taken: Coll
 
 
 class TextRows:
-    """The rows of a stream of text, batch after batch, and what follows them.
+    """The rows of a stream of text, in batches, and what follows them.
 
     line: that of the next row, from 1
     """
 
     def __init__(self, cloud: CloudFile, at: Sequence[int], width: int, line: int) -> None:
-        """Take where the columns of a cloud stand among the `width` cells of a row."""
+        """Store the positions of a cloud's columns among the `width` cells of a row."""
         self.cloud, self.at, self.width, self.line = cloud, at, width, line
         self._rest = b""
 
@@ -162,7 +162,7 @@ class TextRows:
         return FormatError(message, source=self.cloud.file.name, line=line)
 
     def batches(self) -> Iterator[TextBatch]:
-        """Yield the rows; raises FormatError for a row of another width, or where the file ends too early."""
+        """Yield the rows; raises FormatError for a row of another width, or if the file ends too early."""
         done, count = 0, self.cloud.count
         for block in read_blocks(self.cloud.file.stream) if count else ():  # type: ignore[arg-type]
             batch = self._batch(block, count - done)
@@ -175,7 +175,7 @@ class TextRows:
             raise self.problem(f"the header says {count} points, the file holds {done}")
 
     def _batch(self, block: bytes, most: int) -> TextBatch:
-        """Split a block into cells, and keep what stands behind the last row that is wanted."""
+        """Split a block into cells, and keep what follows the last row."""
         cells = split_blank(block, self.width, comment=b"")
         filled = np.flatnonzero(cells.counts)
         if len(filled) > most:
@@ -190,11 +190,11 @@ class TextRows:
         return TextBatch(cells, self)
 
     def behind(self) -> Iterator[bytes]:
-        """Yield what stands behind the last row."""
+        """Yield what follows the last row."""
         return chain((self._rest,), column_file.pieces(self.cloud.file.stream))
 
     def check_end(self) -> bytes:
-        """Return the blanks behind the last row; raises FormatError where more rows stand there."""
+        """Return the blanks after the last row; raises FormatError if more rows follow."""
         blanks: list[bytes] = []
         for piece in self.behind():
             if piece.strip():
@@ -205,10 +205,10 @@ class TextRows:
 
 
 class TextBatch(column_file.Batch):
-    """Some rows; a number that is not finite stands for no number."""
+    """Rows; a number that is not finite means a missing number."""
 
     def __init__(self, cells: Cells, table: TextRows) -> None:
-        """Take the cells of the rows that a table reads next."""
+        """Store the cells of the next rows of a table."""
         self.cells, self.table = cells, table
         self.line = table.line
         self.size = len(cells.rows)
@@ -236,7 +236,7 @@ class TextBatch(column_file.Batch):
         return [column.text(row).decode("utf-8", "replace") for row in range(self.size)]
 
     def column(self, place: int) -> Any:
-        """Return a column as numbers of its kind; raises FormatError for a number that is not of this kind."""
+        """Return a column as numbers of its type; raises FormatError for a number that does not fit it."""
         kind, values = self.table.cloud.record[place], self.numbers(place).values
         if kind.kind not in column_file.WHOLE:
             return values.astype(kind)
@@ -255,14 +255,14 @@ class TextBatch(column_file.Batch):
 def encode_text(
     columns: Sequence[OutColumn], style: Style, batch: TextBatch, rows: Ints | None, made: Sequence[Made]
 ) -> bytes:
-    """Return rows as they were, with what is made in the place of their cells, or behind them in further columns."""
+    """Return rows with new numbers in place of their cells, or after them in further columns."""
     cells = batch.cells
     chosen = np.arange(batch.size) if rows is None else rows
     if not len(chosen):
         return b"" if rows is not None else cells.data[MARGIN:-MARGIN].tobytes()
     lines = cells.rows[chosen]
     at, ends = cells.line_starts[lines], cells.line_ends[lines]
-    if rows is None:  # what stands between rows, or behind the last, belongs to one of them
+    if rows is None:  # text between rows, or after the last, belongs to one of them
         at = np.concatenate([[MARGIN], ends[:-1]])
         ends = np.append(ends[:-1], len(cells.data) - MARGIN)
     new, parts = iter(made), list[Spans]()
@@ -283,7 +283,7 @@ def encode_text(
 
 
 def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
-    """Write numbers as the shortest text of their kind, or with so many decimals."""
+    """Write numbers as the shortest text of their type, or with fixed decimals."""
     if column.kind is None:
         raise ValueInvalid(f"column {column.name} holds texts; the rows of a cloud are numbers")
     values = np.asarray(numbers, np.float64).reshape(-1, 1)
@@ -295,7 +295,7 @@ def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
 
 
 def _unless_lost(new: Spans, values: Any, old: Spans) -> Spans:
-    """Keep the text of cells that held no number, and still do: `-nan` stays."""
+    """Keep the text of cells that had no number, and have none now: `-nan` is unchanged."""
     lost = np.flatnonzero(~np.isfinite(values))
     first = old.data[old.starts[lost]]
     first = old.data[old.starts[lost] + ((first == ord("-")) | (first == ord("+")))]

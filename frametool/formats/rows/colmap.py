@@ -1,12 +1,12 @@
-"""COLMAP's images.txt: two lines an image, the second its points (which may be empty, and counts all the same).
+"""COLMAP's images.txt: two lines per image, the second its points (which may be empty, but must be there).
 
-# Image list with two lines of data per image:
-#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME
-1 0.8517 0.0165 0.5035 -0.1431 -0.7376 1.0240 3.7463 1 P1180141.JPG
-2362.39 248.498 58396 1784.7 268.254 59027
+    # Image list with two lines of data per image:
+    #   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME
+    1 0.8517 0.0165 0.5035 -0.1431 -0.7376 1.0240 3.7463 1 P1180141.JPG
+    2362.39 248.498 58396 1784.7 268.254 59027
 
-What is written is the pose of the world in the camera, camera<-world: the camera stands at -R't. Optical axes. The list
-of frames that a rig has since 2025, frames.txt, holds the pose of the world in the rig: FRAME_ID RIG_ID QW .. TZ ..
+The file has the pose of the world in the camera, camera<-world: the camera is at -R't. Optical axes. Since 2025
+frames.txt, the list of frames of a rig, has the pose of the world in the rig: FRAME_ID RIG_ID QW .. TZ ..
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ POSES = FORMATS["colmap"].poses
 
 
 def poses(file: InputFile, options: Options) -> Iterator[Written]:  # noqa: ARG001 - as the other forms have it
-    """Yield the poses of images.txt, or of frames.txt, as they are written."""
+    """Yield the poses of images.txt, or of frames.txt, as written."""
     comments, lines = True, text_lines(file)
     of_frames = False
-    begins_so: bool | None = None  # whether names of pictures begin with a number and a blank
+    begins_so: bool | None = None  # whether names of images begin with a number and a blank
     for number, line in lines:
         bare = line.strip()
         if not bare or bare.startswith("#"):
@@ -63,8 +63,8 @@ def read(file: InputFile, options: Options) -> Iterator[Samples]:
 
 
 def _pose(file: InputFile, line: int, text: str, *, of_frame: bool) -> Written:
-    words = text.split(maxsplit=9)  # the name of a picture may hold blanks
-    data = text.split()[9:] if of_frame else []  # how many, and three words of each
+    words = text.split(maxsplit=9)  # the name of an image may contain blanks
+    data = text.split()[9:] if of_frame else []  # a count, and three words per item
     expected = FRAME_LINE if of_frame else f"10 words ({IMAGE_LINE})"
     if len(words) < 9 or (len(words) < 10 and not of_frame):
         raise FormatError(f"expected {expected}, found {len(words)} words", source=file.name, line=line)

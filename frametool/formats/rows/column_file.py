@@ -1,10 +1,10 @@
-"""Files of columns of numbers, read without any text: what a format has to offer, and what its files share.
+"""Files of columns of numbers, read without text: the interface of formats, and what their files share.
 
-The module of a format that is read as `arrays` has `open_columns(file, options) -> ColumnFile`; of one that is written
-so, `create(columns, count, style) -> ColumnWriter`.  Rows are counted from 1, batches follow one another.
+The module of a format that is read as `arrays` has `open_columns(file, options) -> ColumnFile`; if it is written,
+`create(columns, count, style) -> ColumnWriter`.  Rows are counted from 1, batches follow one another.
 
-Records lie in a file as numpy keeps them, the fields of one after the other.  What a header says of them is held
-against the file before anything is read, memory taken or written.  Knows no format.
+Records in a file have numpy's layout, one field after another.  Headers are checked against the file before data are
+read, memory is allocated or output is written.  Knows no format.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ STAMP_NS = np.dtype(np.int64)
 XYZ = ("x", "y", "z")
 PIECE = 1 << 20  # bytes that are copied at once
 BATCH_BYTES = 1 << 21
-MOST_ROWS = 1 << 15  # of a batch; in cache with what is made of it
+MOST_ROWS = 1 << 15  # of a batch; it and its results stay in cache
 
 
 class ColumnNumbers(NamedTuple):
-    """Numbers of a column: (n,) of float64 or its own type, nan where null, and the nulls (None: there are none)."""
+    """Numbers of a column: (n,) of float64 or its own type, nan for null, and the null mask (None: no nulls)."""
 
     values: Floats
     nulls: Flags | None = None
@@ -57,10 +57,10 @@ class ColumnNumbers(NamedTuple):
 class OutColumn(NamedTuple):
     """A column of the output.
 
-    name: "" where columns have no names
+    name: "" if columns have no names
     kind: the type of its numbers; None for texts
-    passed: the place of the column of the input that passes as it is; None for what is made
-    longest: how many characters a text has at most, where that is known; is_json: whether texts are JSON
+    passed: the index of the unchanged input column; None for a new column
+    longest: the maximum length of a text, if known; is_json: whether texts are JSON
     """
 
     name: str
@@ -71,9 +71,9 @@ class OutColumn(NamedTuple):
 
 
 class Made(NamedTuple):
-    """What stands in a column that is made: (n,) of its kind, or texts; and the rows that have none (None: all have).
+    """The data of a new column: (n,) of its type, or texts; and the mask of missing values (None: none missing).
 
-    Numbers of rows that have none are nan.
+    Missing numbers are nan.
     """
 
     values: Any
@@ -81,25 +81,25 @@ class Made(NamedTuple):
 
 
 class Batch(Protocol):
-    """Some rows of a file; places are those of its columns.
+    """Rows of a file, addressed by the indices of its columns.
 
-    size: how many they are; bytes_read: how many bytes of the file they take
+    size: the number of rows; bytes_read: their size in the file
     """
 
     size: int
     bytes_read: int
 
     def column(self, place: int) -> Any:
-        """Return a column as it is: an array whose kind the file tells, or texts."""
+        """Return a column unchanged: an array of the file's type, or texts."""
 
     def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats; a null may be any number."""
         return ColumnNumbers(self.column(place).astype(np.float64))
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-        """Return a column as nanoseconds, and why rows have none; in_ns: as `whole_stamps` has it.
+        """Return a column as nanoseconds, and why rows have none; in_ns: as in `whole_stamps`.
 
-        A float of seconds counts as the decimal that it prints as, as it does in a table of text.
+        A float of seconds has the value of its shortest decimal text, as in a table of text.
         """
         numbers = self.column(place)
         if numbers.dtype.kind in WHOLE:
@@ -111,14 +111,14 @@ class Batch(Protocol):
         return stamps, dict.fromkeys(np.flatnonzero(bad).tolist(), "not a time in seconds")
 
     def texts(self, place: int) -> Sequence[str]:
-        """Return a column as texts, "" for none."""
+        """Return a column as texts, "" for missing ones."""
         return [str(plain_value(value)) for value in self.column(place).tolist()]
 
 
 def whole_stamps(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags]:
-    """Return whole numbers as nanoseconds, and which are beyond 64 bits of them.
+    """Return integers as nanoseconds, and the mask of those beyond 64 bits.
 
-    in_ns: how many nanoseconds each counts; 0 are seconds, or what the size of the first says
+    in_ns: nanoseconds per unit; 0 for seconds, or what the size of the first implies
     """
     first = int(next(iter(numbers[numbers != 0]), 0))
     each = in_ns or nanoseconds_each(first)
@@ -128,25 +128,25 @@ def whole_stamps(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags]:
 
 
 class ColumnWriter(Protocol):
-    """Write the rows of one batch after the other."""
+    """Writes rows batch by batch."""
 
     def of_rows(self, batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
-        """Return what is written of a batch: of these of its rows (None: all), with what is made for each of them.
+        """Return the bytes for rows of a batch (None: all), with the new data of each.
 
-        batch: None where no column passes.
+        batch: None if no column is copied from the input.
         """
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last batch."""
+        """Yield what follows the last batch."""
 
 
 class ColumnFile(Protocol):
-    """A file that was opened: its columns are known, its rows are not read yet.
+    """An opened file: its columns are known, its rows are not read yet.
 
-    names: of the columns; None where they have none; width: how many there are
-    kinds: the types of their numbers; None for texts and for what else is not a number
-    vectors: columns of vectors that turn when points move, as normals do
-    gaps: numbers that are not finite stand for none: a point without return; else their rows are bad
+    names: of the columns; None if they have none; width: their number
+    kinds: the types of their numbers; None for texts and everything else
+    vectors: columns of vectors that are rotated with the points, such as normals
+    gaps: a number that is not finite means a missing point; otherwise its row is bad
     """
 
     names: tuple[str, ...] | None
@@ -156,57 +156,57 @@ class ColumnFile(Protocol):
     gaps: bool
 
     def kind(self, place: int) -> Kind | None:
-        """Return the type of a column's numbers; None for what is not a number."""
+        """Return the type of a column's numbers; None for other columns."""
         return self.kinds[place]
 
     def moved_by(self, pose: Components | None) -> None:
-        """Move what has a place among the points by the pose that moves all of them, before any is read.
+        """Transform data about all points by the pose that transforms all of them, before any is read.
 
-        That is the pose of the sensor, or rotations of splats; None: there is no such pose.
+        Such as the pose of the sensor, or rotations of splats; None: there is no such pose.
         """
         del pose
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the rows; raises FormatError where the file ends too early."""
+        """Yield the rows; raises FormatError if the file ends too early."""
 
     def nothing(self) -> Batch:
-        """Return a batch of no rows."""
+        """Return an empty batch."""
         return StructuredBatch(np.zeros(0, record_of(kind or "U1" for kind in self.kinds)))
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
-        """Return what writes a file of the same form, with what the columns do not hold as it was.
+        """Return a writer for a file of the same format, with everything outside of the columns unchanged.
 
-        drops: rows may be left out, so that their number is not known before the end.
+        drops: rows may be omitted, so that their number is not known before the end.
         """
 
 
 class StructuredBatch(Batch):
-    """Some rows of an array with a field for each column."""
+    """Rows of a structured array, one field per column."""
 
     def __init__(self, rows: NDArray[Any]) -> None:
-        """Take rows (n,)."""
+        """Store rows (n,)."""
         self.rows = rows
         self.fields = rows.dtype.names or ()
         self.size = len(rows)
         self.bytes_read = rows.nbytes
 
     def column(self, place: int) -> NDArray[Any]:
-        """Return a field as it is."""
+        """Return a field."""
         return self.rows[self.fields[place]]
 
 
 def record_of(kinds: Iterable[Any]) -> Kind:
-    """Return the type of records that have a value of each kind, one behind the other."""
+    """Return the type of records with a value of each type, in this order."""
     return np.dtype([(f"{place}", kind) for place, kind in enumerate(kinds)])
 
 
 def is_number(kind: Kind | None) -> bool:
-    """Return True if a column of this kind holds numbers."""
+    """Return True if a column of this type holds numbers."""
     return kind is not None and kind.kind in FLOATS + WHOLE
 
 
 def plain_value(value: Any) -> Any:
-    """Return a value of a library as JSON has it: what it has no word for as text."""
+    """Return a library's value in JSON terms; values unknown to JSON as text."""
     if isinstance(value, dict):
         return {str(key): plain_value(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
@@ -219,7 +219,7 @@ def plain_value(value: Any) -> Any:
 
 
 def not_finite(values: Floats) -> Flags | None:
-    """Return which numbers are not finite; None if all are."""
+    """Return the mask of numbers that are not finite; None if all are."""
     with np.errstate(invalid="ignore", over="ignore"):
         if np.isfinite(values.sum()):
             return None
@@ -231,14 +231,14 @@ def not_finite(values: Floats) -> Flags | None:
 
 
 def rows_of_batch(size: int) -> int:
-    """Return how many records of so many bytes are read at once."""
+    """Return how many records of this size are read at once."""
     return max(1, min(MOST_ROWS, BATCH_BYTES // max(size, 1)))
 
 
 def record_batches(file: InputFile, record: Kind, count: int) -> Iterator[StructuredBatch]:
-    """Yield so many records of a stream; memory is taken as they come, not as many as are said to come.
+    """Yield records of a stream; memory grows with the data, not with the stated count.
 
-    Raises FormatError where the file ends too early.
+    Raises FormatError if the file ends too early.
     """
     size = rows_of_batch(record.itemsize)
     for done in range(0, count, size):
@@ -251,7 +251,7 @@ def record_batches(file: InputFile, record: Kind, count: int) -> Iterator[Struct
 
 
 def bytes_left(stream: BinaryIO) -> int | None:
-    """Return how many bytes a file still holds; None for a pipe."""
+    """Return the number of remaining bytes; None for a pipe."""
     try:
         about = os.fstat(stream.fileno())
         return about.st_size - stream.tell() if stat.S_ISREG(about.st_mode) else None
@@ -260,10 +260,10 @@ def bytes_left(stream: BinaryIO) -> int | None:
 
 
 def check_declared(file: InputFile, count: int, size: int, what: str, *, last: bool) -> None:
-    """Raise FormatError where a file does not hold as many records as its header says.
+    """Raise FormatError if a file has fewer records than its header states.
 
-    count, size: the records and the bytes of each; what: they are called so
-    last: nothing else follows them, so that what does would be records that the header leaves out
+    count, size: the number of records and the bytes of each; what: their name in messages
+    last: nothing else follows them, so that more data are an error too
     """
     if count and not size:
         raise FormatError(f"the header says {count} {what} of 0 bytes each", source=file.name)
@@ -283,7 +283,7 @@ def pieces(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def read_exactly(file: InputFile, size: int, what: str) -> bytes:
-    """Read so many bytes, memory growing with what comes; raises FormatError where there are fewer."""
+    """Read this many bytes, with memory growing with the data; raises FormatError if there are fewer."""
     found: list[bytes] = []
     missing = size
     while missing and (piece := file.stream.read(min(missing, PIECE))):
@@ -295,14 +295,14 @@ def read_exactly(file: InputFile, size: int, what: str) -> bytes:
 
 
 def temporary_file(owner: object) -> Any:
-    """Return a file without a name that is closed with its owner."""
+    """Return an unnamed file that is closed with its owner."""
     file = TemporaryFile()  # noqa: SIM115 - closed with its owner
     finalize(owner, file.close)
     return file
 
 
 def seekable(file: InputFile, owner: object) -> Any:
-    """Return the stream of a file, to be read here and there; of a pipe a copy, which is closed with its owner."""
+    """Return the stream of a file, with random access; for a pipe a copy, which is closed with its owner."""
     if bytes_left(file.stream) is not None:
         return file.stream
     copy = temporary_file(owner)
@@ -315,16 +315,16 @@ def seekable(file: InputFile, owner: object) -> Any:
 
 
 class CountedWriter:
-    """Write a header that says how many rows there are, the rows, and what stands behind them."""
+    """Writes a header with the number of rows, the rows, and what follows them."""
 
     def __init__(
         self, encode: Encode, head: Callable[[int], bytes], count: int | None,
         behind: Callable[[], Iterable[bytes]] = tuple,
     ) -> None:  # fmt: skip
-        """Take what makes bytes of the rows of a batch, with what is made for them.
+        """Store the functions that encode the rows of a batch, with their new data.
 
-        head: makes the header for so many rows; behind: yields what follows the rows
-        count: how many rows there will be; None if that is known at the end only: they wait in a file until then.
+        head: returns the header for a number of rows; behind: yields what follows the rows
+        count: the number of rows; None if it is known only at the end: rows are kept in a file until then.
         """
         self.encode, self.head, self.count, self.behind = encode, head, count, behind
         self.written = 0
@@ -332,7 +332,7 @@ class CountedWriter:
         self.waiting = temporary_file(self) if count is None else None
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
-        """Return what is written of a batch."""
+        """Return the bytes of a batch."""
         data = self.encode(batch, rows, made)
         self.written += len(made[0].values) if batch is None else batch.size if rows is None else len(rows)
         if self.waiting is not None:
@@ -343,7 +343,7 @@ class CountedWriter:
         return head + data if head else data
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last batch; all, if the rows had to be counted first."""
+        """Yield what follows the last batch; all bytes, if the rows had to be counted first."""
         if not self.begun:
             yield self.head(self.written)
         if self.waiting is not None:
@@ -355,9 +355,9 @@ class CountedWriter:
 def encode_records(
     columns: Sequence[OutColumn], kind: Kind, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]
 ) -> bytes | memoryview:
-    """Return rows as records: what is made goes into its field, what passes is copied.
+    """Return rows as records: new data are written into their fields, the others are copied.
 
-    kind: of the records, which have a field for each of the columns.  Where none is new they are changed in place.
+    kind: of the records, with a field for each column.  If none is new they are changed in place.
     """
     given = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
     if given is not None and given.rows.dtype == kind:
@@ -370,7 +370,7 @@ def encode_records(
             values = next(new).values
             if records.dtype[name].kind == "U":
                 most = records.dtype[name].itemsize // np.dtype("U1").itemsize
-                if len(longest := max(values, key=len, default="")) > most:  # numpy would cut it
+                if len(longest := max(values, key=len, default="")) > most:  # numpy would truncate it
                     found = f"{shown(longest)} has {len(longest)}"
                     raise ValueInvalid(f"column {column.name} holds {most} characters, {found}")
             records[name] = values

@@ -1,9 +1,9 @@
-"""CSV: a header with the column names of the representations, then one row a result.
+"""CSV: a header with the column names of the representations, then one row per result.
 
     name,parent,x,y,z,qx,qy,qz,qw
     camera,map,1.0,2.0,3.0,0.0,0.0,0.0,1.0
 
-Metres, radians unless the column says degrees; the pose of `name` in `parent`.
+Metres, radians unless the column states degrees; the pose of `name` in `parent`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ HALVES = ("linear", "angular", "force", "torque")
 
 
 def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
-    """Return a header and one row a result; a point's coordinates are x, y, z."""
+    """Return a header and one row per result; a point's coordinates are x, y, z."""
     rows = [cells_of(each, style) for each in results]
     if not rows:
         return ""
@@ -41,7 +41,7 @@ write_points = write_poses
 def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
     """Return a pose's cells by column name.
 
-    An extra that a notation says already (the angle beside an axis) is left out; raises ValueInvalid where two
+    An extra that a notation contains (the angle of an axis) is omitted; raises ValueInvalid if two
     notations need one column.
     """
     pose = result.pose
@@ -72,7 +72,7 @@ def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
 
 
 def _record_cells(record: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the cells of a record: three of each vector; what else is no scalar is one cell of JSON."""
+    """Yield the cells of a record: three for each vector; other values that are not scalar are one cell of JSON."""
     for key, value in in_columns(record).items():
         if key in (*PLAIN, *HALVES) and (value is None or isinstance(value, (dict, list))):
             numbers = value.values() if isinstance(value, dict) else value or [None] * 3
@@ -97,7 +97,7 @@ def row(cells: Iterable[Any], style: Style) -> str:
 
 
 def cell(value: Any, style: Style) -> str:
-    """Write one cell, quoted where a reader would split it."""
+    """Format one cell, quoted if necessary."""
     if isinstance(value, float):
         return style.number(value)
     if isinstance(value, (dict, list)):

@@ -1,10 +1,10 @@
-"""g2o pose graphs: the vertices are poses in the world, metres, the quaternion w last; an edge is seen from its first.
+"""g2o pose graphs: vertices are poses in the world, metres, quaternion w last; edges are relative to the first vertex.
 
 VERTEX_SE3:QUAT 0 1.0 2.0 0.5 0.0 0.0 0.0 1.0
 VERTEX_SE2 1 1.0 2.0 0.5
 EDGE_SE3:QUAT 0 1 1.0 0.0 0.0 0.0 0.0 0.0 1.0 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1
 
-Edges measure, and contradict each other: they are no tree; the vertices are what was made of them.
+Edges are measurements and may contradict each other, so they are not a tree; the vertices are the estimate.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
 
 POSES = FORMATS["g2o"].poses
 EDGES = Poses("quaternion", counted="")
-# what else g2o writes: landmarks, parameters, measurements between others
+# other tags of g2o: landmarks, parameters, other measurements
 NO_POSE = r"FIX|PARAMS_\w+|ROBOTLASER\d|VERTEX_(?:XY|\w+XYZ?|CAM|SW\w*)|EDGE_(?:SE[23]|PRIOR|BEARING|PR|SW|PO)\w+"
 IN_SPACE, IN_PLANE = "x y z qx qy qz qw", "x y theta"
 VERTICES = {"VERTEX_SE3:QUAT": IN_SPACE, "VERTEX_SE2": IN_PLANE}
 MEASURED = {"EDGE_SE3:QUAT": IN_SPACE, "EDGE_SE2": IN_PLANE}
-INFORMATION = {IN_SPACE: 21, IN_PLANE: 6}  # numbers behind an edge
+INFORMATION = {IN_SPACE: 21, IN_PLANE: 6}  # numbers after an edge
 
 
 def form_of(_file: InputFile, options: Options) -> Poses:
-    """Return what the poses are: of vertices in the world, or of one vertex in another."""
+    """Return the meaning of the poses: of vertices in the world, or of one vertex in another."""
     return EDGES if options.answers.edges else POSES
 
 
 def poses(file: InputFile, options: Options) -> Iterator[Written]:
-    """Yield the vertices as they are written, or the edges."""
+    """Yield the vertices as written, or the edges."""
     edges = options.answers.edges
     kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
     only_others = 0
@@ -73,7 +73,7 @@ def poses(file: InputFile, options: Options) -> Iterator[Written]:
 
 
 def _pose(file: InputFile, line: int, words: list[str], layout: str, *, ids: int) -> Written:
-    """Read a vertex with its id, or an edge with the two it connects, which holds its information too."""
+    """Read a vertex with its id, or an edge with its two vertices and its information matrix."""
     expected = f"{'id' if ids == 1 else 'i j'} {layout}"
     size = len(expected.split())
     kind, *rest = words

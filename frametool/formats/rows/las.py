@@ -1,8 +1,8 @@
-"""LAS and LAZ, laser scans, through the libraries laspy and lazrs, the extra `frametool[las]`.
+"""LAS and LAZ, laser scans, with the libraries laspy and lazrs, the extra `frametool[las]`.
 
-x y z are integers of 32 bits, times a scale, plus an offset.  The scale stays; the offset is chosen anew, whole metres
-near the first points that are written, and what does not fit then is an error.  All other dimensions, VLRs and EVLRs
-are kept, a coordinate system among them, which a warning says.
+x y z are 32-bit integers, times a scale, plus an offset.  The scale is preserved; the offset is chosen again, whole
+metres near the first points that are written; points that do not fit are an error.  All other dimensions, VLRs and
+EVLRs are preserved, including a coordinate system, with a warning.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 XYZ, WHOLE = column_file.XYZ, column_file.WHOLE
 STORED = ("X", "Y", "Z")
 LIMITS = np.iinfo(np.int32)
-NEW_SCALE = 0.001  # metres, of a file that is made
+NEW_SCALE = 0.001  # metres, of a new file
 COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
 EXTRA = {f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)} | {"f4", "f8"}  # types of other dimensions
 LONGEST_NAME = 32
-RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # where the header counts them, and the least bytes of each
+RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # where the header has their number, and the minimum size of each
 MINOR_AT, LEAST_HEAD = 25, 375  # of the version, 1.4 has EVLRs; bytes of its header
-PACKED_AT, PACKED = 104, b"\x80"  # the byte that says so, and from which value on
+PACKED_AT, PACKED = 104, b"\x80"  # the byte that marks compression, and its lowest such value
 
 
 def _laspy(name: str, *, packed: bool = False) -> Any:
-    """Import the library, and keep it from printing; raises FileProblem where it, or what unpacks, is not installed."""
+    """Import the library, and keep it from printing; raises FileProblem if it, or decompression, is missing."""
     try:
         laspy = import_module("laspy")  # it ships no types
         if packed:
@@ -65,7 +65,7 @@ REFUSED = "it cannot be written as las: {}"
 
 @contextmanager
 def _translated(name: str, what: str) -> Iterator[None]:
-    """Turn whatever the library raises into one error, with what the library says in the place of {}."""
+    """Convert any exception of the library into one error, with its text in place of {}."""
     try:
         yield
     except FrametoolError:
@@ -78,44 +78,44 @@ def _translated(name: str, what: str) -> Iterator[None]:
 
 
 class _Clipped:
-    """A file of which nobody reads more than there is: memory is taken for what a header says, before it is read."""
+    """A file wrapper that never reads more than exists: the library allocates what a header states before it reads."""
 
     def __init__(self, stream: Any, size: int) -> None:
-        """Take a stream that can be gone back in, and how many bytes it has."""
+        """Store a seekable stream and its size."""
         self._stream, self._size = stream, size
 
     def __getattr__(self, name: str) -> Any:
-        """Do all else as the file does."""
+        """Delegate everything else to the file."""
         return getattr(self._stream, name)
 
     def read(self, size: int = -1) -> bytes:
-        """Read so many bytes, or all that are left."""
+        """Read this many bytes, or all that are left."""
         left = max(self._size - self._stream.tell(), 0)
         data: bytes = self._stream.read(left if size < 0 else min(size, left))
         return data
 
 
 class LasBatch(column_file.StructuredBatch):
-    """Some points."""
+    """A batch of points."""
 
     def __init__(self, points: Any, names: Sequence[str]) -> None:
-        """Take a record of the library and the names of the columns."""
+        """Store a record of the library and the names of the columns."""
         super().__init__(points.array)
         self.points, self.names = points, names
 
     def column(self, place: int) -> NDArray[Any]:
-        """Return a column as it is."""
+        """Return a column unchanged."""
         return np.array(self.points[self.names[place]])
 
 
 class LasFile(column_file.ColumnFile):
-    """A scan whose points are read one batch after the other."""
+    """A scan whose points are read in batches."""
 
     vectors = (("x_t", "y_t", "z_t"),)  # directions of waveforms
     gaps = False
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header; raises FormatError for a broken one, FileProblem where the extra is missing."""
+        """Read the header; raises FormatError for a broken one, FileProblem if the extra is missing."""
         laspy = _laspy(file.name, packed=file.head()[PACKED_AT : PACKED_AT + 1] >= PACKED)
         self.file = file
         file.stream = column_file.seekable(file, self)
@@ -138,16 +138,16 @@ class LasFile(column_file.ColumnFile):
             probe = laspy.ScaleAwarePointRecord.zeros(1, header=header)
             kinds = [np.array(probe[name]) for name in self.names]
         self.width = len(self.names)
-        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # several in one are no number
+        self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # several in one are not a number
 
     def moved_by(self, pose: Components | None) -> None:
-        """Warn that a coordinate system is kept."""
+        """Warn that a coordinate system is preserved."""
         del pose
         if any(type(vlr).__name__.startswith(("Wkt", "Geo")) for vlr in self.header.vlrs):
             warn(f"{self.file.name}: its coordinate system (CRS) is kept as it is; is it still that of the points?")
 
     def batches(self) -> Iterator[LasBatch]:
-        """Yield the points; raises FormatError where the file ends too early."""
+        """Yield the points; raises FormatError if the file ends too early."""
         count, done = self.header.point_count, 0
         while done < count:
             wanted = min(column_file.MOST_ROWS, count - done)
@@ -159,7 +159,7 @@ class LasFile(column_file.ColumnFile):
             yield LasBatch(points, self.names)
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> LasWriter:
-        """Return what writes a file of the same kind."""
+        """Return a writer for a file of the same kind."""
         del drops  # the library counts
         if [column.name for column in columns] != list(self.names):
             raise ValueInvalid("the dimensions of las stay as they are; -f npy or csv writes others")
@@ -167,14 +167,14 @@ class LasFile(column_file.ColumnFile):
         return LasWriter(deepcopy(self.header), columns, packed=packed, name=self.file.name)
 
 
-MOST_PACKED = 1 << 16  # points in a packed byte: far more than any packer makes
+MOST_PACKED = 1 << 16  # points in a packed byte: far more than any encoder reaches
 
 
 class LasWriter:
-    """Write points into a file that can be gone back in, as the header wants, and give it out at the end."""
+    """Writes points to a seekable file, because the header needs it, and yields its bytes at the end."""
 
     def __init__(self, header: Any, columns: Sequence[OutColumn], *, packed: bool, name: str = "las") -> None:
-        """Take a header, whose offsets are chosen when the first points come."""
+        """Store a header; its offsets are chosen with the first points."""
         self.header, self.columns, self.packed, self.name = header, columns, packed, name
         self.kept = column_file.temporary_file(self)
         self.writer: Any = None
@@ -182,7 +182,7 @@ class LasWriter:
         self.left_out = 0  # points without numbers
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Take the points of a batch, those that have a place; nothing is written yet."""
+        """Write the points of a batch that have numbers; nothing is returned yet."""
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
         new |= {name: new[name].astype(np.float64) for name in XYZ if name in new}
@@ -210,7 +210,7 @@ class LasWriter:
             self.writer = writer(self.kept, self.header, do_compress=self.packed, closefd=False)
 
     def _points(self, batch: LasBatch | None, rows: Ints | None, new: dict[str, Any]) -> Any:
-        """Return points as the library writes them."""
+        """Return points as a record of the library."""
         kind = _laspy(self.name).ScaleAwarePointRecord
         if batch is None:
             points = kind.zeros(len(new["x"]), header=self.header)
@@ -230,7 +230,7 @@ class LasWriter:
         return points
 
     def _stored(self, values: Floats, axis: int) -> Ints:
-        """Return coordinates as they are stored; raises FormatError for one that does not fit."""
+        """Return coordinates as stored integers; raises FormatError for one that does not fit."""
         scale, offset = float(self.header.scales[axis]), float(self.header.offsets[axis])
         with np.errstate(all="ignore"):
             stored = np.rint((values - offset) / scale)
@@ -243,7 +243,7 @@ class LasWriter:
         return stored.astype(np.int32)
 
     def end(self) -> Iterator[bytes]:
-        """Yield the file."""
+        """Yield the bytes of the file."""
         self._begin({})
         with _translated(self.name, REFUSED):
             if evlrs := getattr(self.header, "evlrs", None):
@@ -259,12 +259,12 @@ class LasWriter:
 
 
 def open_columns(file: InputFile, _options: Options) -> LasFile:
-    """Open a scan; raises FormatError, FileProblem where the extra is missing."""
+    """Open a scan; raises FormatError, FileProblem if the extra is missing."""
     return LasFile(file)
 
 
 def misfit(column: OutColumn) -> str:
-    """Return why LAS has no place for a column, "" where it has one."""
+    """Return why LAS cannot hold a column, "" if it can."""
     if column.name in STORED or len(column.name.encode()) > LONGEST_NAME:
         return f"its names have at most {LONGEST_NAME} bytes, and {', '.join(STORED)} have a meaning"
     kind = None if column.kind is None else column.kind.str[1:]
@@ -272,7 +272,7 @@ def misfit(column: OutColumn) -> str:
 
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
-    """Return what writes points made elsewhere: LAS 1.4, what is no dimension of it as extra bytes."""
+    """Return a writer for new points: LAS 1.4, columns that are not dimensions of it as extra bytes."""
     laspy = _laspy(style.form)
     names = {column.name for column in columns}
     if not names >= set(XYZ):

@@ -1,9 +1,9 @@
-"""NeRF's transforms.json: the pose of each camera in the world as 4x4 rows, with the axes of OpenGL; metres or not.
+"""NeRF's transforms.json: the pose of each camera in the world as 4x4 rows, with the axes of OpenGL; any scale.
 
 {"camera_angle_x": 0.69, "frames": [{"file_path": "1.png", "transform_matrix": [[..], [..], [..], [0, 0, 0, 1]]}]}
 
 Axes of OpenGL: x right, y up, z backward. Matrices of three rows occur (Nerfstudio), and `applied_transform`, which
-they contain already.
+is already included in them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
 def poses(file: InputFile, options: Options) -> Iterator[Written]:
-    """Yield the poses of the cameras as they are written."""
+    """Yield the poses of the cameras as written."""
     for document in parse_documents(file.text, file.name):
         try:
             whole = as_mapping(document.value, "transforms.json")

@@ -1,6 +1,6 @@
-"""NPY, the array of one file of numpy: n x 3 points, n x 7 poses, or records with named fields.
+"""NPY, numpy's file of one array: n x 3 points, n x 7 poses, or records with named fields.
 
-Read in pieces, never unpickled; of more than two axes the first counts the rows (n x 4 x 4 is n x 16).
+Read in pieces, never unpickled; with more than two axes the first counts the rows (n x 4 x 4 is n x 16).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 MAGIC = b"\x93NUMPY"
 MOST_HEADER = 1 << 20
 MOST_COLUMNS, MOST_BYTES = 1 << 16, 1 << 24  # of a row
-LONGEST_TEXT = 64  # characters of a name that is made; numpy has a fixed size for them
+LONGEST_TEXT = 64  # characters of a new name; numpy has fixed-size texts
 ALIGNED = 64  # bytes, as numpy pads its headers
 
 
 def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
-    """Return the type of an element, the shape, and whether columns stand one by one; raises FormatError."""
+    """Return the type of an element, the shape, and whether it is in column-major order; raises FormatError."""
 
     def wrong(what: str) -> FormatError:
         return FormatError(what, source=file.name)
@@ -65,12 +65,12 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
 
 
 class NpyFile(column_file.ColumnFile):
-    """An array whose rows are read one batch after the other."""
+    """An array whose rows are read in batches."""
 
     gaps = True
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header; raises FormatError for what is not a table of numbers."""
+        """Read the header; raises FormatError if it is not a table of numbers."""
         self.file = file
         kind, self.shape, self.by_columns = read_header(file)
         if not self.shape:
@@ -96,13 +96,13 @@ class NpyFile(column_file.ColumnFile):
         column_file.check_declared(file, self.count, self.record.itemsize, "rows", last=True)
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the rows; raises FormatError where the file ends too early."""
+        """Yield the rows; raises FormatError if the file ends too early."""
         if self.by_columns and len(self.shape) > 1:
             return self._rows_of_columns()
         return column_file.record_batches(self.file, self.record, self.count)
 
     def _rows_of_columns(self) -> Iterator[Batch]:
-        """Yield the rows of an array whose columns stand one after the other: all of it is read for that."""
+        """Yield the rows of an array in column-major order, which has to be read completely."""
         data, size = bytearray(), self.count * self.record.itemsize
         while len(data) < size and (piece := self.file.stream.read(min(column_file.PIECE, size - len(data)))):
             data += piece
@@ -114,7 +114,7 @@ class NpyFile(column_file.ColumnFile):
             yield column_file.StructuredBatch(rows.view(self.record)[:, 0])
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
-        """Return what writes an array of the same kind, row after row."""
+        """Return a writer for an array of the same kind, row after row."""
         del style
         shape = self.shape[1:] if self.names is None else None
         return _writer(columns, self.record, None if drops else self.count, shape)
@@ -123,9 +123,9 @@ class NpyFile(column_file.ColumnFile):
 def _writer(
     columns: Sequence[OutColumn], given: Kind, count: int | None, shape: tuple[int, ...] | None
 ) -> column_file.CountedWriter:
-    """Return what writes an array: without fields where the input had none and all columns are of one type.
+    """Return a writer for an array: without fields if the input had none and all columns are of one type.
 
-    given: the type of the input's records; shape: of a row that has no fields
+    given: the type of the input's records; shape: of a row without fields
     """
     record = _record_type(columns, given)
     kinds = {record[place] for place in range(len(columns))}
@@ -147,7 +147,7 @@ def _writer(
 
 
 def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
-    """Return the type of the records of an output; that of the input, padding included, if its fields stay."""
+    """Return the type of the records of an output; that of the input, padding included, if its fields are unchanged."""
     made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
     fields = [
         (column.name or f"{at}", kind if column.passed is None else given[column.passed])
@@ -163,6 +163,6 @@ def open_columns(file: InputFile, _options: Options) -> NpyFile:
 
 
 def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
-    """Return what writes rows made elsewhere: n x 3 where there are points alone, else records with fields."""
+    """Return a writer for new rows: n x 3 for points alone, else records with fields."""
     names = tuple(column.name for column in columns)
     return _writer(columns, np.dtype([]), count, () if names == column_file.XYZ else None)

@@ -1,4 +1,4 @@
-"""PCD, the point clouds of PCL: x y z in metres, normals, and other fields, which pass byte for byte.
+"""PCD, the point clouds of PCL: x y z in metres, normals, and other fields, which are preserved byte for byte.
 
     # .PCD v0.7 - Point Cloud Data file format
     VERSION 0.7
@@ -12,9 +12,9 @@
     POINTS 307200
     DATA binary
 
-Read: `ascii`, `binary`, and `binary_compressed` (LZF), which is written as `binary`.  VIEWPOINT is the pose of the
-sensor in the frame of the points, tx ty tz qw qx qy qz, and moves with them.  COLUMNS is an older word for FIELDS;
-files before 0.7 have no VIEWPOINT, some no COUNT.  A field called `_` is padding.
+Reads `ascii`, `binary`, and `binary_compressed` (LZF), which is written as `binary`.  VIEWPOINT is the pose of the
+sensor in the frame of the points, tx ty tz qw qx qy qz, and is transformed with them.  COLUMNS is an older word for
+FIELDS; files before 0.7 have no VIEWPOINT, some no COUNT.  A field named `_` is padding.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 DATA = ("ascii", "binary", "binary_compressed")
 TYPES = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
 CODES = {f"{letter.lower()}{size}": (size, letter) for letter, sizes in TYPES.items() for size in sizes}
-CODES |= {"f2": (4, "F"), "b1": (1, "U")}  # numpy's types, and those in which PCD has their values
+CODES |= {"f2": (4, "F"), "b1": (1, "U")}  # numpy's types, and the PCD types that hold their values
 PADDING = "_"
 _EACH = ("FIELDS", "SIZE", "TYPE", "COUNT")
 _KEYS = ("VERSION", "COLUMNS", *_EACH, "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
@@ -56,7 +56,7 @@ _WIDEST = 1 << 16  # values of one point
 
 
 class PcdField(NamedTuple):
-    """A field of each point: its name, the bytes of one value, its type as a letter, how many values it has."""
+    """A field of each point: its name, the bytes of one value, its type as a letter, the number of its values."""
 
     name: str
     size: int
@@ -65,12 +65,12 @@ class PcdField(NamedTuple):
 
     @property
     def code(self) -> str:
-        """Return the type of one value as numpy writes it: PCD is little-endian."""
+        """Return the type of one value in numpy's notation: PCD is little-endian."""
         return f"<{self.kind.lower()}{self.size}"
 
 
 class PcdColumn(NamedTuple):
-    """A column of a cloud: its name, which value of which field it is, its byte in a record and its cell in a row."""
+    """A column of a cloud: its name, its field and index in it, its byte in a record and its cell in a row."""
 
     name: str
     field: PcdField
@@ -80,7 +80,7 @@ class PcdColumn(NamedTuple):
 
 
 def columns_of(fields: Sequence[PcdField]) -> list[PcdColumn]:
-    """Return the columns of fields, each value of one; padding makes none, and takes its room."""
+    """Return the columns of fields, one per value; padding has none, but occupies bytes."""
     found: list[PcdColumn] = []
     offset, cell = 0, 0
     for field in fields:
@@ -105,15 +105,15 @@ def record_type(fields: Sequence[PcdField]) -> Kind:
 
 
 class PcdHead:
-    """What a header says.
+    """The contents of a header.
 
-    text: the header byte for byte, its last line end included
-    words: what stands behind each key; lines: the number of its line
-    viewpoint: seven numbers; None where there are none
+    text: the header byte for byte, including its last line end
+    words: the values of each key; lines: the number of its line
+    viewpoint: seven numbers; None if there are none
     """
 
     def __init__(self, stream: BinaryIO, source: str) -> None:
-        """Read a header and leave the stream behind it; raises FormatError that says line, value and remedy."""
+        """Read a header, up to the data; raises FormatError with line, value and remedy."""
         self.source = source
         self.words: dict[str, list[str]] = {}
         self.lines: dict[str, int] = {}
@@ -186,7 +186,7 @@ class PcdHead:
         return PcdField(name, int(size), kind, count)
 
     def _points(self) -> int:
-        """Return how many points there are; WIDTH, HEIGHT and POINTS have to agree."""
+        """Return the number of points; WIDTH, HEIGHT and POINTS have to agree."""
         found = {}
         for key in ("WIDTH", "HEIGHT", "POINTS"):
             if (words := self.words.get(key)) is None:
@@ -214,7 +214,7 @@ class PcdHead:
             raise self.problem("VIEWPOINT", f"VIEWPOINT: {error}") from None
 
     def rewritten(self, words: dict[str, str]) -> bytes:
-        """Return the header with other words behind some keys, those that it has."""
+        """Return the header with other values of some existing keys."""
         lines = self.text.split(b"\n")
         for key in words.keys() & self.lines.keys():
             at = self.lines[key] - 1
@@ -224,27 +224,27 @@ class PcdHead:
 
 
 def _words_of(fields: Sequence[PcdField]) -> dict[str, str]:
-    """Return the words of a header that say what its fields are."""
+    """Return the values of a header that describe its fields."""
     return {key: " ".join(str(field[at]) for field in fields) for at, key in enumerate(_EACH)}
 
 
 def viewpoint_words(pose: Rigid) -> str:
-    """Return the pose of a sensor as the words of VIEWPOINT: tx ty tz qw qx qy qz."""
+    """Return the pose of a sensor as the values of VIEWPOINT: tx ty tz qw qx qy qz."""
     tx, ty, tz, x, y, z, w = pose
     x, y, z, w = quaternion.from_quaternion(x, y, z, w, floats)
     return " ".join(repr(each + 0.0) for each in (tx, ty, tz, w, x, y, z))
 
 
-MOST = 88  # bytes that one packed byte may stand for: three make up to 264
+MOST = 88  # maximum expansion of one packed byte: three make up to 264
 
 
 def unpack(packed: bytes, size: int) -> bytearray:
     """Return the `size` bytes that were packed with LZF.
 
-    A control byte below 32 says how many bytes follow as they are, less one.  Else its upper three bits are a length
-    less two (seven: the next byte is added), its lower five the upper bits of a distance less one, whose lower eight
-    follow.  Memory grows with what is there, never with `size`.
-    Raises ValueInvalid for what was not packed so, or makes more or fewer bytes.
+    A control byte below 32 is a number of literal bytes minus one.  Otherwise its upper three bits are a length
+    minus two (seven: the next byte is added), its lower five the upper bits of a distance minus one, whose lower eight
+    follow.  Memory grows with the data, never with `size`.
+    Raises ValueInvalid for invalid data, or another size.
     Source: liblzf, lzf_d.c.
     """
     if size > MOST * len(packed):
@@ -260,7 +260,7 @@ def unpack(packed: bytes, size: int) -> bytearray:
 
 
 def _unpack(packed: bytes, size: int, out: bytearray) -> None:
-    """Append runs until all is read or too much is there; raises IndexError where one is cut.  The hot loop."""
+    """Append runs until everything is read or too much is there; raises IndexError if truncated.  The hot loop."""
     at, end = 0, len(packed)
     while at < end and len(out) <= size:
         control = packed[at]
@@ -282,7 +282,7 @@ def _unpack(packed: bytes, size: int, out: bytearray) -> None:
             raise ValueInvalid("it refers to what stands before its beginning")
         if distance >= length:
             out += out[start : start + length]
-        else:  # the run overlaps what it makes
+        else:  # the run overlaps its own output
             part = out[start:]
             out += (part * (length // distance + 1))[:length]
     if at > end:
@@ -290,10 +290,10 @@ def _unpack(packed: bytes, size: int, out: bytearray) -> None:
 
 
 class PcdFile(CloudFile):
-    """A cloud whose points are read one batch after the other."""
+    """A cloud whose points are read in batches."""
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header and hold it against the file; raises FormatError."""
+        """Read the header and check it against the file; raises FormatError."""
         head = self.head = PcdHead(file.stream, file.name)
         self.columns = columns_of(head.fields)
         super().__init__(file, [column.name for column in self.columns], record_type(head.fields), head.points)
@@ -305,7 +305,7 @@ class PcdFile(CloudFile):
             self.text = TextRows(self, [column.cell for column in self.columns], every, head.text.count(b"\n") + 1)
 
     def moved_by(self, pose: Components | None) -> None:
-        """Move VIEWPOINT by the pose that moves all points; None: there is no such one."""
+        """Transform VIEWPOINT by the pose that transforms all points; None: there is no such pose."""
         if self.head.viewpoint is None:
             return
         name = self.file.name
@@ -320,7 +320,7 @@ class PcdFile(CloudFile):
         self.viewpoint = viewpoint_words(placed.pose_of(moved))
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the points; raises FormatError where the file ends too early, or holds more."""
+        """Yield the points; raises FormatError if the file ends too early, or has more."""
         if self.head.data != "binary_compressed":
             yield from super().batches()
         elif self.count:
@@ -332,7 +332,7 @@ class PcdFile(CloudFile):
                 yield column_file.StructuredBatch(rows)
 
     def _unpacked(self) -> list[Any]:
-        """Return the packed columns, which follow one another field by field, padding perhaps among them."""
+        """Return the unpacked columns, which are stored field by field, possibly with padding."""
         file, points, fields = self.file, self.count, self.head.fields
         packed_size, size = struct.unpack("<II", column_file.read_exactly(file, 8, "the sizes behind DATA"))
         if size != points * self.record.itemsize:
@@ -358,7 +358,7 @@ class PcdFile(CloudFile):
         return columns
 
     def _fields(self, columns: Sequence[OutColumn]) -> list[PcdField]:
-        """Return the fields of an output; columns of one field that stay together stay one."""
+        """Return the fields of an output; adjacent columns of one field remain one field."""
         same = self.text is not None or same_columns(columns, self.width)
         found = list(self.head.fields) if same else []
         at = self.width if same else 0
@@ -373,11 +373,11 @@ class PcdFile(CloudFile):
         return found
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
-        """Return the type of a point that has other columns."""
+        """Return the type of a point with other columns."""
         return record_type(self._fields(columns))
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
-        """Return the header with what changed in it."""
+        """Return the header with changes."""
         fields = self._fields(columns)
         words = {"VIEWPOINT": self.viewpoint} if self.viewpoint else {}
         if self.head.data == "binary_compressed":
@@ -396,7 +396,7 @@ def _new_field(column: OutColumn) -> PcdField:
 
 
 def misfit(column: OutColumn) -> str:
-    """Return why PCD has no place for a column, "" where it has one."""
+    """Return why PCD cannot hold a column, "" if it can."""
     return misfit_of(CODES, column, PADDING)
 
 
@@ -409,9 +409,9 @@ def create(
     columns: Sequence[OutColumn], count: int | None, _style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
 ) -> column_file.CountedWriter:  # fmt: skip
-    """Return what writes points made elsewhere, with numbers of the types they have.
+    """Return a writer for new points, with numbers of their own types.
 
-    grid: how many points there are in a row, and how many rows; sensor: its pose among the points
+    grid: the number of points per row, and of rows; sensor: its pose among the points
     """
     numbers = numbers_from(1)
     named = [each if each.name else each._replace(name=f"column_{next(numbers)}") for each in columns]

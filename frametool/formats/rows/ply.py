@@ -1,4 +1,4 @@
-"""PLY, polygons and point clouds: the vertices move, and their normals turn; all else passes byte for byte.
+"""PLY, polygons and point clouds: vertices and their normals are transformed; everything else is preserved.
 
     ply
     format binary_little_endian 1.0
@@ -11,9 +11,9 @@
     property list uchar int vertex_indices
     end_header
 
-Read: `ascii`, `binary_little_endian`, `binary_big_endian`; numbers are in the unit of whoever wrote them, metres for
-point clouds.  Rotations of Gaussian splats, rot_0 .. rot_3 (w x y z, of any norm), turn too; their spherical harmonics
-do not, which a warning says.
+Reads `ascii`, `binary_little_endian`, `binary_big_endian`; the unit is that of the author, metres for point clouds.
+Rotations of Gaussian splats, rot_0 .. rot_3 (w x y z, of any norm), are rotated too; their spherical harmonics are
+not, with a warning.
 """
 
 from __future__ import annotations
@@ -51,18 +51,18 @@ TYPES = {
     "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8",
 }  # fmt: skip
 NAMES = {code: name for name, code in reversed(TYPES.items())}
-NEW_NAMES = {code: name for code, name in NAMES.items() if code not in ("i8", "u8")}  # not everybody reads these
+NEW_NAMES = {code: name for code, name in NAMES.items() if code not in ("i8", "u8")}  # not every tool reads these
 NEW_NAMES |= {"b1": "uchar", "f2": "float"}
 VERTEX = "vertex"
-OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # how those of an element begin
+OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # of an element
 SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
 
 
 class PlyElement(NamedTuple):
     """One element of a file.
 
-    instances: how many there are; line: where it stands in the header
-    properties: by name the type of a value, and of a list the type of what counts it, else ""
+    instances: their number; line: in the header
+    properties: by name the type of a value, and for a list the type of its count, else ""
     """
 
     name: str
@@ -72,23 +72,23 @@ class PlyElement(NamedTuple):
 
     @property
     def lists(self) -> list[str]:
-        """Name the properties that are lists, whose size is not known beforehand."""
+        """Return the properties that are lists, whose size is not known beforehand."""
         return [name for name, (_, counted) in self.properties.items() if counted]
 
     @property
     def size(self) -> int:
-        """Return how many bytes one of them has where none of its properties is a list."""
+        """Return the size of one instance without list properties."""
         return sum(width for width, _, _ in self.sizes)
 
     @property
     def sizes(self) -> list[tuple[int, int, bool]]:
-        """Return the bytes of a value of each property, those of what counts a list (0: none does), and its sign."""
+        """Return the bytes of a value of each property, those of a list's count (0: not a list), and its sign."""
         codes = self.properties.values()
         return [(int(code[1:]), int(counted[1:] or 0), counted[:1] == "i") for code, counted in codes]
 
 
 def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElement]]:
-    """Read a header and leave the stream behind it; raises FormatError that says line, value and remedy."""
+    """Read a header, up to the data; raises FormatError with line, value and remedy."""
     if (first := stream.readline(64)).strip() != b"ply" or not first.endswith(b"\n"):
         raise FormatError("the first line of a PLY file is `ply`, and it ends in a line feed", source=source, line=1)
     form, elements, text = "", dict[str, PlyElement](), [first]
@@ -142,17 +142,17 @@ def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None
     element.properties[name] = codes[-1], codes[0] if is_list else ""
 
 
-# --- what stands behind the vertices of a binary file: its rows are followed, so that a file that is cut is noticed ---
+# --- the data after the vertices of a binary file are followed row by row, to detect a truncated file ---
 
-_SHORT = 16  # rows of one length that are followed one by one before more are looked at together
+_SHORT = 16  # rows of one length that are followed singly before more are checked together
 _LOST = "the rest of the file does not fit its header: {}; is it whole?"
 
 
 def _passing(elements: Sequence[PlyElement], order: str, stream: Iterable[bytes], fail: Fail) -> Iterator[bytes]:
-    """Yield the pieces of a stream; raises FormatError where they end too early, or go on behind the last row."""
+    """Yield the pieces of a stream; raises FormatError if they end too early, or continue after the last row."""
     ends: Ends = "little" if order == "<" else "big"
     waiting = [(each, each.instances) for each in reversed(elements)]
-    data, at = b"", 0  # what is not followed yet, and where the next row begins, perhaps behind it
+    data, at = b"", 0  # unprocessed data, and the start of the next row, possibly after it
     for piece in chain(stream, (b"",)):
         data, at = data[at:] + piece, max(at - len(data), 0)
         while waiting and at <= len(data):
@@ -169,7 +169,7 @@ def _passing(elements: Sequence[PlyElement], order: str, stream: Iterable[bytes]
 
 
 def _followed(element: PlyElement, ends: Ends, data: bytes, at: int, left: int, fail: Fail) -> tuple[int, int]:
-    """Return where the rows of an element end that begin in the data, perhaps behind it, and how many are left."""
+    """Return the end of the rows of an element that begin in the data, possibly after it, and the number left."""
     if not element.lists:
         return at + left * element.size, 0
     sizes, alike, size = element.sizes, 0, 0
@@ -194,7 +194,7 @@ def _followed(element: PlyElement, ends: Ends, data: bytes, at: int, left: int, 
 
 
 def _alike(sizes: Sequence[tuple[int, int, bool]], ends: Ends, data: bytes, size: int) -> int:
-    """Count the rows whose lists are as long as those of the first, which has a size: most meshes have triangles."""
+    """Count the rows whose lists are as long as those of the first: most meshes have triangles."""
     rows = len(data) // size
     if rows < _SHORT:
         return 1
@@ -209,12 +209,12 @@ def _alike(sizes: Sequence[tuple[int, int, bool]], ends: Ends, data: bytes, size
 
 
 class PlyFile(clouds.CloudFile):
-    """A cloud, or the vertices of a mesh, read one batch after the other."""
+    """A cloud, or the vertices of a mesh, read in batches."""
 
     vectors = NORMALS[::-1]
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header and what stands before the vertices; raises FormatError."""
+        """Read the header and everything before the vertices; raises FormatError."""
         self.head, self.order, elements = read_head(file.stream, file.name)
         at = next((at for at, each in enumerate(elements) if each.name == VERTEX), None)
         if at is None:
@@ -257,7 +257,7 @@ class PlyFile(clouds.CloudFile):
         return b"".join(lines)
 
     def moved_by(self, pose: Components | None) -> None:
-        """Turn the rotations of splats with the pose that moves all points; None: there is no such one."""
+        """Rotate splats by the pose that transforms all points; None: there is no such pose."""
         name = self.file.name
         if pose is not None and len(pose) == SCALED and "scale_0" in self.names:
             warn(f"{name}: scale_0 .. scale_2, the sizes of splats, are left as they are: add {log(pose[EXACT]):.9g}")
@@ -273,14 +273,14 @@ class PlyFile(clouds.CloudFile):
             warn(f"{name}: f_rest_*, spherical harmonics, are left as they are: colours keep to the old axes")
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the vertices; raises FormatError where the file ends too early, or holds more."""
+        """Yield the vertices; raises FormatError if the file ends too early, or has more."""
         for batch in super().batches():
             if self.turn is not None:
                 self._turn_splats(batch, self.turn)
             yield batch
 
     def _turn_splats(self, batch: Batch, turn: Sequence[float]) -> None:
-        """Multiply rotations from the left, in place: the Hamilton product, which keeps their norms."""
+        """Multiply rotations from the left, in place: the Hamilton product, which preserves their norms."""
         columns = [batch.column(self.names.index(name)) for name in SPLAT]
         bx, by, bz, bw = (column.astype(np.float64) for column in columns)
         ax, ay, az, aw = turn
@@ -292,7 +292,7 @@ class PlyFile(clouds.CloudFile):
             column[:] = values
 
     def rest(self) -> Iterable[bytes]:
-        """Yield what stands behind the vertices."""
+        """Yield everything after the vertices."""
         if self.is_last:
             return (self.behind,)
         if self.text is not None:
@@ -301,7 +301,7 @@ class PlyFile(clouds.CloudFile):
         return _passing(self.after, self.order, column_file.pieces(self.file.stream), fail)
 
     def _counted(self, text: clouds.TextRows) -> Iterator[bytes]:
-        """Yield the lines of the other elements; raises FormatError where there are not as many as the header says."""
+        """Yield the lines of the other elements; raises FormatError if their number differs from the header's."""
         expected = sum(each.instances for each in self.after)
         lines, begun = 0, b""
         for piece in text.behind():
@@ -314,11 +314,11 @@ class PlyFile(clouds.CloudFile):
             raise FormatError(said, source=self.file.name)
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
-        """Return the type of a vertex that has other columns."""
+        """Return the type of a vertex with other columns."""
         return column_file.record_of(self.order + TYPES[_type_of(column)] for column in columns)
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
-        """Return the header with how many vertices there are and their properties, and what stands before them."""
+        """Return the header with the number of vertices and their properties, and everything before them."""
         text = self.head
         if count != self.count:
             if not self.is_last:
@@ -336,7 +336,7 @@ class PlyFile(clouds.CloudFile):
 
 
 def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, source: str) -> None:
-    """Raise FormatError where lists keep the vertices from being reached."""
+    """Raise FormatError if lists prevent access to the vertices."""
     if vertex.lists:
         message = f"the list {shown(vertex.lists[0])} within {VERTEX!r} is not read; write it as an element of its own"
         raise FormatError(f"{message}, or leave it out", source=source, line=vertex.line)
@@ -347,7 +347,7 @@ def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, s
 
 
 def _type_of(column: OutColumn) -> str:
-    """Return the type of a column as PLY calls it; raises ValueInvalid for what PLY cannot hold."""
+    """Return PLY's name for the type of a column; raises ValueInvalid for what PLY cannot hold."""
     return clouds.type_in("ply", NEW_NAMES if column.passed is None else NAMES, column)
 
 
@@ -356,7 +356,7 @@ def _property_line(column: OutColumn) -> bytes:
 
 
 def misfit(column: OutColumn) -> str:
-    """Return why PLY has no place for a column, "" where it has one."""
+    """Return why PLY cannot hold a column, "" if it can."""
     return clouds.misfit_of(NEW_NAMES, column)
 
 
@@ -366,7 +366,7 @@ def open_columns(file: InputFile, _options: Options) -> PlyFile:
 
 
 def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
-    """Return what writes points made elsewhere, with numbers of the types they have."""
+    """Return a writer for new points, with numbers of their own types."""
     record = column_file.record_of(f"<{TYPES[_type_of(column)]}" for column in columns)
     lines = b"".join(_property_line(column) + b"\n" for column in columns)
 

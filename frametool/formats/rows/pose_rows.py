@@ -1,9 +1,8 @@
-"""How formats write poses, one after the other: the text around the numbers of each, and what they cannot hold.
+"""How formats write poses, one after another: the text around the numbers, and what they cannot store.
 
 `("seconds", b" ", Numbers(7), b"\\n")` is a row of a TUM trajectory, 1305031102.175800000 1.0 2.0 3.0 0.0 0.0 0.0 1.0.
-The table is filled in by `frametool.stream.writers`, for one pose and for a million.  Also what all files of poses of
-one thing that moves share when they are read, lines in, blocks of poses out: checked rotations, direction, axes of
-cameras, stamps, names of the two frames.
+`frametool.stream.writers` fills in the table, for one pose or a million.  Also the common part of reading files of
+poses of one body: lines in, blocks of poses out; checked rotations, direction, axes of cameras, stamps, frames.
 """
 
 from __future__ import annotations
@@ -37,12 +36,12 @@ if TYPE_CHECKING:
 HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
 LOSABLE = {"frames": "names of frames", "stamps": "stamps"}
 MOST_NAMED = 8
-IMAGE = "image"  # the extra that names a picture
-NUMBER = "number"  # the extra that says what a pose was counted as in the same form
+IMAGE = "image"  # the extra that names an image
+NUMBER = "number"  # the extra with the number of a pose in the same format
 
 
 class Numbers(NamedTuple):
-    """So many numbers of a row, with the same text between them."""
+    """Several numbers of a row, with the same text between them."""
 
     size: int
     between: bytes = b" "
@@ -51,12 +50,12 @@ class Numbers(NamedTuple):
 class RowForm(NamedTuple):
     """The text of one pose.
 
-    row: constant text, `Numbers`, and what else is known of a pose: `seconds`, `nanoseconds`, `number` (counted from
-        `first`), `image` (the name of its picture, else its seconds)
-    numbers: from tx, ty, tz, x, y, z, w to the numbers in the order they are written
-    head, between, tail: text before the first pose, between two, and behind the last
+    row: constant text, `Numbers`, and other fields of a pose: `seconds`, `nanoseconds`, `number` (counted from
+        `first`), `image` (the name of its image, else its seconds)
+    numbers: from tx, ty, tz, x, y, z, w to the numbers in the order of the file
+    head, between, tail: text before the first pose, between two, and after the last
     holds: which of `frames`, `stamps` are written; other columns are not
-    beside: what else a reader of the form finds in it, told whenever it is written
+    beside: what else is written for readers of the format, for a note
     """
 
     row: tuple[str | bytes | Numbers, ...]
@@ -70,10 +69,10 @@ class RowForm(NamedTuple):
 
 
 class DroppedFields:
-    """What a form cannot hold of the poses that are written: collected, and told at the end."""
+    """What a format cannot store of the poses that are written: collected, and reported at the end."""
 
     def __init__(self, form: RowForm, style: Style) -> None:
-        """Collect nothing yet; raises ValueInvalid for notations that the form does not have."""
+        """Start empty; raises ValueInvalid for notations that the format does not have."""
         self.form, self.style = form, style
         self.found: dict[str, None] = {}
         self.counted = False
@@ -83,13 +82,13 @@ class DroppedFields:
             raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
 
     def record(self, *, frames: bool, stamps: bool, extras: Iterable[str]) -> None:
-        """Note fields of poses that the format cannot store."""
+        """Record fields of poses that the format cannot store."""
         said = {"frames": frames, "stamps": stamps}
         self.found |= {LOSABLE[what]: None for what, there in said.items() if there and what not in self.form.holds}
         self.found |= dict.fromkeys(extras)  # by name
 
     def tell(self) -> None:
-        """Warn of all that was left out or made up, in one line."""
+        """Warn about everything that was omitted or made up, in one line."""
         left = [words for words in LOSABLE.values() if words in self.found]
         if others := self.found.keys() - {*LOSABLE.values()}:
             left.append(listing(others, MOST_NAMED))
@@ -107,7 +106,7 @@ class DroppedFields:
 
 
 def turned(style: Style, pose: Components) -> Components:
-    """Turn a camera's axes to those of a form where both are known, and those of a camera that it is seen from."""
+    """Convert a camera's axes to those of a format if both are known, and those of a camera as reference frame."""
     if not is_turned(style):
         return pose
     tx, ty, tz, x, y, z, w = pose
@@ -116,13 +115,13 @@ def turned(style: Style, pose: Components) -> Components:
 
 
 def is_turned(style: Style) -> bool:
-    """Return True if the axes of a camera are not those of the form it is written in."""
+    """Return True if the axes of a camera differ from those of the format it is written in."""
     axes = FORMATS[style.form].poses.axes if style.form in FORMATS else ""
     return bool(axes and style.axes and axes != style.axes)
 
 
 def field(name: str, stamp_ns: int, number: int) -> str:
-    """Return what is written for a field of a row."""
+    """Return the text of a field of a row."""
     if name == "seconds":
         return format_stamp(stamp_ns)
     if name == "nanoseconds":
@@ -131,7 +130,7 @@ def field(name: str, stamp_ns: int, number: int) -> str:
 
 
 def image_name(image: str | None, stamp_ns: int) -> str:
-    """Return the name of a picture, with what JSON and rows cannot hold left out; else its stamp."""
+    """Return the name of an image, without characters that JSON and rows cannot hold; else its stamp."""
     if image is None:
         return format_stamp(stamp_ns)
     return "".join(letter for letter in image if letter.isprintable() and letter not in '"\\')
@@ -168,23 +167,23 @@ ROWS = {
 
 
 def rows_of(form: str) -> RowForm | None:
-    """Return how all poses are written in a format; None where each result has a text of its own."""
+    """Return how all poses are written in a format; None if each result has a text of its own."""
     found = getattr(import_module(FORMATS[form].writer), "ROWS", None)
     return found[form] if isinstance(found, dict) else found
 
 
 BLOCK = 1 << 12  # poses
-NUMBERED = 1 << 33  # above this, a number times a second is beyond what a stamp holds
+NUMBERED = 1 << 33  # above this, a number times a second exceeds a stamp
 
 
 class Written(NamedTuple):
-    """One pose as it is written.
+    """One pose as written.
 
     numbers: x, y, z, then those of the rotation
-    number: what it is counted as
-    line: where it stands; path: the way to it, in a document
-    image: the name of its picture, if it has one
-    names: of the frame it is seen from and of what it is the pose of, if each has its own
+    number: its number in the file
+    line: its line; path: its path, in a document
+    image: the name of its image, if it has one
+    names: of its reference frame and its body, if each has its own
     """
 
     numbers: tuple[float, ...]
@@ -196,11 +195,11 @@ class Written(NamedTuple):
 
 
 class PoseBlock(NamedTuple):
-    """Poses of a thing in the world, checked.
+    """Checked poses of a body in the world.
 
     poses: tx, ty, tz, x, y, z, w, arrays of n; stamps_ns: int64 of n
-    lines: where each stands; images: the names of their pictures, "" for none; numbers: what they are counted as
-    names: the two frames of each, or None where the form says which two they all have
+    lines: of each; images: the names of their images, "" for none; numbers: in the file
+    names: the two frames of each, or None if all have the same
     """
 
     poses: Components
@@ -212,7 +211,7 @@ class PoseBlock(NamedTuple):
 
 
 def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
-    """Yield the poses of a file as samples of one frame; what was taken for granted is told beside the file's name."""
+    """Yield the poses of a file as samples of one frame; assumptions are reported with the file's name."""
     parent, child = options.answers.names(*form.frames)
     for block in blocks(rows, form, file, options):
         columns = [part.tolist() for part in block.poses]
@@ -225,8 +224,8 @@ def blocks(
 ) -> Iterator[PoseBlock]:
     """Yield the poses of a file, checked, block by block.
 
-    named: the two frames are called as the form or --frames says, which is told
-    Raises or reports FormatError with the place of a rotation that is none.
+    named: the two frames have the names of the format or --frames, with a note
+    Raises or reports FormatError with the place of an invalid rotation.
     """
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
     count = 0
@@ -241,7 +240,7 @@ def blocks(
 
 
 def describe(options: Options, form: Poses, count: int, *, named: bool = True) -> None:
-    """Keep what was taken for granted of a trajectory, to be told beside the name of its file."""
+    """Record the assumptions about a trajectory, to be reported with the name of its file."""
     parent, child = options.answers.names(*form.frames)
     said = []
     if named and not options.answers.frames:
@@ -252,7 +251,7 @@ def describe(options: Options, form: Poses, count: int, *, named: bool = True) -
 
 
 def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Options) -> tuple[Any, Components]:
-    """Return which rows are poses, and the poses of the thing in the world."""
+    """Return the valid rows, and the poses of the body in the world."""
     import numpy as np
 
     from frametool.geometry import rigid
@@ -291,17 +290,17 @@ def _counted(row: Written, file: InputFile) -> int:
 
 
 def error_at(file: InputFile, row: Written, message: str) -> FormatError:
-    """Make the error for a pose of a file."""
+    """Return the error for a pose of a file."""
     if row.path:
         return format_error(file.source, row.path, message)
     return FormatError(message, source=file.name, line=row.line)
 
 
 class StampFile:
-    """Times of poses, one a line: decimal seconds, or nanoseconds with `ns`, to the nanosecond."""
+    """Timestamps of poses, one per line: decimal seconds, or nanoseconds with `ns`, to the nanosecond."""
 
     def __init__(self, path: str) -> None:
-        """Read them; raises FileProblem, FormatError."""
+        """Read the file; raises FileProblem, FormatError."""
         from frametool.documents.source import read_text
 
         self.path = path
@@ -322,7 +321,7 @@ class StampFile:
         return self.stamps[index]
 
     def finish(self, count: int, name: str) -> None:
-        """Check that there was one time for each pose."""
+        """Check that there was one time per pose."""
         if count != len(self.stamps):
             raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
 
@@ -334,12 +333,12 @@ def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
 
 
 def position_and_turn(rows: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    """Return the numbers of a pose from the rows of its matrix, as `Written` has them."""
+    """Return the numbers of a pose from the rows of its matrix, as in `Written`."""
     return (*(row[3] for row in rows[:3]), *(number for row in rows[:3] for number in row[:3]))
 
 
 def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
-    """Read a word as a whole number, which `what` names; raises FormatError."""
+    """Read a word as an integer, which errors call `what`; raises FormatError."""
     if not re.fullmatch("[0-9]{1,18}", word):
         raise FormatError(f"expected {what}, a whole number, found {shown(word)}", source=file.name, line=line)
     return int(word)
