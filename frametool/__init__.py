@@ -5,10 +5,10 @@
     map_from_camera = tree.lookup("map", "camera_optical")      # the pose of camera_optical in map
     point_in_map = map_from_camera.apply([0.0, 0.0, 1.0])
 
-`FORMATS` is the table of the forms of files, name -> row: what is read from a form and written in it, how it is
-recognised, what its numbers mean; `frametool formats` prints it.
+`FORMATS` is the table of file formats, name -> row: what is read from and written in a format, how it is
+recognised, and its conventions; `frametool formats` prints it.
 
-    [name for name, row in frametool.FORMATS.items() if "tree" in row.reads]    # what `load` takes as its format
+    [name for name, row in frametool.FORMATS.items() if "tree" in row.reads]    # formats that `load` accepts
 
 Arguments are always in the order (target, source). Metres, radians, quaternions x, y, z, w, stamps in integer
 nanoseconds. Names are loaded when first used: `import frametool` alone loads neither numpy nor yaml.
@@ -101,7 +101,7 @@ __all__ = ["__version__", *_HOMES]  # noqa: PLE0604 - its keys are strings
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name when it is first asked for."""
+    """Import a public name at its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module 'frametool' has no attribute {name!r}")
     from importlib import import_module
@@ -120,5 +120,5 @@ def html_of(value: object) -> str | None:
 
 
 def __dir__() -> list[str]:
-    """List the public names, loaded or not."""
+    """List the public names, imported or not."""
     return sorted(__all__)

@@ -1,4 +1,4 @@
-"""`python -m frametool`, where the console script is not on the path."""
+"""`python -m frametool`, if the console script is not on the path."""
 
 from frametool.cli import main
 

@@ -1,15 +1,15 @@
-"""How uncertain poses are: covariances composed, inverted and taken to points, to first order.
+"""Covariances of poses: composition, inversion and transformation of points, to first order.
 
     from frametool import Transform, covariance
     base_from_tool = Transform.from_arrays([0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0])
     turning = [[1e-4 * (i == j == 3) for j in range(6)] for i in range(6)]         # 0.01 rad about x of base
     covariance.point(base_from_tool, turning, [0.0, 1.0, 0.0])                     # 9 numbers: 1e-4 along z of base
 
-A covariance is 36 numbers, row-major, or 6 rows, over (x, y, z, turns about X, Y, Z), metres and radians, along the
-fixed axes of the parent, as ROS has it: t + d[:3], Exp(d[3:]) R.  None is exact.  All things count as independent.
-Of one transform results are lists, of 36 numbers or of the 9 of a point; of arrays of transforms or
-of covariances (n, 6, 6) results are arrays (n, 6, 6) or (n, 3, 3).  Raise ValueInvalid for what is no covariance.
-`FrameTree.covariance` follows a tree; `frametool help covariance` says how to convert other conventions.
+A covariance is 36 numbers, row-major, or 6 rows, over (x, y, z, rotation about X, Y, Z), metres and radians, along the
+fixed axes of the parent, as in ROS: t + d[:3], Exp(d[3:]) R.  None is exact.  All inputs are assumed independent.
+For one transform results are lists, of 36 numbers or of the 9 of a point; for arrays of transforms or
+of covariances (n, 6, 6) results are arrays (n, 6, 6) or (n, 3, 3).  Raises ValueInvalid for an invalid covariance.
+`FrameTree.covariance` follows a tree; `frametool help covariance` explains how to convert other conventions.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["compose", "invert", "point"]
 
 
 def compose(a: Transform, cov_a: Covariance, b: Transform, cov_b: Covariance) -> Any:
-    """Return the covariance of a @ b: what a is uncertain about its turn has the lever arm of b."""
+    """Return the covariance of a @ b; b is the lever arm of a's rotation uncertainty."""
     first, second = _placed(a, cov_a), _placed(b, cov_b)
 
     def kernel(*parts: Any) -> Components | None:
@@ -41,7 +41,7 @@ def compose(a: Transform, cov_a: Covariance, b: Transform, cov_b: Covariance) ->
 
 
 def invert(a: Transform, cov_a: Covariance) -> Any:
-    """Return the covariance of a.inverse(), along the axes of what was the child."""
+    """Return the covariance of a.inverse(), along the axes of the former child."""
 
     def kernel(*parts: Any) -> Components | None:
         return placed.covariance_of(placed.inverse(parts))
@@ -50,7 +50,7 @@ def invert(a: Transform, cov_a: Covariance) -> Any:
 
 
 def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None) -> Any:
-    """Return the 3 x 3 covariance of a.apply(p), of that of a, and of the point's own."""
+    """Return the 3 x 3 covariance of a.apply(p), from those of a and of the point."""
     pose, at, own = _placed(a, cov_a), validation.columns(p, 3, "point"), _entries(cov_p, uncertainty.POINT)
     end = len(pose)
 
@@ -63,12 +63,12 @@ def point(a: Transform, cov_a: Covariance, p: Numbers, cov_p: Covariance = None)
 
 
 def _placed(a: Transform, covariance: Covariance) -> Components:
-    """Return a transform with its covariance behind it, if it has one."""
+    """Return a transform followed by its covariance, if it has one."""
     return (*a.components, *_entries(covariance, uncertainty.POSE))
 
 
 def _found(kernel: Callable[..., Components | None], size: int, parts: Components) -> Any:
-    """Run a kernel; None of it is exact.  Warn of turns that are too wide for the first order."""
+    """Run a kernel; None if it is exact.  Warn about rotations that are too uncertain for the first order."""
     if validation.single(parts):
         entries = [entry + 0.0 for entry in kernel(*parts) or [0.0] * size]
         uncertainty.warn_if_wide([entries])
@@ -86,7 +86,7 @@ def _found(kernel: Callable[..., Components | None], size: int, parts: Component
 
 
 def _entries(given: Covariance, size: int) -> Components:
-    """Return the entries of a covariance, or columns of those of many, checked; none of None."""
+    """Return the checked entries of a covariance, or columns of those of many; None for None."""
     if given is None:
         return ()
     side = round(size**0.5)
@@ -110,7 +110,7 @@ def _entries(given: Covariance, size: int) -> Components:
 
 
 def _are_many(given: Any, side: int) -> bool:
-    """Tell an array of covariances, or a list of them, from the numbers or rows of one."""
+    """Return True for an array or list of covariances, False for the numbers or rows of one."""
     if hasattr(given, "shape"):
         return len(given.shape) > 1 and given.shape != (side, side)
     first = given[0] if isinstance(given, (list, tuple)) and given else None

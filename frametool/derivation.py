@@ -32,7 +32,7 @@ def explain(
     operation: str, *operands: Any, to: str = "quaternion", precision: int | None = DIGITS, degrees: bool = False,
     keep_sign: bool = False, **options: Any,
 ) -> Explanation:  # fmt: skip
-    """Derive what an operation does, step by step: formula, formula with these numbers, value with its unit.
+    """Derive an operation step by step: formula, formula with these numbers, value with its unit.
 
         print(frametool.explain("convert", {"rpy_deg": [10, 20, 30]}, to="matrix"))
         frametool.explain("lookup", tree, "map", "camera", at_ns=2_500_000_000).markdown()
@@ -41,8 +41,8 @@ def explain(
         lookup TREE TARGET SOURCE (at_ns, source_at_ns, fixed); apply TREE TARGET SOURCE RECORD (at_ns, kind) or apply
         POSE RECORD (kind); follow STEPS of `follow_steps`.  A POSE is a mapping, its text, a Transform or a Rotation.
     to: notations separated by commas.  precision: significant digits, None for all.  degrees: bare angles are in
-    degrees, in and out.
-    Raises ValueInvalid; what the operation raises.
+        degrees, in and out.
+    Raises ValueInvalid; also the errors of the operation.
     """
     if operation not in OPERATIONS:
         raise ValueInvalid(f"no operation {shown(operation)}{alternatives(operation, OPERATIONS, 'operations')}")
@@ -60,7 +60,7 @@ def explain(
 
 
 def _pose(value: Any, *, degrees: bool) -> WrittenPose:
-    """Take one pose: a mapping, its text, a Transform or a Rotation.
+    """Read one pose: a mapping, its text, a Transform or a Rotation.
 
     Raises ValueInvalid, FormatError.
     """

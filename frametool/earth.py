@@ -1,14 +1,14 @@
-"""Places on the Earth (WGS84): latitude and longitude to and from ECEF and UTM, and the axes at a place.
+"""Positions on the Earth (WGS84): latitude and longitude to and from ECEF and UTM, and local axes.
 
     import frametool
-    ecef_from_map = frametool.earth_pose(48.1, 11.5, 520.0)            # axes east, north, up at this place
+    ecef_from_map = frametool.earth_pose(48.1, 11.5, 520.0)            # axes east, north, up at this position
     xyz = frametool.ecef_from_lla(48.1, 11.5, 521.0)
     ecef_from_map.inverse().apply(xyz)                                  # 1 m up
 
-lat and lon are degrees, lat in [-90, 90], lon read in [-180, 360] and given in (-180, 180]; alt is metres above the
-ellipsoid, as in NavSatFix, not above the sea.  ECEF is the Earth's frame: x to lat 0 lon 0, z to the north pole.
-One place is plain floats, without numpy; arrays broadcast, and results are arrays of their shape.  Raise ValueInvalid
-for what is no place.  The rooms below use the kernels, `geometry.earth` and `geometry.transverse_mercator`.
+lat and lon are degrees, lat in [-90, 90], lon in [-180, 360] as input and (-180, 180] as output; alt is metres above
+the ellipsoid, as in NavSatFix, not above sea level.  ECEF is the Earth's frame: x to lat 0 lon 0, z to the north pole.
+A single position is plain floats, without numpy; arrays broadcast, and results are arrays of their shape.  Raises
+ValueInvalid for an invalid position.  The kernels are in `geometry.earth` and `geometry.transverse_mercator`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["earth_pose", "ecef_from_lla", "lla_from_ecef", "lla_from_utm", "utm_
 
 
 def ecef_from_lla(lat: Numbers, lon: Numbers, alt: Numbers = 0.0) -> Any:
-    """Return x, y, z in metres: three floats of one place, an array (..., 3) of many."""
+    """Return x, y, z in metres: three floats for one position, an array (..., 3) for many."""
     given = _columns(lat=lat, lon=lon, alt=alt)
     if validation.single(given):
         return validation.checked(earth.ecef, 3, given, "place", earth.check_lla)
@@ -37,17 +37,17 @@ def ecef_from_lla(lat: Numbers, lon: Numbers, alt: Numbers = 0.0) -> Any:
 
 
 def lla_from_ecef(xyz: Numbers) -> Any:
-    """Return lat, lon, alt of x, y, z in metres, shape (..., 3), 100 km or more from the centre; lon of a pole is 0."""
+    """Return lat, lon, alt from x, y, z in metres, shape (..., 3), 100 km or more from the centre; lon 0 at a pole."""
     return validation.checked(earth.lla, 3, validation.columns(xyz, 3, "xyz"), "xyz", earth.check_ecef)
 
 
 def earth_pose(
     lat: Numbers, lon: Numbers, alt: Numbers = 0.0, axes: str = "enu", *, zone: Numbers | str | None = None
 ) -> Transform:
-    """Return ecef_from_axes: the pose in ECEF of axes at a place; at a pole lon tells them.
+    """Return ecef_from_axes: the pose in ECEF of axes at a position; at a pole lon defines them.
 
     axes: `enu` (x east, y north, z up), `ned` (north, east, down), `grid` (along the grid of UTM, z up) or `ecef`
-    zone: that of the grid, as `32N`; by the rule if there is none
+    zone: that of the grid, such as `32N`; by default the standard zone
     """
     given = _columns(lat=lat, lon=lon, alt=alt)
     if axes not in earth.AXES:
@@ -67,8 +67,9 @@ def earth_pose(
 def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) -> Any:
     """Return zone, easting, northing, convergence in degrees and grid scale.
 
-    zone: held where it is given, as `32N`, up to 30 degrees of its meridian; else by the rule, Norway and Svalbard
-    included.  Convergence is how far grid north lies clockwise of true north: yaw in grid = yaw in enu + convergence.
+    zone: fixed, such as `32N`, up to 30 degrees from its meridian; by default the standard zone, including the
+    exceptions of Norway and Svalbard.  Convergence is the angle of grid north clockwise of true north: yaw in grid =
+    yaw in enu + convergence.
     """
     given = _columns(lat=lat, lon=lon)
     zoned = _zone(zone, *given), *given
@@ -82,18 +83,18 @@ def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) 
 
 
 def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
-    """Return lat, lon of positions in a zone, as `32N` (`32S` south of the equator), or in a zone each."""
+    """Return lat, lon of positions in a zone, such as `32N` (`32S` south of the equator), or with a zone each."""
     given = _zone(zone), *_columns(easting=easting, northing=northing)
     return validation.checked(mercator.lat_lon, 2, given, "utm", mercator.check_grid)
 
 
 def _columns(**values: Numbers) -> Components:
-    """Return numbers of one place as floats, of many as arrays that broadcast; checked to be finite."""
+    """Return numbers of one position as floats, of many as arrays that broadcast; checked to be finite."""
     return tuple(validation.scalars(value, name) for name, value in values.items())
 
 
 def _zone(given: Any, *place: Any) -> Any:
-    """Return the number of a zone, or those of many; where none is given that of the place, if it is known."""
+    """Return the number of a zone, or of many; by default that of the position, if it is known."""
     if given is None and place:
         return validation.number(mercator.standard_zone, place)
     if not isinstance(given, (list, tuple)) and not getattr(given, "shape", ()):

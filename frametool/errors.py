@@ -1,19 +1,19 @@
-"""The errors frametool raises, with their exit codes, and the one way it warns.
+"""The errors raised by frametool, with their exit codes, and the function for warnings.
 
     FrametoolError                                                   exit
-      ValueInvalid     a number or name that cannot be               1
-      FormatError      text that is not what it should be, with      1
-                       its source, line and column
-      Unanswered       a form that leaves open what an option says   2
-      BadAnswer        an option that does not fit the file          2
-      Misused          arguments or columns that do not fit          2
-      BadTopology      cycle, two parents, a frame in itself         1
-      LookupFailed                                                   4
+      ValueInvalid     an invalid number or name                      1
+      FormatError      text that cannot be read, with its source,     1
+                       line and column
+        Unanswered     a file that needs an option                    2
+        BadAnswer      an option that does not fit the file           2
+      Misused          arguments or columns that do not fit           2
+      BadTopology      cycle, two parents, a frame in itself          1
+      LookupFailed                                                    4
         UnknownFrame   NotConnected
         NoDataAt       TooEarly  TooLate
-      FileProblem      missing, unreadable, exists, full             5
+      FileProblem      missing, unreadable, exists, full              5
 
-The library raises; only the edge of the command line turns an error into a line on stderr.
+The library raises; only the command line turns an error into a line on stderr.
 """
 
 from __future__ import annotations
@@ -29,40 +29,41 @@ if TYPE_CHECKING:
     Result = TypeVar("Result")
     Listener = Callable[[str, str], None]
 
-SHOWN = 60  # characters of the input that a message quotes at most
-LONGEST_NAME = 200  # characters of a name that is compared with others
+SHOWN = 60  # maximum length of quoted input in a message
+LONGEST_NAME = 200  # names up to this length are compared with others
 MOST_COMPARED = 500  # names
-NEAREST = 5  # names that come first in a list that is cut
+NEAREST = 5  # names listed first in a shortened list
 USUAL_NAME = 20  # characters
 
 
 class FrametoolError(Exception):
-    """Any failure frametool reports.
+    """Base class of all errors.
 
-    exit_code: the status its commands end with
-    rule: the rule of `check` that is broken, if any
+    exit_code: of commands that end with it
+    rule: the rule of `check` that is violated, if any
+
     """
 
     exit_code = 1
     rule = ""
 
     def __init__(self, *message: object, **fields: object) -> None:
-        """Keep what the message says as fields too, for those who do not read sentences."""
+        """Store the facts of the message as fields too, for programs."""
         super().__init__(*message)
         self.fields = fields
 
     @property
     def kind(self) -> str:
-        """Return the name of the failure in machine output: `unknown_frame`."""
+        """Return the name of the error in machine output: `unknown_frame`."""
         name = next(each.__name__ for each in type(self).__mro__ if each.__name__[0] != "_")
         return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name)[1:]
 
     def details(self) -> dict[str, object]:
-        """Return all there is to say beside the kind and the message."""
+        """Return the facts in addition to the kind and the message."""
         return self.fields
 
     def __reduce__(self) -> tuple[Callable[..., FrametoolError], tuple[object, ...]]:
-        """Let an error pass from one process to another, whatever arguments it was made of."""
+        """Allow pickling an error, whatever its arguments."""
         return _rebuilt, (type(self), self.args, self.__dict__)
 
 
@@ -74,10 +75,10 @@ def _rebuilt(kind: type[FrametoolError], message: tuple[object, ...], state: dic
 
 
 class ValueInvalid(FrametoolError, ValueError):
-    """Report a number, rotation or name that cannot be used."""
+    """A number, rotation or name that cannot be used."""
 
     def __init__(self, message: str, *, rule: str = "") -> None:
-        """Keep the rule beside the message."""
+        """Store the rule with the message."""
         super().__init__(message)
         self.rule = rule or self.rule
 
@@ -86,23 +87,23 @@ _FINDING = namedtuple("_FINDING", "rule message source line column path", defaul
 
 
 class Finding(_FINDING):
-    """A sentence with a place: what is wrong or odd, and the rule of `check` that says so.
+    """A message with a place: what is wrong or suspicious, and the rule of `check`.
 
     rule, message, source: texts
-    line, column: from 1, 0 where they say nothing
-    path: in a document, the way to it
+    line, column: from 1, 0 if unknown
+    path: in a document, the keys that lead to it
     """
 
     __slots__ = ()
 
 
 class FormatError(FrametoolError, ValueError):
-    """Report text that cannot be read; say where: `source:line:column`, both counted from 1."""
+    """Text that cannot be read; its place is `source:line:column`, both counted from 1."""
 
     def __init__(
         self, message: str, *, source: str = "", line: int = 0, column: int = 0, snippet: str = "", rule: str = "",
     ) -> None:  # fmt: skip
-        """Keep the place beside the message; `snippet` is the source line with a caret below it."""
+        """Store the place with the message; `snippet` is the source line with a caret below it."""
         super().__init__(message)
         self.rule = rule or self.rule
         self.message = message
@@ -112,56 +113,56 @@ class FormatError(FrametoolError, ValueError):
         self.snippet = snippet
 
     def __str__(self) -> str:
-        """Return `source:line:column: message`, leaving out what is not known."""
+        """Return `source:line:column: message`, without unknown parts."""
         place = ":".join(str(part) for part in self.details().values())
         return f"{place}: {self.message}" if place else self.message
 
     @property
     def finding(self) -> Finding:
-        """Return it as `check` lists it."""
+        """Return the error as a finding of `check`."""
         return Finding(self.rule or "syntax", self.message, self.source, self.line, self.column)
 
     def details(self) -> dict[str, object]:
-        """Return the place as far as it is known."""
+        """Return the known parts of the place."""
         return {key: value for key in ("source", "line", "column") if (value := getattr(self, key))}
 
 
 class Unanswered(FormatError):
-    """Report a file whose form leaves something open, with the options that say it."""
+    """A file that does not specify something, with the options that set it."""
 
     exit_code = 2
 
 
 class BadAnswer(FormatError):
-    """Report an option about a file that does not fit it, as a joint that the robot does not have."""
+    """An option about a file that does not fit it, such as a joint that the robot does not have."""
 
     exit_code = 2
 
 
 class Misused(FormatError):
-    """Report arguments or options that do not fit each other or the columns of a table."""
+    """Arguments or options that do not fit each other or the columns of a table."""
 
     exit_code = 2
 
 
 class BadTopology(FormatError):
-    """Report frames that form no tree: a cycle, two parents, a frame in itself."""
+    """Frames that are not a tree: a cycle, two parents, a frame in itself."""
 
 
 class LookupFailed(FrametoolError, LookupError):
-    """Report a lookup that has no answer."""
+    """A lookup without a result."""
 
     exit_code = 4
 
 
 class UnknownFrame(LookupFailed):
-    """Report a frame that is not in the tree, with the nearest names and those there are.
+    """A frame that is not in the tree, with the nearest names and the number of frames.
 
     short: the message without the list of frames
     """
 
     def __init__(self, name: str, *, known: Iterable[str], where: str = "") -> None:
-        """Compose the message from the name, the frames there are and the tree's name."""
+        """Compose the message from the name, the known frames and the tree's name."""
         from heapq import nsmallest
 
         self.name = name
@@ -174,36 +175,36 @@ class UnknownFrame(LookupFailed):
 
 
 class NotConnected(LookupFailed):
-    """Report two frames that hang in different trees."""
+    """Two frames in different trees."""
 
 
 class NoDataAt(LookupFailed):
-    """Report an edge without data at the requested time."""
+    """An edge without data at the requested time."""
 
 
 class TooEarly(NoDataAt):
-    """Report a request before an edge's first sample."""
+    """A request before an edge's first sample."""
 
 
 class TooLate(NoDataAt):
-    """Report a request after an edge's last sample."""
+    """A request after an edge's last sample."""
 
 
 class FileProblem(FrametoolError, OSError):
-    """Report a file that is missing, unreadable, in the way or on a full disk."""
+    """A file that is missing, unreadable, already there or on a full disk."""
 
     exit_code = 5
 
 
 class FrametoolWarning(UserWarning):
-    """Mark what was read, used and is nevertheless worth a look."""
+    """A warning about data that were used but look suspicious."""
 
 
 _listeners: list[Listener] = []
 
 
 def warn(message: str, *, rule: str = "") -> None:
-    """Report something odd that does not stop the work: to whoever listens, else as a Python warning.
+    """Emit a warning: to the current listener, else as a Python warning.
 
     rule: the rule of `check` that finds it, if any
     """
@@ -217,7 +218,7 @@ def warn(message: str, *, rule: str = "") -> None:
 
 @contextmanager
 def heard_by(listener: Listener) -> Iterator[None]:
-    """Pass the warnings of a block to a listener; an outer one does not hear them."""
+    """Pass the warnings of a block to a listener; outer listeners do not receive them."""
     _listeners.append(listener)
     try:
         yield
@@ -228,10 +229,10 @@ def heard_by(listener: Listener) -> Iterator[None]:
 def overheard(
     call: Callable[..., Result], *arguments: object, **options: object
 ) -> tuple[Result, list[tuple[str, str]]]:
-    """Return what a function returns, and its warnings as (rule, message), for a reader to add the place."""
+    """Return the result of a function, and its warnings as (rule, message), to which a reader adds the place."""
     warned: list[tuple[str, str]] = []
     _listeners.append(lambda message, rule: warned.append((rule, message)))
-    try:  # as `heard_by`, which would cost half a microsecond for each of a million rotations
+    try:  # like `heard_by`, which would cost half a microsecond for each of a million rotations
         return call(*arguments, **options), warned
     finally:
         _listeners.pop()
@@ -244,14 +245,14 @@ def did_you_mean(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
 
 
 def _closest(name: str, known: list[str], count: int, cutoff: float) -> list[str]:
-    """Return the names most like one, the best first."""
+    """Return the most similar names, the best first."""
     from difflib import get_close_matches
 
     return get_close_matches(name[:LONGEST_NAME], _likely(name[:LONGEST_NAME], known), n=count, cutoff=cutoff)
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Return the nearest known names: the best, and those that are nearly as near; empty where none is."""
+    """Return the nearest known names: the best, and those nearly as near; empty if there is none."""
     from difflib import SequenceMatcher
 
     ratios = {each: SequenceMatcher(None, each, name[:LONGEST_NAME]).ratio() for each in known}
@@ -261,15 +262,15 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 def any_near(name: str, known: Iterable[str], otherwise: str) -> str:
-    """Return `; did you mean 'x' or 'y'?` for all names that are near, or else a hint."""
+    """Return `; did you mean 'x' or 'y'?` for all near names, or else a hint."""
     near = nearest(name, known)
     return f"; did you mean {' or '.join(map(shown, near))}?" if near else f"; {otherwise}"
 
 
 def _likely(name: str, known: list[str]) -> list[str]:
-    """Return the names worth comparing: of many those with the same first or second half that share the most beyond it.
+    """Return the names to compare: of many those with the same first or second half and the most in common.
 
-    A typing error leaves one half of a name as it was.  The longer the name, the dearer a comparison, the fewer.
+    A typing error leaves one half of a name unchanged.  Longer names cost more, so fewer are compared.
     """
     if len(known) <= MOST_COMPARED:
         return known
@@ -281,7 +282,7 @@ def _likely(name: str, known: list[str]) -> list[str]:
 
 
 def _sharing(names: list[str], name: str, count: int, *, ends: bool) -> list[str]:
-    """Return the names that begin with the first characters of one, or end with its last."""
+    """Return the names that begin with the first characters of a name, or end with its last."""
     if ends:
         end = name[len(name) - count :]
         return [each for each in names if each.endswith(end)]
@@ -290,7 +291,7 @@ def _sharing(names: list[str], name: str, count: int, *, ends: bool) -> list[str
 
 
 def _sharing_most(names: list[str], name: str, least: int, *, ends: bool) -> list[str]:
-    """Return the names that share as many characters with one as any of them does; all share the `least`."""
+    """Return the names with the most characters in common with a name; all have the `least` in common."""
     most = len(name)
     while least < most:
         middle = (least + most + 1) // 2
@@ -302,13 +303,13 @@ def _sharing_most(names: list[str], name: str, least: int, *, ends: bool) -> lis
 
 
 def alternatives(name: str, known: Iterable[str], label: str) -> str:
-    """Return `; did you mean 'x'? frames: a, b`, or only what there is."""
+    """Return `; did you mean 'x'? frames: a, b`, or only the list."""
     names = list(known)
     return f"{did_you_mean(name, names) or ';'} {label}: {listing(names, near=name)}"
 
 
 def listing(names: Iterable[str], most: int = 20, *, near: str = "") -> str:
-    """Return the names sorted and joined by commas, cut after `most`; then those nearest to a name come first."""
+    """Return the names sorted and joined by commas, shortened after `most`; then those nearest to a name come first."""
     from heapq import nsmallest
 
     everything = list(names)
@@ -320,10 +321,10 @@ def listing(names: Iterable[str], most: int = 20, *, near: str = "") -> str:
 def first_of(
     names: Sequence[str], most: int, *, quote: Callable[[str], str] = str, gap: str = ", ", count: int | None = None
 ) -> str:
-    """Return the first names and how many more there are: the one way in which a list is cut.
+    """Return the first names and how many more there are; all lists are shortened by it.
 
-    A last one is named: it takes no more room than a word on it.
-    count: how many names there are, where these are not all
+    A single last one is named: it needs no more space than a word about it.
+    count: the total number of names, if these are not all
     """
     count = len(names) if count is None else count
     most += count == most + 1
@@ -331,20 +332,20 @@ def first_of(
 
 
 def bare(name: str) -> str:
-    """Return a name for a list in a message: as `shown`, without quotes."""
+    """Return a name for a list in a message: like `shown`, without quotes."""
     kept = _cut(name, printable)
     return printable(name) if kept == name else f"{printable(kept)}..."
 
 
 def printable(name: str) -> str:
-    """Return text on one line as a terminal may show it: control characters as escapes, so that none can steer it."""
+    """Return text on one line for a terminal: control characters are escaped, so that they have no effect."""
     if name.isprintable():
         return name
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in name)
 
 
 def cells(text: str) -> int:
-    """Count the cells a text takes on a terminal: wide characters take two."""
+    """Return the width of a text on a terminal: wide characters count twice."""
     if text.isascii():
         return len(text)
     from unicodedata import combining, east_asian_width
@@ -353,7 +354,7 @@ def cells(text: str) -> int:
 
 
 def shown(value: object) -> str:
-    """Return a value from the input for a message: on one line, within 60 characters, escapes and quotes included."""
+    """Return a value from the input for a message: on one line, within 60 characters, including escapes and quotes."""
     is_text = isinstance(value, str)
     text = str(value) if is_text else repr(value)
     quote = repr if is_text else str
@@ -362,7 +363,7 @@ def shown(value: object) -> str:
 
 
 def _cut(text: str, quote: Callable[[str], str]) -> str:
-    """Return as much of a text as is 60 characters long once it is quoted."""
+    """Return the beginning of a text that has 60 characters when quoted."""
     kept = text[:SHOWN]
     while len(quote(kept)) > SHOWN:
         kept = kept[:-1]

@@ -1,1 +1,1 @@
-"""Text to plain values and back, and from a path to its place: YAML and JSON."""
+"""YAML, JSON and XML: text to plain values and back, and the place of each value in the text."""

@@ -1,4 +1,4 @@
-"""Bytes to pieces of text that end where a document or a line ends: recordings of any size in bounded memory."""
+"""Split bytes into pieces of text that end at a document or a line: recordings of any size in bounded memory."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ if TYPE_CHECKING:
 
 
 class Piece(NamedTuple):
-    """Whole documents or lines of a text, and the number of their first line, from 1."""
+    """Complete documents or lines of a text, and the number of their first line, from 1."""
 
     text: str
     line: int
 
 
 def documents(stream: BinaryIO, name: str) -> Iterator[Piece]:
-    """Cut a stream behind lines that end in `---`; a piece holds as many documents as came in one block.
+    """Split a stream after lines that end in `---`; a piece has as many documents as arrived in one block.
 
-    Raises FormatError for what is no UTF-8, and for a document that is too long.
+    Raises FormatError if it is not UTF-8, and for a document that is too long.
     """
     return _pieces(stream, name, _end_of_documents)
 
 
 def lines(stream: BinaryIO, name: str) -> Iterator[Piece]:
-    """Cut a stream behind line ends; a piece holds as many lines as came in one block."""
+    """Split a stream after line ends; a piece has as many lines as arrived in one block."""
     return _pieces(stream, name, lambda data, start: data.rfind(b"\n", start) + 1)
 
 
 def _end_of_documents(data: bytearray, start: int) -> int:
-    """Return the offset behind the last line that ends in `---`, or 0.
+    """Return the offset after the last line that ends in `---`, or 0.
 
-    `ros2 topic echo` puts the three dashes behind the last word of its note about a lost message.
+    `ros2 topic echo` appends the three dashes to its note about a lost message.
     """
     ends = (data.rfind(end, start) + len(end) for end in (b"---\n", b"---\r\n") if data.rfind(end, start) >= 0)
     return max(ends, default=0)
 
 
 def _pieces(stream: BinaryIO, name: str, end_of: Callable[[bytearray, int], int]) -> Iterator[Piece]:
-    """Read blocks and pass on what is whole; the rest waits for the next block."""
+    """Read blocks and yield complete pieces; the rest is joined to the next block."""
     line = 1
     waiting, size = bytearray(), sizes.PIECE
     while block := stream.read1(size):  # type: ignore[attr-defined]
@@ -65,7 +65,7 @@ def _pieces(stream: BinaryIO, name: str, end_of: Callable[[bytearray, int], int]
 
 
 def _piece(data: bytes, name: str, line: int) -> Piece:
-    """Decode a piece; line ends become those of Unix, which changes no line's number."""
+    """Decode a piece; line ends become those of Unix, which does not change line numbers."""
     with counted_from(line):
         text = decode(data, name)
     return Piece(text.replace("\r\n", "\n") if "\r" in text else text, line)
@@ -73,7 +73,7 @@ def _piece(data: bytes, name: str, line: int) -> Piece:
 
 @contextmanager
 def counted_from(line: int) -> Iterator[None]:
-    """Let errors of a piece name the line in the whole file; `line` is the number of the piece's first."""
+    """Make errors of a piece name the line in the whole file; `line` is the number of the piece's first line."""
     try:
         yield
     except FormatError as error:

@@ -1,8 +1,8 @@
-"""YAML and JSON text to plain values, strictly, and from a path back to its place in the text.
+"""Strict parsing of YAML and JSON text into plain values, and the place of a path in the text.
 
-A document is dicts, lists, text and None: every scalar stays text as written, so that names stay names (`on`, `007`,
-`12:30`) and numbers are read by the one rule of `frametool.text.numbers`.  Places are not kept while reading; they
-are found again when a message needs them.  Who rewrites parts of a text asks for the tree of its nodes, with the place
+A document consists of dicts, lists, text and None: every scalar remains text as written, so that names are preserved
+(`on`, `007`, `12:30`) and numbers are parsed only by `frametool.text.numbers`.  Places are not stored while reading;
+they are searched when a message needs them.  To rewrite parts of a text there is a tree of its nodes, with the place
 of each.  Knows syntax only.
 """
 
@@ -27,21 +27,21 @@ _EQUALS = r"([\w./-]+) ?="
 
 
 class Document:
-    """One document of a text: its value, its number in the text (empty ones count), and the text."""
+    """One document of a text: its value, its index in the text (empty ones count), and the text."""
 
     __slots__ = ("index", "source", "value")
 
     def __init__(self, value: Any, index: int, source: Source) -> None:
-        """Keep the three together."""
+        """Store the three."""
         self.value = value
         self.index = index
         self.source = source
 
 
 def parse_documents(text: str, name: str, tags: Collection[str] = ()) -> list[Document]:
-    """Read every document of a YAML or JSON text; empty ones are left out.
+    """Read every document of a YAML or JSON text; empty ones are omitted.
 
-    name: what messages call the text.  tags: of YAML's mappings that are read, as `parse_yaml` has them.
+    name: of the text, for messages.  tags: YAML tags of mappings that are read, as in `parse_yaml`.
     Values are dict, list, str or None (an empty value, `~`, `null`); keys are text, each once.
     Raises FormatError with line and column.
     """
@@ -65,15 +65,15 @@ def events_of(text: str) -> Iterator[Event]:
 
 
 def locate(text: str, path: Path, *, key: bool = False) -> tuple[int, int]:
-    """Find line and column, from 1, of the value at a path, or of its key.
+    """Return line and column, from 1, of the value at a path, or of its key.
 
-    path: (document index, key or index, ...).  What is missing is placed at the nearest thing around it.
+    path: (document index, key or index, ...).  A missing value gets the place of the nearest enclosing one.
     """
     return locate_many(text, [path], key=key)[0]
 
 
 def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[tuple[int, int]]:
-    """Find the places of several paths in one pass over a text that parse_documents has read."""
+    """Return the places of several paths in one pass over a text that parse_documents has read."""
     text = text.removeprefix(_BYTE_ORDER_MARK)
     return places_of(text, _offsets(text, paths, key=key))
 
@@ -86,14 +86,14 @@ def _offsets(text: str, paths: Sequence[Path], *, key: bool) -> list[int]:
 def format_error(
     source: Source, path: Path, message: str, *, key: bool = False, error: type[FormatError] = FormatError
 ) -> FormatError:
-    """Make the error for a value, or its key, at a path: placed, with the source line and a caret."""
+    """Return the error for a value, or its key, at a path: with the place, the source line and a caret."""
     bare = source._replace(text=source.text.removeprefix(_BYTE_ORDER_MARK))
     (offset,) = _offsets(bare.text, [path], key=key)
     return error_at(bare, offset, message, error)
 
 
 def explain_scalar(text: str) -> str:
-    """Say why a text stands where a mapping was meant: no blank after a colon, an invisible character; or ""."""
+    """Return why a text is found instead of a mapping: no blank after a colon, an invisible character; or ""."""
     if match := re.match(_TIGHT_COLON, text):
         return f"write a blank after '{match[1]}:'"
     if ":" in text and (odd := odd_characters(text)):
@@ -104,10 +104,10 @@ def explain_scalar(text: str) -> str:
 
 
 class Node(NamedTuple):
-    """A value and where it stands, from its first character up to behind its last.
+    """A value and its range in the text, from its first character to after its last.
 
     value: text of a scalar, a dict of (key node, value node) by key, or a list of nodes
-    flow: a map or list in brackets; quote: the character around a scalar, * for an alias; column of its first character
+    flow: a map or list in brackets; quote: the quotes of a scalar, * for an alias; column of its first character
     """
 
     start: int
@@ -118,7 +118,7 @@ class Node(NamedTuple):
     column: int = 0
 
     def at(self, path: tuple[str | int, ...]) -> Node:
-        """Return the node further down; raises FormatError below an alias."""
+        """Return the node at a path; raises FormatError below an alias."""
         node: Node = self
         for step in path:
             refuse_alias(node)
@@ -141,10 +141,10 @@ class Node(NamedTuple):
 
 
 class Aliased(FormatError):
-    """Report an alias of YAML: what it stands for is written elsewhere, and perhaps for others too."""
+    """A YAML alias: its value is defined elsewhere, and may be shared."""
 
     def in_text(self, text: str) -> Aliased:
-        """Take the place of the first alias in a text."""
+        """Return the error for the first alias in a text."""
         aliases = (leaf.start for root in parse_nodes(text) for leaf in root.leaves() if leaf.quote == "*")
         ((self.line, self.column),) = places_of(text, [next(aliases, 0)])
         return self
@@ -160,7 +160,7 @@ NOTHING = Node(0, 0, {})  # a mapping without keys
 
 
 class _Opened:
-    """A list or map whose end has not come yet."""
+    """A list or map that is not complete yet."""
 
     __slots__ = ("column", "end", "flow", "key", "start", "value")
 
@@ -184,12 +184,12 @@ class _Opened:
             self.key = None
 
     def node(self, end: int) -> Node:
-        """Return the node that ends here; what has no brackets ends with its last value."""
+        """Return the complete node; without brackets it ends with its last value."""
         return Node(self.start, end if self.flow else self.end, self.value, self.flow, column=self.column)
 
 
 def parse_nodes(text: str) -> list[Node]:
-    """Return the trees of all documents of a text that `parse_documents` reads: nothing is checked again here."""
+    """Return the trees of all documents of a text that `parse_documents` has read, without checks."""
     roots: list[Node] = []
     opened: list[_Opened] = []
     for kind, word, start, end, style, column in events_of(text):

@@ -1,7 +1,7 @@
 """JSON text to plain values and to places, and plain values to JSON on one line: knows JSON, no meaning.
 
-The json module is ten times faster than any YAML parser and starts sooner; it keeps no places, so they are found by
-a scan of their own when an error needs them.  How floats are written is the caller's.
+The json module is ten times faster than any YAML parser and starts faster; it stores no places, so an error searches
+them with a scan of its own.  The caller formats floats.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ if TYPE_CHECKING:
 JSON_NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?+(?:[eE][-+]?[0-9]++)?+"
 _BLANKS = re.compile(r"[ \t\n\r]*")
 _WORD = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"|[{}\[\]]|[^\s{}\[\],:"]+'
-# up to \ud83d and the like without the other half of the pair
+# escapes such as \ud83d without the other half of the surrogate pair
 _WHOLE = r"(?s)(?:[^\\]++|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(?!\\u[dD][89a-fA-F])\\.)*+"
 _BRACKETS = {"{": MAP, "[": LIST, "]": END, "}": END}
 
 
 class _RepeatedKey(Exception):
-    """Report that a key appears twice in one object, or is empty."""
+    """A key that appears twice in one object, or is empty."""
 
 
 class _NoJson(FormatError):
-    """Report a text that is no JSON at all."""
+    """A text that is not JSON at all."""
 
 
 def looks_like_json(text: str) -> bool:
-    """Say whether the first character that is not blank opens an array, or an object with a quoted key or none."""
+    """Return True if the first non-blank character opens an array, or an object with a quoted key or no key."""
     first = _BLANKS.match(text).end()  # type: ignore[union-attr]
     if not text.startswith("{", first):
         return text.startswith("[", first)
@@ -58,10 +58,10 @@ def looks_like_json(text: str) -> bool:
 
 
 def parse_json(source: Source) -> list[Any] | None:
-    """Return the values of a text of one or several JSON objects or arrays; None if it is no JSON.
+    """Return the values of a text of one or several JSON objects or arrays; None if it is not JSON.
 
-    Numbers and truth values stay text, null is None.  Raises FormatError for what is JSON but must not be:
-    a key twice, half a character, too deep, too much.
+    Numbers and booleans remain text, null is None.  Raises FormatError for JSON that is not accepted: a duplicate key,
+    half a surrogate pair, too deep, too much.
     """
     try:
         return strict_json(source)
@@ -70,7 +70,7 @@ def parse_json(source: Source) -> list[Any] | None:
 
 
 def strict_json(source: Source) -> list[Any]:
-    """Return the values of a text that must be JSON; raises FormatError with the place where it is none."""
+    """Return the values of a text that must be JSON; otherwise raises FormatError with the place."""
     if source.text.count("[") + source.text.count("{") > MOST_CONTAINERS:
         raise error_at(source, 0, too_much(0))
     try:
@@ -92,7 +92,7 @@ def strict_json(source: Source) -> list[Any]:
 
 
 def _deeply_decoded(source: Source) -> list[Any]:
-    """Decode a text; one that is as deep as allowed gets the stack that json needs for it."""
+    """Decode a text; deep nesting within the limit gets the stack that json needs."""
     try:
         return _decoded(source.text)
     except RecursionError:
@@ -107,7 +107,7 @@ def _deeply_decoded(source: Source) -> list[Any]:
 
 
 def _decoded(text: str) -> list[Any]:
-    """Decode one value after the other, up to the end."""
+    """Decode one value after another, up to the end."""
     from json import JSONDecoder
 
     decode = JSONDecoder(object_pairs_hook=_distinct, parse_int=str, parse_float=str, parse_constant=str).raw_decode
@@ -121,13 +121,13 @@ def _decoded(text: str) -> list[Any]:
 
 
 def _end_of_blanks(text: str, begin: int) -> int:
-    """Return the offset of the next character that is not blank."""
+    """Return the offset of the next non-blank character."""
     match = _BLANKS.match(text, begin)
     return match.end() if match else begin
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Make a dict of pairs whose keys all differ and are not empty."""
+    """Return a dict of pairs whose keys all differ and are not empty."""
     made = dict(pairs)
     if len(made) != len(pairs) or "" in made:
         raise _RepeatedKey
@@ -135,7 +135,7 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _settle(values: list[Any], text: str) -> bool:
-    """Turn truth values into text, level by level; say whether there are at most DEEPEST levels."""
+    """Convert booleans to text, level by level; return True if there are at most DEEPEST levels."""
     has_words = "true" in text or "false" in text
     level: list[Any] = [values]
     for _ in range(DEEPEST + 1):
@@ -180,15 +180,15 @@ def _depths(text: str) -> Iterator[tuple[int, int]]:
 
 
 def _too_deep(source: Source) -> FormatError:
-    """Find the bracket that is one too many."""
+    """Return the error for the bracket that exceeds the depth."""
     at = next((start for depth, start in _depths(source.text) if depth > DEEPEST), 0)
     return error_at(source, at, too_much(DEEPEST))
 
 
 def dump(value: Any, number: Callable[[float], str] = repr) -> str:
-    """Write plain values as JSON on one line; `number` writes the floats.
+    """Write plain values as JSON on one line; `number` formats the floats.
 
-    Not json.dumps, because that has no say in how floats are written.
+    json.dumps does not allow that.
     """
     if isinstance(value, (float, Verbatim)):
         return number(value) if isinstance(value, float) else str(value)
@@ -201,4 +201,4 @@ def dump(value: Any, number: Callable[[float], str] = repr) -> str:
     import json
 
     is_plain = not isinstance(value, str) or value.isprintable()
-    return json.dumps(value, ensure_ascii=not is_plain)  # control characters and lone surrogates reach no terminal raw
+    return json.dumps(value, ensure_ascii=not is_plain)  # escapes control characters and lone surrogates

@@ -1,10 +1,9 @@
-"""Where text comes from and how to point into it: files, bytes to text, limits, places of keys and values, snippets.
+"""Sources of text and places in it: files, decoding, limits, places of keys and values, snippets.
 
-Knows no syntax.  Lines and columns are counted from 1; a line ends where YAML says it does, so that the places are
-the parser's own.
+Knows no syntax.  Lines and columns are counted from 1; lines end as in YAML, so that places agree with the parser.
 
-A document may hold a million frames, but no short text may ask for gigabytes: held back are depth, which takes stack,
-lists and maps, which take thirty times the room that they are written in, and what aliases repeat.
+A document may have a million frames, but no short text may allocate gigabytes.  Limited are: depth, which needs stack;
+lists and maps, which need thirty times the memory of their text; and the expansion of aliases.
 """
 
 from __future__ import annotations
@@ -32,19 +31,19 @@ if TYPE_CHECKING:
     # kind, text of a scalar, start, end, quote of a scalar or bracket of a container ("" for a block), column
     Event: TypeAlias = tuple[int, str, int, int, str, int]
 
-DEEPEST = 990  # levels of lists and maps; a tree of 60 frames in a row has 120, and libyaml reads no more than 1000
-# of one file of documents, also in bytes; a million frames take 100 to 600 million
+DEEPEST = 990  # levels of lists and maps; a chain of 60 frames has 120, and libyaml reads at most 1000
+# characters or bytes of one file of documents; a million frames have 100 to 600 million
 MOST_CHARACTERS = 1 << 30
-# lists and maps in one text: each takes 64 bytes or more, and 3 characters to write; a million messages: 6e6
+# lists and maps in one text: each needs 64 bytes or more, and 3 characters; a million messages have 6e6
 MOST_CONTAINERS = 10_000_000
-# commas and line ends in one text: the value between two takes 60 bytes; a million messages in lines have 4e7
+# commas and line ends in one text: each value needs 60 bytes; a million messages on lines have 4e7
 MOST_VALUES = 50_000_000
 MOST_KEPT, MOST_KEPT_BYTES = 32, 1 << 28  # values, and bytes of the files and texts they were read from
-SETTLED_NS = 50_000_000  # a file that was written just now may change again within one tick of its clock
+SETTLED_NS = 50_000_000  # a file written just now may change again within one tick of its clock
 
 
 def size_problem(text: str) -> str:
-    """Say what of a text is too long; "" if nothing is."""
+    """Return in what respect a text is too long; "" if it is not."""
     if len(text) > MOST_CHARACTERS:
         return f"longer than {MOST_CHARACTERS} characters, the most in one file; split it"
     if len(text) > MOST_VALUES and text.count(",") + text.count("\n") > MOST_VALUES:
@@ -53,13 +52,13 @@ def size_problem(text: str) -> str:
 
 
 def too_much(depth: int) -> str:
-    """Say which of the two limits is passed at a depth."""
+    """Return which of the two limits is exceeded at a depth."""
     if depth >= DEEPEST:
         return f"nested deeper than {DEEPEST} levels"
     return f"more than {MOST_CONTAINERS} lists and maps in one file; split it"
 
 
-HEAD = 1 << 16  # bytes of a file that are looked at before it is read
+HEAD = 1 << 16  # bytes of a file that are inspected before it is read
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 UTF32 = (b"\xff\xfe\x00\x00", b"\x00\x00\xfe\xff")
 LOOKED_AT = 4096
@@ -89,7 +88,7 @@ LEAF, LIST, MAP, END = range(4)  # kinds of events
 
 
 class Source(NamedTuple):
-    """A text under the name that messages use for it; `first_line` and `column` say where in that it begins."""
+    """A text with its name for messages; `first_line` and `column` are its start in the named file."""
 
     name: str
     text: str
@@ -97,20 +96,20 @@ class Source(NamedTuple):
     first_column: int = 1
 
     def place(self, line: int, column: int) -> tuple[int, int]:
-        """Return a place in the text as one in what has its name."""
+        """Return a place in the text as a place in the named file."""
         return self.first_line + line - 1, column + (self.first_column - 1) * (line == 1)
 
 
 class Verbatim(str):
-    """A number or truth value as it was written; it is written so again, without quotes."""
+    """A number or boolean as written, which is written again unchanged, without quotes."""
 
     __slots__ = ()
 
 
 class FileState(NamedTuple):
-    """What changes when a file does: of a folder, of one of the files in it.
+    """The attributes of a file that differ after a change; for a folder, of one of its files.
 
-    others: its device, number, mode, and when its bytes were changed
+    others: device, inode, mode, and the time of the last change
     """
 
     name: str
@@ -120,7 +119,7 @@ class FileState(NamedTuple):
 
     @classmethod
     def of(cls, found: os.stat_result, name: str = "") -> FileState:
-        """Take it out of what the system says."""
+        """Create from the result of stat."""
         return cls(
             name, found.st_size, found.st_ctime_ns, (found.st_dev, found.st_ino, found.st_mode, found.st_mtime_ns)
         )
@@ -134,7 +133,7 @@ def states_of(path: str) -> list[FileState]:
 
 
 class Pasted(Source):
-    """A text made of one that somebody pasted, who knows nothing of places in it."""
+    """A text converted from a pasted one, without places in it."""
 
 
 _noted: list[dict[str, list[FileState]]] = []
@@ -142,7 +141,7 @@ _noted: list[dict[str, list[FileState]]] = []
 
 @contextmanager
 def noting_files() -> Iterator[dict[str, list[FileState]]]:
-    """Yield what will hold the state of each file that is opened by `opened` in the block, as it was then."""
+    """Yield a dict that receives the state of each file opened by `opened` in the block, at that time."""
     found: dict[str, list[FileState]] = {}
     _noted.append(found)
     try:
@@ -152,9 +151,9 @@ def noting_files() -> Iterator[dict[str, list[FileState]]]:
 
 
 class ReadCache:
-    """What was read last from files, for as long as these stay as they were.
+    """The last values read from files, valid as long as these are unchanged.
 
-    Each value stands with the states of its files as it was read, and their size.
+    Each value is stored with the states of its files when it was read, and their size.
     """
 
     def __init__(self) -> None:
@@ -162,10 +161,10 @@ class ReadCache:
         self._values: dict[Hashable, tuple[Any, dict[str, list[FileState]], int]] = {}
 
     def read(self, key: Hashable, files: Iterable[str], size: int, read: Callable[[], Value]) -> Value:
-        """Return what `read` makes of files, and of others that it opens: as it did before, or anew where one changed.
+        """Return the result of `read` for files, and others that it opens; cached unless one of them has changed.
 
-        key: all that says what is read, and how
-        size: of texts that are read beside files
+        key: everything that determines what is read
+        size: of texts that are read in addition to files
         """
         found = self._values.pop(key, None)
         if found is None or not _are_current(found[1]):
@@ -184,7 +183,7 @@ class ReadCache:
 
 
 def _are_current(files: dict[str, list[FileState]]) -> bool:
-    """Return True if all files still are what was read."""
+    """Return True if all files are unchanged."""
     try:
         return all(states_of(path) == states for path, states in files.items())
     except OSError:
@@ -192,7 +191,7 @@ def _are_current(files: dict[str, list[FileState]]) -> bool:
 
 
 def _instead_of_a_file(name: str) -> str:
-    """Say what a text that was taken for a file's name may be, if it looks like a pose."""
+    """Return what a text that was taken for a file name may be instead, if it looks like a pose."""
     for pattern, remedy in (
         (r"\s*(?:inv\(|~\s*[\[{])", "the inverse of a pose is inv(POSE), in quotes, with all its brackets"),
         (r"\s*[pP]\[", "a pose of Universal Robots is p[x, y, z, rx, ry, rz], with its bracket"),
@@ -204,7 +203,7 @@ def _instead_of_a_file(name: str) -> str:
 
 
 def opened(path: str | PathLike[str]) -> BinaryIO:
-    """Open a file, or standard input for `-`, with a buffer that can be looked into.
+    """Open a file, or standard input for `-`, with a buffer that allows peeking.
 
     Raises FileProblem.
     """
@@ -225,23 +224,23 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
 
-# what ends where its next one begins, or with the stream: a key or an entry of YAML, on the first line, and XML
+# values that end where the next one begins, or with the stream: a YAML key or entry on the first line, and XML
 _OVER_LINES = rb"""- |["']?[A-Za-z_][\w./-]*["']?[ \t]*:\s|\s*<"""
 
 
 def _data(begin: bytes) -> bytes:
-    """Return the whole lines of a text from the first one that is data."""
+    """Return the complete lines of a text from the first line of data on."""
     return re.sub(rb"\A(?:\xef\xbb\xbf)?(?:(?:#.*|---)?[ \t\r]*\n)*", b"", begin[: begin.rfind(b"\n") + 1])
 
 
 def has_line(begin: bytes) -> bool:
-    """Return True if a line of data has arrived, and it is none of a document, which stands on many."""
+    """Return True if a line of data has arrived, and it is not part of a document of many lines."""
     data = _data(begin)
     return bool(data) and not re.match(_OVER_LINES, data)
 
 
 def has_record(begin: bytes) -> bool:
-    """Return True if a document has arrived, a line of JSON, or two lines of a table."""
+    """Return True if a document, a line of JSON, or two lines of a table have arrived."""
     data = _data(begin)
     if re.match(_OVER_LINES, data):
         return re.search(rb"(?m)^---\s*$", data) is not None
@@ -249,9 +248,9 @@ def has_record(begin: bytes) -> bool:
 
 
 def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
-    """Read a file, or standard input for `-`, as text; `stream` is what was opened already.
+    """Read a file, or standard input for `-`, as text; `stream` is an opened stream.
 
-    Raises FileProblem when it cannot be read, FormatError when it is no text or too long.
+    Raises FileProblem when it cannot be read, FormatError when it is not text or too long.
     """
     name = "stdin" if str(path) == "-" else str(path)
     stream = stream or opened(path)
@@ -268,9 +267,9 @@ def read_text(path: str | PathLike[str], stream: BinaryIO | None = None) -> str:
 
 
 def decode(data: bytes, name: str) -> str:
-    """Return the text of bytes: UTF-8, or UTF-16 when a byte order mark says so; the mark is taken off.
+    """Decode bytes: UTF-8, or UTF-16 with a byte order mark; the mark is removed.
 
-    Raises FormatError at the first byte that is something else.
+    Raises FormatError at the first invalid byte.
     """
     encoding = "utf-16" if data.startswith(UTF16) else "utf-8-sig"
     try:
@@ -283,7 +282,7 @@ def decode(data: bytes, name: str) -> str:
 
 
 def _undecodable(data: bytes, name: str, encoding: str, error: UnicodeDecodeError) -> FormatError:
-    """Place the first bad byte; what precedes it is good text, what follows is shown as far as it goes."""
+    """Return the error for the first invalid byte; the text before it is shown, and after it as far as possible."""
     start = error.start + (3 if encoding == "utf-8-sig" and data.startswith(b"\xef\xbb\xbf") else 0)
     before = data[:start].decode(encoding, "ignore")
     if what := not_text(data):
@@ -295,13 +294,13 @@ def _undecodable(data: bytes, name: str, encoding: str, error: UnicodeDecodeErro
 
 
 def _no_text(name: str, before: str, what: str) -> FormatError:
-    """Make the error for bytes behind some text; a line of them would show nothing."""
+    """Return the error for bytes after some text, without showing the line."""
     ((line, column),) = places_of(f"{before}.", [len(before)])
     return FormatError(what, source=name, line=line, column=column)
 
 
 def not_text(data: bytes) -> str:
-    """Say what bytes are that are no UTF-8; "" if they may be text in some other encoding."""
+    """Return what kind of data bytes are that are not UTF-8; "" if they may be text in another encoding."""
     head = data[:LOOKED_AT]
     for magic, what in MAGIC.items():
         if head.startswith(magic):
@@ -317,13 +316,13 @@ def not_text(data: bytes) -> str:
     controls = len(head) - len(head.translate(None, _CONTROLS))
     try:
         most = len(head) // 10 if head[:-3].decode() else 0
-    except UnicodeDecodeError as error:  # Latin-1 has bytes that are no UTF-8, but no controls
+    except UnicodeDecodeError as error:  # Latin-1 has bytes that are not UTF-8, but no controls
         most = 0 if error.start < len(head) - 6 else len(head) // 10
     return "not text but binary data" if controls > max(2, most) else ""
 
 
 def check_text(source: Source) -> None:
-    """Refuse a text that is too long or holds halves of surrogate pairs, which no encoding can write."""
+    """Refuse a text that is too long or has halves of surrogate pairs, which no encoding can write."""
     if problem := size_problem(source.text):
         raise FormatError(problem, source=source.name)
     try:
@@ -336,7 +335,7 @@ def check_text(source: Source) -> None:
 def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
     """Return line and column of each offset, in one pass over the text.
 
-    Behind the last character, where parsers find that something is missing, all offsets are one place.
+    All offsets after the last character, where parsers report missing characters, have the same place.
     """
     last = len(text.rstrip(" \t\r\n"))
     begins = [0, *(end.end() for end in re.finditer(_LINE_END, text[: max(offsets, default=0)]))]
@@ -349,7 +348,7 @@ def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
 
 
 def error_at(source: Source, offset: int, message: str, error: type[FormatError] = FormatError) -> FormatError:
-    """Make the error for an offset into the source's text, with the source line and a caret below it."""
+    """Return the error for an offset in the source's text, with the source line and a caret below it."""
     if isinstance(source, Pasted):
         return error(message, source=source.name)
     ((line, column),) = places_of(source.text, [offset])
@@ -358,7 +357,7 @@ def error_at(source: Source, offset: int, message: str, error: type[FormatError]
 
 
 def line_of(text: str, line: int) -> str:
-    """Return a line of the text without its end; "" beyond the last."""
+    """Return a line of the text without its end; "" after the last."""
     begin = 0
     for number, end in enumerate(re.finditer(_LINE_END, text), 1):
         if number == line:
@@ -368,7 +367,7 @@ def line_of(text: str, line: int) -> str:
 
 
 def pointer(line: str, column: int) -> str:
-    """Return the line with a caret below the column: tabs kept, wide characters counted twice, long lines cut."""
+    """Return the line with a caret below the column: tabs kept, wide characters count twice, long lines cut."""
     line, column = _cut(line, column)
     visible = "".join(c if c.isprintable() or c == "\t" else "\ufffd" for c in line)
     gap = "".join("\t" if each == "\t" else " " * cells(each) for each in visible[: column - 1])
@@ -387,12 +386,12 @@ def _cut(line: str, column: int) -> tuple[str, int]:
 
 
 class InputFile:
-    """A file, standard input for `-`, or a folder; what it holds is read once, as a stream or as one text."""
+    """A file, standard input for `-`, or a folder; its contents are read once, as a stream or as one text."""
 
     def __init__(self, path: str | PathLike[str], stream: BinaryIO | None = None, *, folder: bool = False) -> None:
         """Open a file.
 
-        stream: what was opened already, with nothing of it read; folder: there is nothing to open.
+        stream: an opened stream, not yet read; folder: there is nothing to open.
         Raises FileProblem.
         """
         self.path = str(path)
@@ -403,7 +402,7 @@ class InputFile:
         self._is_pipe = not self.stream.seekable()
 
     def head(self) -> bytes:
-        """Return the first bytes, and leave them to be read."""
+        """Return the first bytes without consuming them."""
         if self._is_pipe:
             from frametool.text.lines import arrived
 
@@ -419,18 +418,18 @@ class InputFile:
 
     @property
     def source(self) -> Source:
-        """Return the whole text under its name."""
+        """Return the whole text with its name."""
         return Source(self.name, self.text)
 
     def close(self) -> None:
-        """Let go of a file; standard input stays open."""
+        """Close a file; standard input remains open."""
         if self.path != "-":
             self.stream.close()
 
 
 @contextmanager
 def paused_collector() -> Iterator[None]:
-    """Keep the garbage collector off meanwhile: it would walk the growing result again and again."""
+    """Disable the garbage collector in the block: it would traverse the growing result again and again."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -441,17 +440,17 @@ def paused_collector() -> Iterator[None]:
 
 
 def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tuple[int, int]]:
-    """Walk the events of a text and keep the offsets of keys and values on the way to the paths.
+    """Iterate over the events of a text and store the offsets of keys and values on the paths.
 
     A path is (document, key or index, ...).  Returns (offset of the key, offset of the value) for each path and each
-    of its beginnings that the text holds; in a list both are the value's.  Of equal keys the first counts.
+    of its prefixes that the text has; in a list both are the value's.  The first of equal keys counts.
     """
     wanted = {path[:length] for path in paths for length in range(1, len(path) + 1)}
     found: dict[Path, tuple[int, int]] = {}
     walk = iter(events)
     outer: list[tuple[Path, str | int | None]] = []
     path: Path = ()
-    step: str | int | None = 0  # the index or key that comes next; None where a key is awaited
+    step: str | int | None = 0  # the next index or key; None when a key is expected
     key_start = 0
     for kind, text, start, *_ in walk:
         if kind == END:
@@ -476,7 +475,7 @@ def find_marks(events: Iterable[Event], paths: Sequence[Path]) -> dict[Path, tup
 
 
 def _skip(walk: Iterator[Event]) -> None:
-    """Pass over the rest of a list or map that has just begun."""
+    """Skip the rest of a list or map that has just begun."""
     depth = 1
     for kind, *_ in walk:
         if kind != LEAF:
@@ -486,7 +485,7 @@ def _skip(walk: Iterator[Event]) -> None:
 
 
 def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int:
-    """Return the offset of the key or value at a path; of what is missing, that of the nearest value around it."""
+    """Return the offset of the key or value at a path; if it is missing, that of the nearest enclosing value."""
     for length in range(len(path), 0, -1):
         if path[:length] in found:
             return found[path[:length]][not (key and length == len(path))]
@@ -494,7 +493,7 @@ def mark_of(path: Path, found: dict[Path, tuple[int, int]], *, key: bool) -> int
 
 
 def repeated_key(source: Source, events: Iterable[Event]) -> FormatError:
-    """Make the error for the first key that its map holds twice, or that is empty."""
+    """Return the error for the first key that its map has twice, or that is empty."""
     opened: list[dict[str, int] | None] = [None]  # the keys of a map; None for a list
     key_next = False
     for kind, text, start, *_ in events:

@@ -1,7 +1,7 @@
-"""XML as a stream of elements with their places, or as a tree of those that a form has a use for; without entities.
+"""XML as a stream of elements with their places, or as a tree of selected elements; without entities.
 
-Expat of the standard library.  Knows syntax only.  Names keep their prefix as written (`sensor:camera`), so that files
-whose prefixes are bound nowhere are read too.
+It uses expat of the standard library and knows syntax only.  Names keep their prefix as written (`sensor:camera`), so
+that files with undeclared prefixes can be read too.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DECIMALS = "0123456789.-+eE \t\r\n"
 class Element(NamedTuple):
     """The beginning or the end of an element.
 
-    ends: whether it is the end; then `text` is what stands directly in the element, the rest is as at its beginning
+    ends: True for the end; then `text` is the text directly in the element, the rest is as at its beginning
     depth: 1 for the root
     offset: of its first character, in bytes
     """
@@ -50,7 +50,7 @@ class XmlFile:
     """The elements of one XML file, and errors that point into it."""
 
     def __init__(self, file: InputFile) -> None:
-        """Read the bytes of a file; raises FileProblem, and FormatError where they are too many or no text."""
+        """Read the bytes of a file; raises FileProblem, and FormatError if they are too many or not text."""
         self.name = file.name
         try:
             self.data = file.stream.read(MOST_CHARACTERS + 1)
@@ -62,8 +62,8 @@ class XmlFile:
     def elements(self, deepest: int = DEEPEST_ELEMENT, *, ends: bool = True) -> Iterator[Element]:
         """Yield the beginnings and ends of all elements, in order.
 
-        deepest: those further down are left out; ends: without them the text in elements is left out too.
-        Raises FormatError for what is no XML, and for declarations of entities.
+        deepest: omit elements below this depth; ends: without them the text of elements is omitted too.
+        Raises FormatError if it is not XML, and for declarations of entities.
         """
         opened: list[Element] = []
         texts: list[list[str]] = []
@@ -119,20 +119,20 @@ class XmlFile:
             found.clear()
 
     def _check_doctype(self, parser: expat.XMLParserType, _: str, file: str | None, *_more: object) -> None:
-        """Refuse entities of another file, which expat would leave out in silence."""
+        """Refuse entities of another file, which expat would omit silently."""
         if file and _OTHER_ENTITY.search(self.data.replace(b"\0", b"")):
             message = f"a DOCTYPE with entities of {shown(file)} is not read; expand: xmllint --noent --loaddtd FILE"
             raise self._at(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, message)
 
     def _broken(self, error: expat.ExpatError) -> FormatError:
-        """Say in one line what is no XML."""
+        """Return a one-line error for invalid XML."""
         if what := not_text(self.data):
             return FormatError(what, source=self.name, line=1, column=1)
         problem = "it ends too early" if error.code == _ENDS_EARLY else expat.ErrorString(error.code)
         return self._at(error.lineno, error.offset + 1, f"not XML: {problem}")
 
     def error(self, element: Element, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
-        """Make the error for an element, or for the value of one of its attributes."""
+        """Return the error for an element, or for the value of one of its attributes."""
         line, column = self.place(element, attribute)
         return self._at(line, column, message, rule=rule)
 
@@ -148,27 +148,27 @@ class XmlFile:
         return line, column
 
     def _at(self, line: int, column: int, message: str, *, rule: str = "") -> FormatError:
-        # lines as expat counts them, which are those of every editor
+        # lines as expat counts them, the same as in editors
         text = self.data.decode("utf-8", "replace").split("\n")[line - 1 : line] or [""]
         snippet = pointer(line_of(text[0], 1), column)
         return FormatError(message, source=self.name, line=line, column=column, snippet=snippet, rule=rule)
 
     def required(self, element: Element, attribute: str) -> str:
-        """Return an attribute that must be there and say something."""
+        """Return an attribute that must be present and not empty."""
         value = element.attributes.get(attribute)
         if not value:
             raise self.error(element, f"<{element.tag}> has no {attribute}", attribute if value is not None else "")
         return value
 
     def numbers(self, element: Element, attribute: str, count: int, default: str | None = None) -> tuple[float, ...]:
-        """Read an attribute as so many finite numbers between blanks; without it the default."""
+        """Read an attribute as this many finite numbers between blanks; without it the default."""
         text = element.attributes.get(attribute, default)
         if text is None:
             raise self.error(element, f"<{element.tag}> has no {attribute}")
         return self.numbers_in(text, element, attribute, count)
 
     def numbers_in(self, text: str, element: Element, attribute: str, count: int) -> tuple[float, ...]:
-        """Read a text of an element as so many finite numbers; the attribute, if any, is where it stands."""
+        """Read a text of an element as this many finite numbers; the attribute, if any, is its place."""
         words = text.split()
         if len(words) == count and not text.strip(_DECIMALS):  # plain decimals, nearly always
             try:
@@ -192,11 +192,11 @@ class XmlFile:
         return Source(self.name, self.data.decode("utf-8", "replace"))
 
 
-_ENDS_EARLY = 3  # expat's code for "no element found", which it also says behind a text that breaks off
+_ENDS_EARLY = 3  # expat's code for "no element found", also used for truncated text
 
 
 class XmlNode:
-    """One element: its attributes and place, its text, and those of the elements in it that are kept."""
+    """One element: its attributes and place, its text, and its selected children."""
 
     __slots__ = ("children", "element", "line", "tag", "text", "xml")
 
@@ -210,36 +210,36 @@ class XmlNode:
         self.text = ""
 
     def all(self, *tags: str) -> Iterator[XmlNode]:
-        """Yield the elements of some kinds that stand directly in it."""
+        """Yield the direct children of some kinds."""
         return (child for child in self.children if child.tag in tags)
 
     def first(self, tag: str) -> XmlNode | None:
-        """Return the first element of a kind, if there is one."""
+        """Return the first child of a kind, if there is one."""
         return next(self.all(tag), None)
 
     def text_of(self, tag: str) -> str:
-        """Return the text of the first element of a kind; "" where there is none."""
+        """Return the text of the first child of a kind; "" if there is none."""
         found = self.first(tag)
         return "" if found is None else found.text
 
     def attribute(self, name: str) -> str:
-        """Return an attribute; "" where it is missing."""
+        """Return an attribute; "" if it is missing."""
         return self.element.attributes.get(name, "").strip()
 
     def error(self, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
-        """Make the error for it, or for the value of one of its attributes."""
+        """Return the error for it, or for the value of one of its attributes."""
         return self.xml.error(self.element, message, attribute, rule=rule)
 
     def numbers(self, count: int) -> tuple[float, ...]:
-        """Read its text as so many finite numbers."""
+        """Read its text as this many finite numbers."""
         return self.xml.numbers_in(self.text, self.element, "", count)
 
 
 def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "", *, texts: bool = True) -> XmlNode:
-    """Return the root element with what is kept below it.
+    """Return the root element with the selected elements below it.
 
-    held: the elements that are kept in each element, the root first; of all others nothing is.
-    form: what a file with another root is not.  texts: without them it is faster.
+    held: the children kept for each element, the root first; all others are dropped.
+    form: the format's name, for a file with another root.  texts: without them it is faster.
     Raises FormatError.
     """
     top = next(iter(held))

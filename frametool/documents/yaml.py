@@ -1,17 +1,17 @@
 """YAML text to plain values, and to places, through the parser's events: knows YAML, no meaning.
 
-The library's constructors are not used: they build numbers, dates and truth values out of names, and they let a small
-text grow without bound.  The loop here keeps every scalar as text and counts depth and aliases as it goes; what the
-parser complains of becomes one line that a person can act on.
+The library's constructors are not used: they convert names to numbers, dates and booleans, and allow a small text to
+grow without bound.  The loop here keeps every scalar as text and counts depth and aliases; the parser's errors become
+one line that tells a person what to do.
 
-      - {name: lidar, parent: base_link, xyz: [0.9, 0, 2.0], rpy_deg: [0, 0, 90]}
-      - name: lidar
-        parent: base_link
+    - {name: lidar, parent: base_link, xyz: [0.9, 0, 2.0], rpy_deg: [0, 0, 90]}
+    - name: lidar
+      parent: base_link
 
-Long lists of such maps, which big trees are, differ from JSON only in the quotes.  Once a strict pattern has found
-nothing else in them, a few replacements make them JSON, which reads 100 000 of them in a quarter of the time that the
-parser takes to tell its events (0.5 s against 2.1); anything unusual, also a mistake, goes to the parser.  In other
-forms plain values in brackets behind their key, `f1: {xyz: [0.9, 0, 2.0]}`, are taken out in the same way.
+Long lists of such maps, as in big trees, differ from JSON only in the quotes.  If a strict pattern finds nothing else,
+a few replacements make them JSON, which reads 100 000 of them in a quarter of the time that the parser needs for its
+events (0.5 s against 2.1); anything unusual, also an error, is left to the parser.  In other texts plain values in
+brackets after their key, `f1: {xyz: [0.9, 0, 2.0]}`, are extracted in the same way.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     Value: TypeAlias = dict[str, "Value"] | list["Value"] | str | None
     NodeEvent: TypeAlias = ScalarEvent | MappingStartEvent | SequenceStartEvent
 
-# plain words and numbers that mean themselves in YAML and hold nothing that JSON would need to escape
+# plain words and numbers that have the same meaning in YAML and need no escapes in JSON
 _WORD = r"(?:(?!(?:null|Null|NULL)[^\w./-])[A-Za-z_/][\w./-]*+|[-+]?(?:[0-9]++\.?[0-9]*+|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
 _LIST = rf"\[{_WORD}(?:, {_WORD})*+\]"
 _PAIR = rf"{_WORD}: (?:{_WORD}|{_LIST})"
@@ -70,14 +70,14 @@ _QUOTES = (
 )  # fmt: skip
 STANDIN = "0"
 _BRACKETED = rf"(?am)^( *+(?:- )?{_WORD}: )(\{{{_PAIR}(?:, {_PAIR})*+\}}|{_LIST})$"
-_NOT_PLAIN = r"""["'|>#&*!%@`?\t\r]"""  # quotes, comments, texts of several lines, anchors: brackets may be none there
-BRACKETS = "\ue000"  # stands for a value in brackets
+_NOT_PLAIN = r"""["'|>#&*!%@`?\t\r]"""  # quotes, comments, multi-line texts, anchors: brackets may be text there
+BRACKETS = "\ue000"  # replaces a value in brackets
 
 
 def split_run(text: str) -> tuple[str, list[Any]] | None:
-    """Take the list of plain maps off the end of a text.
+    """Split the list of plain maps off the end of a text.
 
-    Returns the text with STANDIN as the list's one item, and the items; None where the text has no such end.
+    Returns the text with STANDIN as the list's only item, and the items; None if the text has no such end.
     """
     begin = re.search(r"(?m)^ *- (\{?)", text) if len(text) >= sizes.ASIDE else None
     run = begin and re.compile(_FLOWS if begin[1] else _BLOCKS).match(text, begin.start())
@@ -88,13 +88,13 @@ def split_run(text: str) -> tuple[str, list[Any]] | None:
 
 
 def _as_flows(run: str, indent: str) -> str:
-    """Write block maps as flow ones, one a line."""
+    """Convert block maps to flow maps, one per line."""
     lines = run[:-1].replace(f"\n{indent}  ", ", ").replace(f"\n{indent}- ", f"}}\n{indent}- {{")
     return f"{indent}- {{{lines[len(indent) + 2 :]}}}\n"
 
 
 def put_back(values: list[Any], items: list[Any]) -> bool:
-    """Put the items where the stand-in is: in the last list of the last document."""
+    """Replace the placeholder by the items: in the last list of the last document."""
     holder = values[-1]
     while isinstance(holder, dict) and holder:
         holder = next(reversed(holder.values()))
@@ -105,9 +105,9 @@ def put_back(values: list[Any], items: list[Any]) -> bool:
 
 
 def split_brackets(text: str) -> tuple[str, list[Any]] | None:
-    """Take the plain values in brackets that end a line out of a text.
+    """Extract the plain values in brackets that end a line of a text.
 
-    Returns the text with BRACKETS in their places, and the values in order; None where a text is short or not plain.
+    Returns the text with BRACKETS in their places, and the values in order; None if a text is short or not plain.
     """
     if len(text) < sizes.ASIDE or BRACKETS in text or re.search(_NOT_PLAIN, text):
         return None
@@ -123,7 +123,7 @@ def split_brackets(text: str) -> tuple[str, list[Any]] | None:
 
 
 def _items(run: str, indent: str) -> list[Any] | None:
-    """Read a value in brackets a line as JSON; None where a key appears twice or there are too many."""
+    """Read one value in brackets per line as JSON; None if a key appears twice or there are too many."""
     from json import JSONDecoder
 
     if run.count("{") + run.count("[") > MOST_CONTAINERS:
@@ -141,7 +141,7 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any] | None:
     return made if len(made) == len(pairs) else None
 
 
-# compiled when an error asks for them, not at start-up
+# compiled when an error needs them, not at start-up
 _UNREADABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
 _ABOUT_TABS = "cannot start any token|tab character"
 _ABOUT_BEGINNINGS = "cannot start any token|scanning a directive"
@@ -157,7 +157,7 @@ _HINTS = {
 
 
 def translated(source: Source, error: Exception) -> FormatError:
-    """Make our error of the parser's: lower case, placed, with a hint where one is known."""
+    """Convert an error of the parser: lower case, with its place, and a hint if one is known."""
     if isinstance(error, MarkedYAMLError) and (mark := error.problem_mark or error.context_mark):
         line = mark.line + 1
         begin = error.context_mark.index if error.context_mark else mark.index
@@ -171,7 +171,7 @@ def translated(source: Source, error: Exception) -> FormatError:
 
 
 def _suspicion(source: Source, line: int) -> str:
-    """Name what people do not see in the line of an error or the one before: odd characters, a missing blank, xacro."""
+    """Return what is hard to see in the line of an error or the previous one: look-alikes, a missing blank, xacro."""
     for text in (line_of(source.text, line), line_of(source.text, line - 1) if line > 1 else ""):
         if odd := odd_characters(text):
             return f"; the line has {odd}"
@@ -188,9 +188,9 @@ def _one_line(text: str) -> str:
 
 
 def _message(error: MarkedYAMLError, line: str, column: int, above: int) -> str:
-    """Say what is wrong at a column of a line, after the parser's problem and its context, lines above."""
+    """Return what is wrong at a column of a line, from the parser's problem and its context, lines above."""
     problem, context = _one_line(error.problem or ""), _one_line(error.context or "")
-    if "maximum nesting depth" in problem:  # of libyaml, which looks some way ahead
+    if "maximum nesting depth" in problem:  # of libyaml, which reads ahead
         return too_much(DEEPEST)
     word = line[column - 1 :].split(maxsplit=1)[0] if line[column - 1 :].strip() else ""
     if "\t" in (line[column - 1 : column], *line[: column - 1].split(" ")) and re.search(_ABOUT_TABS, problem):
@@ -202,16 +202,16 @@ def _message(error: MarkedYAMLError, line: str, column: int, above: int) -> str:
         return f'nothing can begin with {shown(word[0])} here; quote the name: "{name}"'
     if word == ":" and problem == "did not find expected key":
         return "an empty key; write a name before the colon"
-    begun = f" begun {above} line{'s' * (above > 1)} above" if above else ""  # a record knows no line of its file
+    begun = f" begun {above} line{'s' * (above > 1)} above" if above else ""  # a record has no line number
     return problem + (_HINTS.get(problem) or (f", {context}{begun}" if context else ""))
 
 
-TAG = "!"  # key under which a mapping has its tag: no plain key of YAML looks so
+TAG = "!"  # the key for the tag of a mapping: no plain key of YAML looks like it
 MOST_ALIASES = 1000
-SPARE_COPIES = 10_000  # what aliases may repeat, beside one value for each character of the text
+SPARE_COPIES = 10_000  # values that aliases may repeat, in addition to one per character of the text
 
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_ITEM = object()  # stands for the key while a list is filled
+_ITEM = object()  # in place of the key while a list is filled
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _ODD_KEYS = frozenset(("", "<<"))
 _KINDS: dict[type, int] = {
@@ -222,7 +222,7 @@ _KINDS: dict[type, int] = {
     SequenceEndEvent: END,
     MappingEndEvent: END,
 }
-_MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all before it
+_MOST_DIRECTIVES = 100  # libyaml compares each new %TAG with all previous ones
 
 
 def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
@@ -239,7 +239,7 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
 
 
 def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
-    """Read a text that ends in a long list of plain maps; None for others and for mistakes."""
+    """Read a text that ends in a long list of plain maps; None for others and for errors."""
     split = split_run(source.text)
     if split is None:
         return None
@@ -251,7 +251,7 @@ def _read_by_lines(source: Source, tags: Collection[str]) -> list[Value] | None:
 
 
 def _read_without_brackets(source: Source) -> list[Value] | None:
-    """Read a plain text whose values in brackets are read aside; None for others and for mistakes."""
+    """Read a plain text whose values in brackets are extracted; None for others and for errors."""
     split = split_brackets(source.text)
     if split is None:
         return None
@@ -265,7 +265,7 @@ def _read_without_brackets(source: Source) -> list[Value] | None:
 
 
 def yaml_events(text: str) -> Iterator[Event]:
-    """Yield the values of a text in order, with their places; what cannot be parsed ends them."""
+    """Yield the values of a text in order, with their places, up to the first error."""
     get: Callable[[], Any] = _Loader(text).get_event
     kinds = _KINDS
     try:
@@ -285,23 +285,23 @@ def yaml_events(text: str) -> Iterator[Event]:
 
 
 class _Builder:
-    """Build the values of one text; holds what the rare events need beside the loop."""
+    """Builds the values of one text; stores the state for rare events."""
 
     __slots__ = ("aliases", "anchors", "aside", "copies", "documents", "open", "source", "tags")
 
     def __init__(self, source: Source, tags: Collection[str]) -> None:
-        """Start with an empty list of documents, the tags that are read, and the budget for aliases."""
+        """Start with an empty list of documents, the accepted tags, and the budget for aliases."""
         self.source = source
         self.tags = tags
         self.anchors: dict[str, Value] = {}
         self.aliases = MOST_ALIASES
         self.copies = SPARE_COPIES + len(source.text)
-        self.aside: Iterator[Value] | None = None  # what BRACKETS stand for, if they stand for anything
+        self.aside: Iterator[Value] | None = None  # the values of the BRACKETS placeholders, if any
         self.documents: list[Value] = []
         self.open: list[tuple[dict[str, Value] | list[Value], object]] = []
 
     def build(self) -> list[Value]:
-        """Run the loop; what the parser itself refuses becomes our one-line error."""
+        """Run the loop; the parser's own errors become one line."""
         try:
             self._run(_Loader(self.source.text).get_event)
         except FormatError:
@@ -311,10 +311,10 @@ class _Builder:
         return self.documents
 
     def _run(self, get: Callable[[], Any]) -> None:
-        """Take events until the stream ends.
+        """Process events until the stream ends.
 
-        `current` is the dict or list being filled and `key` the key waiting for its value: None where a key comes
-        next, _ITEM in a list.  One function, because two million events pass through it for 100 000 frames.
+        `current` is the dict or list being filled and `key` the key waiting for its value: None if a key is next, _ITEM
+        in a list.  A single function, because two million events pass through it for 100 000 frames.
         """
         stack, nulls, odd_keys, item, brackets = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside and BRACKETS
         current: Any = self.documents
@@ -368,13 +368,13 @@ class _Builder:
                 key = None if kind is MappingStartEvent else item
 
     def _from_aside(self, event: ScalarEvent) -> Value:
-        """Return the next value that was read aside: a list or a map of lists."""
+        """Return the next extracted value: a list or a map of lists."""
         if len(self.open) + 2 > DEEPEST:
             raise self._error(event, too_much(DEEPEST))
         return next(self.aside or iter(()), None)
 
     def _note(self, event: NodeEvent, value: Value) -> None:
-        """Keep the tag of a mapping if it is one that is read, refuse others; remember what an anchor names."""
+        """Store the tag of a mapping if it is accepted, refuse others; remember the value of an anchor."""
         if event.tag is not None:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             if tag not in self.tags or type(value) is not dict:
@@ -384,7 +384,7 @@ class _Builder:
             self.anchors[event.anchor] = value
 
     def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
-        """Raise for a key that is there already, is empty or asks for a merge; a quoted << is a name."""
+        """Raise for a key that is a duplicate, empty or a merge key; a quoted << is a name."""
         if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
@@ -393,7 +393,7 @@ class _Builder:
             raise self._error(event, "merge keys (<<) are not supported; write the entries out")
 
     def _repeat(self, event: AliasEvent, current: object, key: object) -> Value:
-        """Return a copy of what the alias stands for, within the budget."""
+        """Return a copy of an alias's value, within the budget."""
         name = str(event.anchor)
         if key is None:
             raise self._error(event, f"alias *{name} cannot be a key")
@@ -427,5 +427,5 @@ class _Builder:
         raise self._error(event, too_much(DEEPEST))
 
     def _error(self, event: Any, message: str) -> FormatError:
-        """Make the error for the place where an event begins."""
+        """Return the error for the place where an event begins."""
         return error_at(self.source, event.start_mark.index, message)

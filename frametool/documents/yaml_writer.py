@@ -1,4 +1,4 @@
-"""Plain values to YAML text, without the YAML library: one look for all that is printed.
+"""Write plain values as YAML text, without the YAML library, in one style.
 
     name: camera
     xyz: [1.0, 2.0e-05, 3.0]
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Any
 
-# begins with a letter, _ or /; then also digits . - and single blanks: no indicator, number or date looks so
+# begins with a letter, _ or /; then also digits . - and single blanks: unlike any indicator, number or date
 _PLAIN = r"(?:[^\W\d]|/)[\w./-]*(?: [\w./-]+)*"
 _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf", "infinity"))
 _ESCAPED = r'["\\]|[^ -~\xa1-\u1fff\u3001-\ud7ff\uf900-\ufdff\U00010000-\U0003ffff]'
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-_LONGEST_KEY = 200  # of 1024 bytes that a parser looks ahead for the colon
+_LONGEST_KEY = 200  # of 1024 bytes that a parser reads ahead for the colon
 _WIDEST_FLOW_MAP = 8
 _INFINITE = float("inf")
 
 
 def dump(value: Any, number: Callable[[float], str] = repr) -> str:
-    """Write dicts, lists, text, numbers, truth values and None as one YAML document.
+    """Write dicts, lists, text, numbers, booleans and None as one YAML document.
 
-    Lists of scalars and small maps of numbers stand on one line, all else in blocks.
-    number: writes a float; `1e-05` becomes `1.0e-05`, because YAML 1.1 needs the point.
-    Raises ValueInvalid for what no number is: nan, inf.
+    Lists of scalars and small maps of numbers are on one line, everything else in blocks.
+    number: formats a float; `1e-05` becomes `1.0e-05`, because YAML 1.1 needs the point.
+    Raises ValueInvalid for nan and inf.
     """
     if (line := _one_line(value, number)) is not None and not (type(value) is dict and value):
         return f"{line}\n"
@@ -42,7 +42,7 @@ def dump(value: Any, number: Callable[[float], str] = repr) -> str:
 
 
 def flow(value: Any, number: Callable[[float], str] = repr) -> str:
-    """Write a value on one line, as it may stand inside brackets."""
+    """Write a value on one line, as inside brackets."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key, value)}: {flow(each, number)}" for key, each in value.items()) + "}"
     if isinstance(value, (list, tuple)):
@@ -51,7 +51,7 @@ def flow(value: Any, number: Callable[[float], str] = repr) -> str:
 
 
 def quoted(text: str) -> str:
-    """Write a text as it is where that is safe, else in double quotes with escapes."""
+    """Write a text without quotes if that is safe, else in double quotes with escapes."""
     if text.isascii() and text.isidentifier() and len(text) <= _LONGEST_KEY and text.lower() not in _WORDS:
         return text  # most keys and names, before any pattern is compiled
     plain = len(text) <= _LONGEST_KEY and re.fullmatch(_PLAIN, text)
@@ -61,12 +61,12 @@ def quoted(text: str) -> str:
 
 
 def _key(key: str, beside: dict[str, Any]) -> str:
-    """Write a key; y beside x is the coordinate, which no reader in use takes for a truth value."""
+    """Write a key; y next to x is the coordinate, which no reader in use takes for a boolean."""
     return key if key == "y" and "x" in beside else quoted(key)
 
 
 def _escape(match: re.Match[str]) -> str:
-    """Write a character that may not stand in quotes as it is."""
+    """Escape a character that is not allowed in quotes."""
     code = ord(match[0])
     if 0xD800 <= code < 0xE000:
         raise ValueInvalid(f"{match.string!r} holds half a character and cannot be written")
@@ -74,7 +74,7 @@ def _escape(match: re.Match[str]) -> str:
 
 
 def _scalar(value: Any, number: Callable[[float], str]) -> str:
-    """Write what is neither a list nor a map."""
+    """Write a scalar."""
     if isinstance(value, str):
         return str(value) if isinstance(value, Verbatim) else quoted(value)
     if value is None:

@@ -215,7 +215,7 @@ class Explanation:
     def render(self, form: str = "text") -> str:
         """Return the derivation as text or markdown; raises ValueInvalid for another form."""
         if form not in FORMS:
-            raise ValueInvalid(f"no form {shown(form)}{alternatives(form, FORMS, 'forms')}")
+            raise ValueInvalid(f"unknown format {shown(form)}{alternatives(form, FORMS, 'formats')}")
         return FORMS[form](self)
 
 

@@ -382,9 +382,9 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
         likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].magic))
         what = f"XML without an element{f' in its first {HEAD >> 10} KiB' * (len(begin.head) >= HEAD)}"
         what = f"XML with the root element {bare(begin.elements[0])}" if begin.elements else what
-    named = f"forms: {first_of(likely, _MOST_NAMED)}" if likely else "none of those read here is XML"
+    named = f"formats: {first_of(likely, _MOST_NAMED)}" if likely else "none of those read here is XML"
     return FormatError(
-        f"cannot tell the form of {what}; {named}; `frametool formats` lists all, --in FORM names one",
+        f"cannot detect the format of {what}; {named}; `frametool formats` lists all, --in FORMAT sets one",
         source=name or "stdin",
         line=1,
     )

@@ -532,7 +532,7 @@ def load(
     rules = Rules(moving=moving, keep_ns=keep_ns, normalize=normalize)
     chosen = tuple(topics)
     if format is not None and format not in readers("tree"):
-        raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'forms')}")
+        raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'formats')}")
     given = {} if joints is None or isinstance(joints, str | PathLike) else joints
     values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
     joint_files = () if joints is None or given is joints else (str(joints),)
@@ -544,7 +544,7 @@ def load(
     for ask in ("frames", *answers):
         if getattr(known, ask) and not any(ask in file.required_options for file in files):
             names = " and ".join(dict.fromkeys(file.form for file in files))
-            warn(f"{ask} changes nothing: {names} does not leave that open")
+            warn(f"{ask} has no effect: {names} specifies this itself")
     return load_sources(files, rules)
 
 

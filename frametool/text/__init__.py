@@ -1,1 +1,1 @@
-"""Bytes <-> lines, cells and floats in bulk: knows no geometry and no format's meaning."""
+"""Bulk conversion of bytes to lines, cells and floats, and back: knows no geometry and no format."""

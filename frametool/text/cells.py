@@ -1,7 +1,7 @@
-"""Find the cells of a block of lines: where each begins and ends, without touching their text.
+"""Find the cells of a block of lines: the range of each, without changing their text.
 
-Two families: cells between delimiters (CSV, TSV; quoted as RFC 4180 says) and cells between blanks (TUM and the like).
-Knows nothing of what a cell holds.
+Two families: cells between delimiters (CSV, TSV; quoted as in RFC 4180) and cells between blanks (TUM and others).
+Does not interpret cells.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _NEWLINE, _RETURN, _QUOTE, _BLANK, _TAB = b'\n\r" \t'
 
 
 class Cells(NamedTuple):
-    """The lines of a block and the cells of those that have the wanted number of them.
+    """The lines of a block and the cells of those with the expected number of cells.
 
-    data: the block between margins (see spans.py); all places count in it
-    line_starts, line_ends: (lines,), a line's first byte and the one behind its line end
+    data: the block between margins (see spans.py); all offsets refer to it
+    line_starts, line_ends: (lines,), a line's first byte and the one after its line end
     counts: (lines,), cells in each line; 0 for an empty line or a comment
-    rows: (n,), the lines with the wanted number of cells, and starts, ends: (n, columns), theirs
+    rows: (n,), the lines with the expected number of cells, and starts, ends: (n, columns), their ranges
     """
 
     data: Bytes
@@ -44,7 +44,7 @@ class Cells(NamedTuple):
         return Spans(self.data, self.starts[:, index], self.ends[:, index])
 
     def odd_lines(self) -> Ints:
-        """Return the lines with another number of cells, empty ones and comments among them."""
+        """Return the lines with another number of cells, including empty ones and comments."""
         return np.delete(np.arange(len(self.counts)), self.rows)
 
     def line(self, index: int) -> bytes:
@@ -52,12 +52,12 @@ class Cells(NamedTuple):
         return self.data[self.line_starts[index] : self.line_ends[index]].tobytes()
 
     def lines_before(self, index: int) -> int:
-        """Count the line ends in the block before a line: more than its index if cells hold line ends."""
+        """Count the line ends in the block before a line: more than its index if cells contain line ends."""
         return int(np.count_nonzero(self.data[MARGIN : self.line_starts[index]] == _NEWLINE))
 
 
 class _Found(NamedTuple):
-    """All cells of a block in order, and for each line the number of cells found up to its end."""
+    """All cells of a block in order, and for each line the number of cells up to its end."""
 
     starts: Ints
     ends: Ints
@@ -66,10 +66,10 @@ class _Found(NamedTuple):
 
 
 def split_delimited(block: bytes, delimiter: bytes, columns: int, *, comment: bytes = b"") -> Cells:
-    """Find cells between delimiters; quotes belong to the cell's span, and hide delimiters and line ends.
+    """Find cells between delimiters; quotes are part of the cell's span, and hide delimiters and line ends.
 
     block: whole lines; the last line end may be missing.
-    A line that begins with `comment`, if given, has no cells.
+    A line that begins with `comment`, if set, has no cells.
     """
     data, end = _closed(block)
     hidden = _inside_quotes(data, end, delimiter) if b'"' in block else _NOTHING_HIDDEN
@@ -94,7 +94,7 @@ def split_blank(block: bytes, columns: int, *, comment: bytes = b"#") -> Cells:
 
 
 def whole_records(text: bytes, delimiter: bytes = b",") -> int:
-    """Return how many bytes of the text are whole lines, the last of which ends outside quotes."""
+    """Return the number of bytes of the text in complete lines, up to one that ends outside of quotes."""
     end = text.rfind(b"\n") + 1
     if text.find(b'"', 0, end) < 0 or _ends_outside_quotes(text[:end], delimiter):
         return end
@@ -106,17 +106,17 @@ def whole_records(text: bytes, delimiter: bytes = b",") -> int:
 
 
 class RecordEnds:
-    """Find where records end in text that arrives in pieces; bytes inside an open quote are looked at once."""
+    """Find the ends of records in text that arrives in pieces; bytes inside an open quote are scanned once."""
 
     def __init__(self, delimiter: bytes) -> None:
-        """Begin before the first record."""
+        """Start before the first record."""
         self.delimiter = delimiter
         self.quoted = False
 
     def __call__(self, text: bytes) -> int:
-        """Return how many bytes are whole records; the negative number that begin a record if its quote is open.
+        """Return the number of bytes in complete records; negative: that many begin a record whose quote is open.
 
-        text: a line end stands in it; it follows what was returned last.
+        text: contains a line end; it follows what was returned last.
         """
         last, start = text.rfind(b"\n") + 1, 0
         if self.quoted:
@@ -130,7 +130,7 @@ class RecordEnds:
 
 
 def torn_record(text: bytes, delimiter: bytes) -> int | None:
-    """Return where the record begins that has a quote opened and not closed; None where all are closed."""
+    """Return the start of the record with a quote that is not closed; None if all are closed."""
     if _ends_outside_quotes(text, delimiter):
         return None
     start = 0
@@ -142,19 +142,19 @@ def torn_record(text: bytes, delimiter: bytes) -> int | None:
 
 
 def _ends_outside_quotes(lines: bytes, delimiter: bytes) -> bool:
-    """Return True if whole lines certainly end outside quotes."""
+    """Return True if complete lines certainly end outside of quotes."""
     return b'"' not in lines or _inside_quotes(framed(lines), MARGIN + len(lines), delimiter) is not None
 
 
 def without_quotes(cells: Spans) -> Spans:
-    """Return the spans without the quotes around those that have them; for text that holds no quote itself."""
+    """Return the spans without surrounding quotes; for text without quotes inside."""
     first, last = cells.data[cells.starts], cells.data[cells.ends - 1]
     quoted = (first == _QUOTE) & (last == _QUOTE) & (cells.ends - cells.starts > 1)
     return Spans(cells.data, cells.starts + quoted, cells.ends - quoted)
 
 
 def _closed(block: bytes) -> tuple[Bytes, int]:
-    """Return the block between margins, with a line end if it has none, and where that ends."""
+    """Return the block between margins, with a line end if it has none, and its end."""
     data = framed(block)
     end = MARGIN + len(block)
     if not block or block.endswith(b"\n"):
@@ -164,7 +164,7 @@ def _closed(block: bytes) -> tuple[Bytes, int]:
 
 
 def _plain_cells(data: Bytes, end: int, delimiter: bytes, hidden: Flags) -> _Found:
-    """Find cells where every delimiter and line end counts, but those that are hidden."""
+    """Find cells with every delimiter and line end, except hidden ones."""
     text = data[MARGIN:end]
     is_mark = (text == delimiter[0]) | (text == _NEWLINE)
     if hidden.size:
@@ -179,7 +179,7 @@ def _plain_cells(data: Bytes, end: int, delimiter: bytes, hidden: Flags) -> _Fou
 
 
 def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
-    """Tell which bytes stand inside quotes; nothing if some quote neither opens, closes nor doubles another."""
+    """Return which bytes are inside quotes; None if some quote neither opens, closes nor doubles another."""
     quotes = np.flatnonzero(data[:end] == _QUOTE)
     opening, closing = quotes[::2], quotes[1::2]
     before, after = data[opening - 1], data[closing + 1]
@@ -201,7 +201,7 @@ def _is_any(text: Bytes, characters: tuple[int, ...]) -> Flags:
 def _quoted_cells(block: bytes, data: Bytes, delimiter: bytes) -> _Found:
     closed = block if block.endswith(b"\n") else block + b"\n"
     found = [(cell.start(), cell.start(1), cell.end()) for cell in _cell_pattern(delimiter).finditer(closed)]
-    # The last match is the empty one at the end of the text.
+    # the last match is the empty one at the end of the text
     starts, ends, after = (np.array(found[:-1], np.int64).reshape(-1, 3) + MARGIN).T
     ends = np.minimum(ends, MARGIN + len(block))
     stops = np.flatnonzero((data[ends] == _NEWLINE) | (after == MARGIN + len(closed))) + 1
@@ -210,14 +210,14 @@ def _quoted_cells(block: bytes, data: Bytes, delimiter: bytes) -> _Found:
 
 @cache
 def _cell_pattern(delimiter: bytes) -> re.Pattern[bytes]:
-    """Match one cell and, as group 1, what ends it; a quote that is never closed reaches to the end of the text."""
+    """Return a pattern for one cell and, as group 1, what ends it; an unclosed quote reaches to the end of the text."""
     mark = re.escape(delimiter)
     quoted = rb'"(?:[^"]++|"")*+(?:"[^' + mark + rb"\n]*+|\Z)"
     return re.compile(rb"(?:" + quoted + rb"|[^" + mark + rb"\n]*+)(" + mark + rb"|\n|\Z)")
 
 
 def _select(data: Bytes, end: int, found: _Found, columns: int, comment: bytes) -> Cells:
-    """Pick the cells of those lines that have the wanted number of them."""
+    """Select the cells of those lines with the expected number of cells."""
     line_starts = np.concatenate([[MARGIN], found.line_ends[:-1]])[: len(found.line_ends)]
     line_ends = np.minimum(found.line_ends, end)
     counts = np.diff(found.stops, prepend=0)
@@ -238,7 +238,7 @@ def _rows_of(found: _Found, rows: Ints, columns: int) -> tuple[Ints, Ints]:
 
 
 def _begins_with(data: Bytes, places: Ints, text: bytes) -> Flags:
-    """Tell at which places the text stands; it is shorter than the margin."""
+    """Return at which offsets the text begins; it is shorter than the margin."""
     same = np.ones(len(places), np.bool_)
     for offset, character in enumerate(text):
         same &= data[places + offset] == character

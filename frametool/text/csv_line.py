@@ -1,6 +1,6 @@
-"""One line of CSV: its cells with the columns they begin at, and back; quoted as RFC 4180 says.
+"""One line of CSV: its cells with their columns, and back; quoted as in RFC 4180.
 
-For lines that come one at a time; blocks of them are the work of `cells`.
+For single lines; `cells` processes blocks of lines.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ _CELL = re.compile(r'(?:[^\S\n]*"((?:[^"]|"")*)"\s*|([^,]*))(?:,|$)')
 
 
 class LineCell(NamedTuple):
-    """The text of a cell without its quotes and the blanks around it, and its first character's column, from 1."""
+    """The text of a cell without its quotes and surrounding blanks, and its first character's column, from 1."""
 
     text: str
     column: int
@@ -31,6 +31,6 @@ def split_line(line: str) -> list[LineCell]:
 
 
 def quoted(text: str) -> str:
-    """Write a cell, in quotes where a reader would split it."""
+    """Write a cell, in quotes if necessary."""
     is_split = "," in text or '"' in text or "\r" in text or "\n" in text
     return '"' + text.replace('"', '""') + '"' if is_split else text

@@ -1,11 +1,11 @@
-"""Floats as the shortest decimals that read back the same, in bulk, and decimals laid out as text, the points aligned.
+"""Floats as the shortest decimals that read back the same, in bulk, and their layout as text, aligned at the point.
 
 For a float of ulp u let 10**k be the power with 1 <= u / 10**k < 10.  The float is scaled by 10**-k to a sum of an
-integer and a fraction, good to about 2**-45; its neighbours' midpoints lie half an ulp away.  A multiple of ten inside
-them is the shortest answer, once its trailing zeros are cut; there is at most one.  Otherwise the nearest integer is.
-What lies closer to a boundary than the error allows is marked unsure and left to `repr`.
-Source: the two candidates are those of Giulietti's Schubfach (2020), sections 8 and 9, with sums of two floats in the
-place of 128-bit integers.
+integer and a fraction, accurate to about 2**-45; its neighbours' midpoints are half an ulp away.  A multiple of ten
+between them is the shortest result, once its trailing zeros are removed; there is at most one.  Otherwise it is the
+nearest integer.  Numbers closer to a boundary than the error are marked unsure and left to `repr`.
+Source: the two candidates are those of Giulietti's Schubfach (2020), sections 8 and 9, with sums of two floats instead
+of 128-bit integers.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Words
 
-# Sizes whose products with the powers, and the errors of these, stay normal floats.
+# numbers whose products with the powers, and the errors of these, are normal floats
 _LEAST, _GREATEST = 1e-270, 1e270
 _MANTISSA = np.int64((1 << 52) - 1)
-# The error of the scaled value is below 2**-45; the margin costs one row in 10**11.
+# the error of the scaled value is below 2**-45; the margin costs one row in 10**11
 _DOUBT = 2.0**-40
-# Numbers of up to fifteen digits are the only ones so short that read as their float.
+# numbers of up to fifteen digits are the only ones this short that read as their float
 _SHORT_DECIMALS = 6
 _GREATEST_SHORT = 1e15
 _PROBE = 32
 
 
 class Decimals(NamedTuple):
-    """Numbers `digits * 10**-places` (n,); `unsure` are the places of those that could not be decided."""
+    """Numbers `digits * 10**-places` (n,); `unsure` are the indices of undecided ones."""
 
     digits: Ints
     places: Ints
@@ -43,9 +43,9 @@ class Decimals(NamedTuple):
 
 
 def shortest_decimals(size: Floats) -> Decimals:
-    """Return the shortest decimals that read back as these floats, which carry no sign.
+    """Return the shortest decimals that read back as these floats, which have no sign.
 
-    Zero, infinity, nan, subnormal and extreme numbers are unsure, too. Digits may end with zeros.
+    Zero, infinity, nan, subnormal and extreme numbers are unsure too. Digits may end with zeros.
     """
     if _are_short(size[:_PROBE]) and _are_short(size):
         digits = np.rint(size * 10.0**_SHORT_DECIMALS).astype(np.int64)
@@ -72,7 +72,7 @@ def _scaled_decimals(size: Floats) -> Decimals:
     sure = np.abs(above_ten - half_ulp) > _DOUBT
     sure &= np.abs(below_ten - half_ulp) > _DOUBT
     sure &= np.abs(fraction - 0.5) > _DOUBT
-    # A power of two has its lower neighbour at half the distance; only an exact decimal is beyond doubt then.
+    # a power of two has its lower neighbour at half the distance; only an exact decimal is certain then
     sure &= ((bits & _MANTISSA) != 0) | (above_ten == 0)
     upwards = below_ten < half_ulp
     nearest = number + (fraction > 0.5)
@@ -97,7 +97,7 @@ def _scale(size: Floats, power: Floats, rest: Floats) -> tuple[Ints, Floats]:
 
 @cache
 def _tables() -> tuple[Floats, Floats, Floats, Ints]:
-    """Tabulate by binary exponent: power of ten that scales, what it lacks, half an ulp scaled, its decimal places."""
+    """Return tables by binary exponent: scaling power of ten, its error, half an ulp scaled, decimal places."""
     rows = [_table_row(exponent) for exponent in range(2048)]
     powers, rests, half_ulps, places = zip(*rows, strict=True)
     return np.array(powers), np.array(rests), np.array(half_ulps), np.array(places, np.int64)
@@ -115,24 +115,24 @@ def _table_row(exponent: int) -> tuple[float, float, float, int]:
 
 WIDTH = 40
 POINT = 15
-# One byte of the fifteen is the sign's.
+# one byte of the fifteen is the sign
 GREATEST_WHOLE = 10**14
 _MINUS = ord("-")
 _POINT_CHARACTER = np.uint64(ord(".") << 56)
 
 
 class Fields:
-    """Rows of WIDTH bytes, seen as five words and as one long array of bytes between two margins.
+    """Rows of WIDTH bytes, as five words and as one long array of bytes between two margins.
 
     bytes  0 .. 14   sign and whole part, right-aligned     0 ..  7, 8 .. 15   two words of characters
     byte  15         the point
     bytes 16 .. 32   fraction, left-aligned                16 .. 23, 24 .. 31, 32 .. 39   three words
-    A number begins where its first digit or sign stands and ends where its last wanted digit does: what stands outside
-    is never shown, so that neither leading nor trailing zeros have to be moved.
+    A number begins at its first digit or sign and ends at its last wanted digit: what is outside is never copied, so
+    that neither leading nor trailing zeros have to be moved.
     """
 
     def __init__(self, rows: int) -> None:
-        """Make room for so many rows; their content is arbitrary until written."""
+        """Allocate rows; their content is arbitrary until written."""
         self.data: Bytes = np.empty(rows * WIDTH + 2 * MARGIN, np.uint8)
         inner = self.data[MARGIN : MARGIN + rows * WIDTH]
         self.words: Words = inner.view("<u8").reshape(rows, WIDTH // 8)
@@ -150,7 +150,7 @@ class Fields:
             self.words[:, 0] = eight_digits(upper)
 
     def write_fraction(self, fraction: Ints, digits: int) -> list[Words]:
-        """Write integers as exactly so many digits (up to 17) after the point; return their words, filled up with 0."""
+        """Write integers as exactly this many digits (up to 17) after the point; return their words, padded with 0."""
         words = []
         rest = fraction
         for left in range(digits, 0, -8):
@@ -162,24 +162,24 @@ class Fields:
         return words
 
     def write_sign(self, starts: Ints, negative: Flags) -> Ints:
-        """Put a minus before each start; return the starts, moved to the minus where it counts."""
+        """Write a minus before each start; return the starts, moved to the minus of negative numbers."""
         self.data[starts - 1] = _MINUS
         return starts - negative
 
     def whole_starts(self, whole: Ints) -> Ints:
-        """Return where the first digits of the whole parts stand in `data`."""
+        """Return the offsets of the first digits of the whole parts in `data`."""
         return self.origins + POINT - count_digits(whole)
 
 
 def _left_digits(numbers: Ints, digits: int) -> Words:
-    """Return the characters of integers of so many digits, filled up with 0 to eight."""
+    """Return the characters of integers of this many digits, padded with 0 to eight."""
     if digits == 1:
         return numbers.view(np.uint64) + ZEROS
     return eight_digits(numbers * 10 ** (8 - digits) if digits < 8 else numbers)
 
 
 def written(values: Floats, separators: bytes, write: Callable[[Floats], Spans]) -> Spans:
-    """Write rows of floats (n, c) by a function for a flat array of them; put its column's separator behind each."""
+    """Write rows of floats (n, c) by a function for a flat array; append its column's separator to each."""
     rows, columns = values.shape
     if len(separators) != columns:
         raise ValueError(f"{columns} columns, but {len(separators)} separators")

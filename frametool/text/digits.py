@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from frametool.text.spans import Floats, Ints, Words
 
 _SPLITTER = 134217729.0
-# Beyond these exponents a product or its error leaves the range of normal floats.
+# beyond these exponents a product or its error leaves the range of normal floats
 LEAST_POWER, GREATEST_POWER = -290, 290
 TENS: Ints = 10 ** np.arange(19, dtype=np.int64)
 
 
 def halves(value: Floats) -> tuple[Floats, Floats]:
-    """Split floats into two of 26 bits each whose sum they are; |value| below 1e300."""
+    """Split floats into two of 26 bits each, whose sum they are; |value| below 1e300."""
     stretched = value * _SPLITTER
     high = stretched - (stretched - value)
     return high, value - high
 
 
 def product_error(a: tuple[Floats, Floats], b: tuple[Floats, Floats], product: Floats) -> Floats:
-    """Return what the rounded product of two floats, given as their halves, lacks to the exact one."""
+    """Return the error of the rounded product of two floats, which are passed as their halves."""
     (a_high, a_low), (b_high, b_low) = a, b
     error = a_high * b_high
     error -= product
@@ -42,7 +42,7 @@ def product_error(a: tuple[Floats, Floats], b: tuple[Floats, Floats], product: F
 
 @cache
 def power_of_ten(exponent: int) -> tuple[float, float]:
-    """Return 10**exponent as a float and the float nearest to what it lacks."""
+    """Return 10**exponent as a float, and the float nearest to its error."""
     above, below = (10**exponent, 1) if exponent >= 0 else (1, 10**-exponent)
     high = above / below
     numerator, denominator = high.as_integer_ratio()
@@ -51,7 +51,7 @@ def power_of_ten(exponent: int) -> tuple[float, float]:
 
 @cache
 def powers_of_ten() -> tuple[Floats, Floats]:
-    """Tabulate `power_of_ten` from LEAST_POWER to GREATEST_POWER: the powers and what they lack."""
+    """Return a table of `power_of_ten` from LEAST_POWER to GREATEST_POWER: the powers and their errors."""
     table = np.array([power_of_ten(exponent) for exponent in range(LEAST_POWER, GREATEST_POWER + 1)])
     return np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1])
 
@@ -68,7 +68,7 @@ _ONES_AND_TEN_THOUSANDS = np.uint64(1 + (10000 << 32))
 
 
 def read_eight_digits(digits: Words) -> Words:
-    """Return the numbers that words of eight digit values (characters ^ ZEROS) write.
+    """Return the numbers in words of eight digit values (characters ^ ZEROS).
 
     Source: three multiplications, Lemire 2018.
     """
@@ -85,7 +85,7 @@ def read_eight_digits(digits: Words) -> Words:
 
 
 def not_digits(digits: Words) -> Words:
-    """Return words that are zero where all eight digit values are 0 to 9."""
+    """Return words that are zero if all eight digit values are 0 to 9."""
     beyond = digits + _ABOVE_NINE
     beyond |= digits
     beyond &= _HIGH
@@ -93,12 +93,12 @@ def not_digits(digits: Words) -> Words:
 
 
 def first_point(characters: Words) -> Ints:
-    """Return the place, 0 to 7, of the first point in words of eight characters; 8 if there is none."""
+    """Return the index, 0 to 7, of the first point in words of eight characters; 8 if there is none."""
     others = characters ^ _POINTS
     found = others - _ONES
     found &= ~others
     found &= _HIGH
-    # The bits below the lowest one set: the highest of each byte before it; those of all eight if none is set.
+    # the bits below the lowest set bit: the highest of each byte before it; those of all eight if none is set
     below = (~found & (found - np.uint64(1))) >> np.uint64(7) & _ONES
     below *= _ONES  # the highest byte is their sum
     return (below >> np.uint64(56)).view(np.int64)
@@ -106,7 +106,7 @@ def first_point(characters: Words) -> Ints:
 
 @cache
 def _four_digits() -> tuple[Words, Words]:
-    """Tabulate the characters 0000 .. 9999, once in the lower and once in the upper half of a word."""
+    """Return tables of the characters 0000 .. 9999 in the lower and in the upper half of a word."""
     characters = b"".join(b"%04d" % number for number in range(10000))
     low = np.frombuffer(characters, "<u4").astype(np.uint64)
     return low, low << np.uint64(32)
@@ -132,10 +132,10 @@ def count_digits(numbers: Ints) -> Ints:
 
 
 def significant_digits(words: Sequence[Words]) -> Ints:
-    """Count the digits of numbers in words of characters up to their last one that is not 0.
+    """Count the digits of numbers in words of characters up to their last non-zero one.
 
-    A word's highest byte that is not 0 is found in the exponent of the word as a float: digits are below 16, so that
-    rounding never reaches the next byte. The float 0 has the exponent -1023, which no other word is below.
+    A word's highest non-zero byte follows from the exponent of the word as a float: digits are below 16, so that
+    rounding never reaches the next byte. The float 0 has the exponent -1023, below that of any other word.
     """
     last = np.full(words[0].shape, -1, np.int64)
     for index, word in enumerate(words):

@@ -1,7 +1,6 @@
 """Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces.
 
-Knows nothing of what lines hold, nor of numpy, so that a tool
-which sees only a few lines stays light.
+Does not interpret lines and does not import numpy, so that commands with only a few lines start fast.
 """
 
 from __future__ import annotations
@@ -20,18 +19,18 @@ if TYPE_CHECKING:
     from io import BufferedIOBase
     from typing import TypeAlias
 
-    ByteStream: TypeAlias = BufferedIOBase  # `read1` gives what has arrived, and waits only while there is nothing
+    ByteStream: TypeAlias = BufferedIOBase  # `read1` returns what has arrived, and blocks only if nothing has
 
 
-# A piece this large was not typed: more is on its way, and waiting a moment for it saves much work per block. But
-# nothing that has arrived is kept back for longer than the second number.
+# a piece this large was not typed: more follows, and a short wait for it saves much work per block; but nothing that
+# has arrived is held back for longer than the second number
 BULK_BYTES = 1 << 14
 _PATIENCE_MS = 5
 _LONGEST_WAIT_S = 0.02
 
 
 def whole_lines(text: bytes) -> int:
-    """Return how many bytes of the text are whole lines."""
+    """Return the number of bytes of the text in complete lines."""
     return text.rfind(b"\n") + 1
 
 
@@ -42,10 +41,10 @@ def read_blocks(
 ) -> Iterator[bytes]:
     """Yield blocks of whole lines, in order; only the very last may lack its line end.
 
-    A block has `sizes.BLOCK` bytes when the stream delivers as fast as they are taken.
-    whole: how many bytes of a text are finished records; for records of several lines. A negative number: so many
-    bytes are the beginning of a record that goes on behind them, and need not be looked at again.
-    Raises FormatError if one record is longer than `sizes.RECORD`, however the stream was cut.
+    A block has `sizes.BLOCK` bytes if the stream delivers as fast as they are processed.
+    whole: returns the number of bytes in complete records, for records of several lines; negative: that many bytes
+        begin a record that continues after them, and need not be scanned again.
+    Raises FormatError if one record is longer than `sizes.RECORD`, independent of the pieces of the stream.
     """
     size, longest = sizes.BLOCK, sizes.RECORD
     ready = _readiness(stream)
@@ -91,7 +90,7 @@ def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> 
 
 
 def _readiness(stream: ByteStream) -> Callable[[int], bool]:
-    """Return a function that tells whether more comes within so many milliseconds; False if it cannot tell."""
+    """Return a function that returns True if more arrives within this many milliseconds; False if unknown."""
     import select
 
     try:
@@ -103,10 +102,10 @@ def _readiness(stream: ByteStream) -> Callable[[int], bool]:
 
 
 class Pieces(RawIOBase):
-    """Bytes that an iterator yields, as a stream; no piece is empty."""
+    """The bytes from an iterator, as a stream; no piece is empty."""
 
     def __init__(self, pieces: Iterator[bytes], source: Any = None) -> None:
-        """Take the pieces, and what is closed behind the last."""
+        """Store the pieces, and the source to close after the last."""
         self._pieces = pieces
         self._source = source
         self._rest = b""
@@ -116,27 +115,27 @@ class Pieces(RawIOBase):
         return True
 
     def fileno(self) -> int:
-        """Return the number of the file that the pieces are of."""
+        """Return the file descriptor of the pieces."""
         return int(self._source.fileno())
 
     def readinto(self, buffer: Any) -> int:
-        """Fill a buffer with what fits of the next piece; 0 at the end."""
+        """Fill a buffer from the next piece; 0 at the end."""
         self._rest = self._rest or next(self._pieces, b"")
         size = min(len(self._rest), len(buffer))
         buffer[:size], self._rest = self._rest[:size], self._rest[size:]
         return size
 
     def close(self) -> None:
-        """Close the source too; standard input stays open."""
+        """Close the source too; standard input remains open."""
         if self._source is not None and self._source is not getattr(sys.stdin, "buffer", None):
             self._source.close()
         super().close()
 
 
 def arrived(stream: BufferedReader, is_enough: Callable[[bytes], bool], most: int) -> BufferedReader:
-    """Wait until a pipe has brought enough to tell its form, and return a stream that shows it at the first look.
+    """Wait until a pipe has delivered enough to detect its format, and return a stream that allows peeking at it.
 
-    is_enough: judges the bytes so far; most: bytes after which nothing is waited for
+    is_enough: judges the bytes so far; most: the number of bytes after which it stops waiting
     """
     if is_enough(stream.peek()):
         return stream

@@ -1,8 +1,8 @@
 """Numbers, lengths and angles as people write them: knows text, knows no document.
 
-A number is what YAML 1.2 and JSON call one (`1e-3`, `-.5`, `5.`, `010` is ten); what YAML 1.1 would add (base 60,
-octal, hexadecimal, underscores) is refused with the reason.  Units stand behind numbers and in the names of columns:
-`2cm`, `x_mm`, `yaw [deg]`; an angle may also be a multiple of pi.
+A number is one of YAML 1.2 and JSON (`1e-3`, `-.5`, `5.`, `010` is ten); the additions of YAML 1.1 (base 60,
+octal, hexadecimal, underscores) are refused with the reason.  Units follow numbers and names of columns: `2cm`,
+`x_mm`, `yaw [deg]`; an angle may also be a multiple of pi.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    Angle: TypeAlias = tuple[float, str | None]  # value; "deg", "rad", or None where the text does not say
+    Angle: TypeAlias = tuple[float, str | None]  # value; "deg", "rad", or None if the text has no unit
 
-LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # how many make a metre
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 100.0, "mm": 1000.0, "um": 1e6}  # units per metre
 ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False, "radian": False, "radians": False}
 BRACKETS = r"(?<!\s)\s*+[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 
 
 # float() reads more than a decimal number (blanks, underscores, nan, other scripts' digits), but nothing else of these
 _DECIMAL_CHARACTERS = "0123456789.-+eE"
-_strip = str.strip  # what is no text is a TypeError
+_strip = str.strip  # raises TypeError for anything but text
 _INFINITE = float("inf")
-# possessive: digits are never shared out in another way, which would take time that grows with their square
+# possessive: no backtracking, which would need quadratic time
 _DECIMAL = r"(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?+[0-9]++)?+"
-# patterns are compiled when first needed, not at start-up: most texts are plain numbers
+# patterns are compiled at first use, not at start-up: most texts are plain numbers
 _WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
 _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _BARE_STAR = r"[-+]? ?\*"
@@ -41,7 +41,7 @@ _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 
 
 class NotFinite(ValueInvalid):
-    """Report nan, inf, or a number beyond the range of doubles."""
+    """A number that is nan, inf, or beyond the range of doubles."""
 
     rule = "not-finite"
 
@@ -49,7 +49,7 @@ class NotFinite(ValueInvalid):
 def parse_number(text: str) -> float:
     """Read a finite decimal number, correctly rounded.
 
-    Raises ValueInvalid with a message that quotes the text and says what is wrong with it.
+    Raises ValueInvalid with a message that quotes the text and the reason.
     """
     if not _strip(text, _DECIMAL_CHARACTERS):
         try:
@@ -65,8 +65,8 @@ def parse_number(text: str) -> float:
 def parse_angle(text: str) -> Angle:
     """Read an angle: a number, `90deg`, `90 deg`, `90°`, `1.57rad`, `pi/2`, `-3pi/4`, `2*pi`.
 
-    Returns the value and its unit "deg" or "rad", or None where the text does not say.
-    Multiples of pi come back in degrees: pi/2 is (90.0, "deg"), so that quarter turns stay exact.
+    Returns the value and its unit "deg" or "rad", or None if the text has no unit.
+    Multiples of pi are returned in degrees: pi/2 is (90.0, "deg"), so that quarter turns are exact.
     Raises ValueInvalid.
     """
     if not _strip(text, _DECIMAL_CHARACTERS):
@@ -111,7 +111,7 @@ def parse_lengths(text: str) -> tuple[float, ...]:
 
 
 def parse_fractions(text: str) -> list[float]:
-    """Read a fraction, several between commas, or START:STOP:STEP, whose steps are those of decimals."""
+    """Read a fraction, several separated by commas, or START:STOP:STEP with decimal steps."""
     if ":" not in text:
         return [parse_number(each.strip()) for each in text.split(",")]
     from decimal import Decimal
@@ -129,14 +129,14 @@ def parse_fractions(text: str) -> list[float]:
 
 
 def number_or_none(text: str) -> float:
-    """Read a number, nan where there is no text; raises ValueInvalid."""
+    """Read a number, nan for an empty text; raises ValueInvalid."""
     return parse_number(text) if text else math.nan
 
 
 def read_number_or_angle(
     text: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: it is no angle
 ) -> float:
-    """Read a cell: a plain number, or what may say its own unit, an angle in degrees or radians, a length in metres.
+    """Read a cell: a plain number, or one with a unit, an angle in degrees or radians, a length in metres.
 
     Raises ValueInvalid.
     """
@@ -149,7 +149,7 @@ def read_number_or_angle(
 
 
 def _refusal(text: str, message: str) -> ValueInvalid:
-    """Return NotFinite for nan, inf and what no double holds, ValueInvalid for anything else that is not a number."""
+    """Return NotFinite for nan, inf and numbers beyond doubles, ValueInvalid for anything else that is not a number."""
     return NotFinite(message) if _reason(text) == _NOT_FINITE else ValueInvalid(message)
 
 
@@ -165,12 +165,12 @@ def _degrees_of_pi(text: str, sign: str, factor: str | None, divisor: str | None
 
 
 def explain_number(text: str) -> str:
-    """Say why a text is no number, and what to write instead."""
+    """Return why a text is not a number, and what to write instead."""
     return f"{shown(text)} {_reason(text)}"
 
 
 def explain_angle(text: str) -> str:
-    """Say why a text is no angle, and what to write instead."""
+    """Return why a text is not an angle, and what to write instead."""
     reason = _reason(text)
     if reason in {_UNKNOWN, _UNIT, _ANGLE} and re.search("deg|rad|pi|°|π", text, re.IGNORECASE):
         reason = "is not an angle; write a number, 90deg, 1.57rad or pi/2"
@@ -182,7 +182,7 @@ def explain_angle(text: str) -> str:
 _UNKNOWN = "is not a number"
 _NO_LENGTH = "is not a length; write metres, or a unit: 2cm, 20mm, 0.02m"
 def half_unit(text: str) -> float:
-    """Return half a unit of the last digit that a number is written with; 0 without a point: such a number is exact."""
+    """Return half a unit of the last written digit of a number; 0 without a point: such a number is exact."""
     digits, _, exponent = text.strip(" \t\"'").lower().partition("e")
     _, point, decimals = digits.partition(".")
     return 0.5 * 10.0 ** min(int(exponent or 0) - len(decimals), 300) if point and decimals.isdigit() else 0.0
@@ -193,7 +193,7 @@ _ANGLE = "is an angle with a unit where a bare number is expected"
 
 
 def _reason(text: str) -> str:
-    """Find the first of the known mistakes in a text that is no number."""
+    """Return the first known mistake in a text that is not a number."""
     if odd := odd_characters(text):
         return f"has {odd}"
     return next((reason for pattern, reason in _MISTAKES if re.fullmatch(pattern, text, _LOOSELY)), _UNKNOWN)
@@ -222,9 +222,9 @@ _MISTAKES = (
 
 
 def odd_characters(text: str) -> str:
-    """Name the first character that looks like another one: odd minus signs, wide digits, invisible blanks.
+    """Return a description of the first look-alike character: minus signs, wide digits, invisible blanks.
 
-    Returns "" where there is none.
+    Returns "" if there is none.
     """
     odd = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not c.isprintable())), None)
     if odd is None:

@@ -1,9 +1,9 @@
-"""Text to floats in bulk, every one rounded as Python's `float` rounds it; and floats of seconds to nanoseconds.
+"""Text to floats in bulk, each rounded like Python's `float`; and floats of seconds to nanoseconds.
 
-The common cell, a sign, up to eight digits, a point and up to 24 digits, is read in words of eight characters; blanks
-around it and an exponent cost a second look. Where the result is too near to the middle of two floats, where the cell
-is longer, or is no number, Python's own reader decides. Source of the exact division: Clinger 1990.
-Seconds are those of the decimal that a float prints as, not of its last bit: 1700000000.1 is 1700000000100000000 ns.
+The common cell (a sign, up to eight digits, a point and up to 24 digits) is read in words of eight characters; blanks
+around it and an exponent need a second pass. Python's own reader decides if the result is too near to the middle of
+two floats, or if the cell is longer or not a number. Source of the exact division: Clinger 1990.
+Seconds are those of a float's shortest decimal, not of its last bit: 1700000000.1 is 1700000000100000000 ns.
 """
 
 from __future__ import annotations
@@ -38,29 +38,29 @@ if TYPE_CHECKING:
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
 _MOST_WORDS = 3
 _EXACT = 1 << 53
-# Results are good to 2**-100; what the rounding dropped may be off by this share of itself and still be decided.
+# results are accurate to 2**-100; rounding may be off by this share of itself and still be decided
 _DOUBT = 1.0 + 2.0**-30
-# With these exponents neither a product nor its error leaves the range of normal floats.
+# with these exponents neither a product nor its error leaves the range of normal floats
 _GREATEST_EXPONENT = 240
 _MINUS, _PLUS, _SMALL_E = b"-+e"
 _LOWER_CASE = 0x20
-# The lowest 0 .. 8 bytes of a word.
+# the lowest 0 .. 8 bytes of a word
 LOWEST = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
 
 
 class _Mantissa(NamedTuple):
-    """Integers `whole * 10**(8 * words - 8) + tail` of cells read as so many words after the point."""
+    """Integers `whole * 10**(8 * words - 8) + tail` of cells read as this many words after the point."""
 
     whole: Ints
     tail: Ints
     words: int
 
 
-LONGEST_MEANT = 32  # of longer ones no digit counts that is left out
+LONGEST_MEANT = 32  # digits beyond this length do not matter
 
 
 def half_units(cells: Spans) -> Floats:
-    """Return half a unit of the last digit that each number (n,) is written with, as `half_unit` does of one."""
+    """Return half a unit of the last written digit of each number (n,), as `half_unit` does for one."""
     starts, ends = trimmed(cells.data, cells.starts, cells.ends)
     texts = windows(cells.data, LONGEST_MEANT)[starts].view(np.uint8).reshape(-1, LONGEST_MEANT)
     inside = np.arange(LONGEST_MEANT) < (ends - starts)[:, None]
@@ -75,19 +75,19 @@ def half_units(cells: Spans) -> Floats:
 def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
     """Read cells as floats.
 
-    Accepted are plain decimal numbers, `[+-] digits [. digits] [e [+-] digits]`, with blanks or tabs around them;
-    neither nan, inf, hexadecimals, underscores nor what is beyond the range of floats.
-    Returns the values, in the cells' shape, and the places of the bad ones in order, counted in the flattened
+    Accepts plain decimal numbers, `[+-] digits [. digits] [e [+-] digits]`, with blanks or tabs around them;
+    neither nan, inf, hexadecimals, underscores nor numbers beyond the range of floats.
+    Returns the values, in the cells' shape, and the indices of the bad ones in order, in the flattened
     cells; a bad one's value is nan.
     """
     starts, ends = cells.starts.ravel(), cells.ends.ravel()
-    # Where the first cell begins with a blank, all but a few do.
+    # if the first cell begins with a blank, nearly all do
     if starts.size and _is_blank(cells.data[starts[:1]])[0]:
         starts, ends = trimmed(cells.data, starts, ends)
     values, sure = _parse_plain(cells.data, starts, ends)
     rest = np.flatnonzero(~sure)
     if rest.size:
-        # What overflows is undecided, and read singly.
+        # overflows are undecided, and read singly
         with np.errstate(over="ignore", invalid="ignore"):
             values[rest], sure = _parse_decorated(cells.data, starts[rest], ends[rest])
         rest = rest[~sure]
@@ -137,7 +137,7 @@ def _after_sign(data: Bytes, starts: Ints) -> tuple[Ints, Flags]:
 
 
 def trimmed(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints]:
-    """Leave out the blanks and tabs around cells."""
+    """Remove the blanks and tabs around cells."""
     while (blank := _is_blank(data.take(starts)) & (starts < ends)).any():
         starts = starts + blank
     while (blank := _is_blank(data.take(ends - 1)) & (starts < ends)).any():
@@ -153,7 +153,7 @@ def _is_blank(characters: Bytes) -> Flags:
 def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:
     """Find an `e` followed by up to four characters, and read these.
 
-    Returns the ends of what stands before it, the exponents (0 without an e) and which of them are numbers in range.
+    Returns the ends of the text before it, the exponents (0 without an e) and which of them are numbers in range.
     """
     stops = ends
     for behind in (2, 3, 4, 5):
@@ -169,7 +169,7 @@ def _split_exponent(data: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, 
 
 
 def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Flags]:
-    """Read unsigned decimals as integers of whole words, and tell which of them are sure."""
+    """Read unsigned decimals as integers of whole words, and return which of them are certain."""
     characters = windows(data, 8)[starts].view("<u8")
     length = ends - starts
     before = np.minimum(first_point(characters), length)
@@ -190,7 +190,7 @@ def _read_mantissa(data: Bytes, starts: Ints, ends: Ints) -> tuple[_Mantissa, Fl
 
 
 def _fraction_digits(data: Bytes, starts: Ints, length: Ints, words: int) -> list[Words]:
-    """Take so many words of digit values; those beyond the cell's end are 0."""
+    """Return this many words of digit values; those beyond the cell's end are 0."""
     characters = windows(data, 8 * words)[starts].view("<u8").reshape(-1, words)
     digits = []
     for word in range(words):
@@ -201,7 +201,7 @@ def _fraction_digits(data: Bytes, starts: Ints, length: Ints, words: int) -> lis
 
 
 def _tail(words: list[Words]) -> Ints:
-    """Return the integer that the words after the first fraction word write, below 10**16."""
+    """Return the integer in the words after the first fraction word, below 10**16."""
     total = np.zeros(1, np.uint64)
     for word in words:
         total = total * np.uint64(10**8) + read_eight_digits(word)
@@ -209,7 +209,7 @@ def _tail(words: list[Words]) -> Ints:
 
 
 def _scale(mantissa: _Mantissa, power: Floats, rest: Floats, sure: Flags) -> Floats:
-    """Multiply by a power of ten, itself a sum of two floats; clear `sure` where the last bit is in doubt."""
+    """Multiply by a power of ten, itself a sum of two floats; clear `sure` where the last bit is uncertain."""
     high, low = _as_two_floats(mantissa)
     product = high * power
     error = product_error(halves(high), halves(power), product)
@@ -224,7 +224,7 @@ def _scale(mantissa: _Mantissa, power: Floats, rest: Floats, sure: Flags) -> Flo
 
 
 def _as_two_floats(mantissa: _Mantissa) -> tuple[Floats, Floats]:
-    """Return the mantissa as the sum of a float and what that lacks."""
+    """Return the mantissa as the sum of a float and its error."""
     high, low = _split_integer(mantissa.whole)
     if mantissa.words == 1:
         return high, low
@@ -244,15 +244,15 @@ def _split_integer(numbers: Ints) -> tuple[Floats, Floats]:
     return high, (numbers - high.astype(np.int64)).astype(np.float64)
 
 
-NINE = 9  # decimals of a second that nanoseconds have
+NINE = 9  # decimals of a second in nanoseconds
 MOST = np.iinfo(np.int64).max
 FURTHEST = float(MOST // BILLION)  # seconds
 
 
 def nanoseconds_of(seconds: Floats) -> tuple[Ints, Flags]:
-    """Return seconds (n,) in whole nanoseconds, and which of them are none: not finite, or beyond 64 bits.
+    """Return seconds (n,) in whole nanoseconds, and which of them are invalid: not finite, or beyond 64 bits.
 
-    What is finer than a nanosecond is rounded, halves to even.
+    Fractions of a nanosecond are rounded, halves to even.
     """
     size = np.abs(seconds)
     none = ~(size < FURTHEST)

@@ -1,11 +1,11 @@
-r"""A line as a shell would take it apart: words, quotes, comments, and names whose values stand in for them.
+r"""A line parsed like in a shell: words, quotes, comments, and variables.
 
     lookup 'my robot.yaml' map "base link"  # a comment
     compose $base_from_tool "inv(${map_from_base})" \
         '{xyz: [1, 2, 3]}'
 
-In single quotes all is as written; in double quotes and bare `$NAME` is replaced, `\` takes the next character as it
-is, and `$$` is one dollar sign.  What only a shell can do is refused, not taken for text.
+Single quotes are literal; in double quotes and outside `$NAME` is replaced, `\` escapes the next character,
+and `$$` is one dollar sign.  Features of a real shell are refused, not taken for text.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _INSTEAD = {
 
 
 def _tokens(line: str) -> Iterator[tuple[re.Match[str], bool]]:
-    """Yield the tokens of a line up to a comment, each with whether a word begins there."""
+    """Yield the tokens of a line up to a comment, each with whether it begins a word."""
     begins = True
     for token in _TOKEN.finditer(line):
         if begins and token[0] == "#":
@@ -58,19 +58,19 @@ def has_words(line: str) -> bool:
 
 
 def goes_on(line: str) -> bool:
-    """Return True for a line that ends in a backslash which no other one takes and which is in no comment."""
+    """Return True for a line that ends in a backslash, which is neither escaped nor in a comment."""
     backslashes = len(line) - len(line.rstrip("\\"))
     return backslashes % 2 == 1 and any(token.end() == len(line) for token, _ in _tokens(line))
 
 
 def pipeline(line: str) -> list[str]:
-    """Return the commands of a line between its bars."""
+    """Return the commands of a line separated by bars."""
     bars = [token.start() for token, _ in _tokens(line) if token[0] == "|"]
     return [line[begin + 1 : end] for begin, end in pairwise([-1, *bars, len(line)])]
 
 
 def split(line: str, value_of: Callable[[str], str]) -> list[str]:
-    """Return the words of a line with the values of names in them; raise Misused for what cannot be taken."""
+    """Return the words of a line with variables replaced; raise Misused for what cannot be parsed."""
     words: list[str] = []
     for token, begins in _tokens(line):
         kind = token.lastgroup or ""
@@ -83,20 +83,20 @@ def split(line: str, value_of: Callable[[str], str]) -> list[str]:
 
 
 def _text(kind: str, text: str, value_of: Callable[[str], str], *, begins: bool = False) -> str:
-    """Return what a token stands for."""
+    """Return the text of a token."""
     if kind == "double":
         return _IN_QUOTES.sub(lambda each: _text(each.lastgroup or "", each[each.lastgroup or ""], value_of), text)
     if kind == "dollar":
         return _dollar(text, value_of)
     if kind == "special":
         raise Misused(f"{text} is for a shell: {_INSTEAD[text]}; in quotes it is text")
-    if kind == "quoted":  # a backslash in double quotes stays before what needs none
+    if kind == "quoted":  # a backslash in double quotes is literal before other characters
         return text if text in '$`"\\' else f"\\{text}"
     return os.path.expanduser(text) if kind == "plain" and begins and text.startswith("~/") else text
 
 
 def _dollar(text: str, value_of: Callable[[str], str]) -> str:
-    """Return what a dollar sign and what follows it stand for."""
+    """Return the text for a dollar sign and what follows it."""
     behind = text[1:]
     bare = behind[1:-1] if behind.startswith("{") else behind
     if re.fullmatch(NAME, bare):

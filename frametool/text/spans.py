@@ -1,7 +1,7 @@
-"""Stretches of text inside one byte array, and joining many of them into one block; the kinds of arrays of `text`.
+"""Ranges of text in one byte array, and joining many of them into one block; the array types of `text`.
 
-A span is a start and an end in `data`; columns of text are arrays of spans, so that text which only passes through is
-never decoded. Knows nothing of what the text means.
+A span is a start and an end in `data`; columns of text are arrays of spans, so that unchanged text is never decoded.
+Does not interpret text.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Around every span this many bytes of `data` may be read, whatever they hold: copies go by whole windows.
+# around every span this many bytes of `data` may be read, whatever they are: copies use whole windows
 MARGIN = 64
-# Windows of one batch stay in the second-level cache.
+# windows of one batch fit into the second-level cache
 _BATCH_BYTES = 1 << 17
 
 
 class Spans(NamedTuple):
-    """Text as places in `data`: `data[starts[i] : ends[i]]`; starts and ends have one shape, rows first."""
+    """Text as ranges in `data`: `data[starts[i] : ends[i]]`; starts and ends have one shape, rows first."""
 
     data: Bytes
     starts: Ints
@@ -33,23 +33,23 @@ class Spans(NamedTuple):
 
 
 def framed(block: bytes | bytearray | memoryview) -> Bytes:
-    """Copy a block into an array with MARGIN zero bytes before and after it: offset i stands at MARGIN + i."""
+    """Copy a block into an array with MARGIN zero bytes before and after it: offset i is at MARGIN + i."""
     data = np.zeros(len(block) + 2 * MARGIN, np.uint8)
     data[MARGIN : MARGIN + len(block)] = np.frombuffer(block, np.uint8)
     return data
 
 
 def windows(data: Bytes, width: int) -> np.ndarray:
-    """View `data` as all its overlapping stretches of `width` bytes, each one item: `[i]` begins at i."""
+    """View `data` as all its overlapping ranges of `width` bytes, each one item: `[i]` begins at i."""
     return np.ndarray((len(data) - width + 1,), f"V{width}", data, 0, (1,))
 
 
 def join(columns: Sequence[Spans]) -> bytes:
-    """Write the spans of each row one after the other, row after row.
+    """Write the spans of each row one after another, row after row.
 
-    columns: spans of shape (n,) or (n, c), all with the same n; nothing is put between them.
-    Every span is copied as a window of one width, in order, so that each one covers what its predecessor
-    wrote beyond its end; the few spans longer than MARGIN are then copied by themselves.
+    columns: spans of shape (n,) or (n, c), all with the same n; nothing is inserted between them.
+    Every span is copied as a window of one width, in order, so that each one overwrites what its predecessor wrote
+    beyond its end; the few spans longer than MARGIN are then copied one by one.
     """
     parts = [_as_columns(part) for part in columns]
     lengths = np.concatenate([part.ends - part.starts for part in parts], axis=1)
@@ -94,9 +94,9 @@ def _copy_long(out: Bytes, places: Ints, parts: Sequence[Spans], width: int) -> 
         first += part.starts.shape[1]
 
 
-# Let the C library keep freed memory instead of giving it back to the system after every block: freeing one large
-# untouched allocation raises glibc's thresholds for that (mallopt(3), M_MMAP_THRESHOLD: dynamic).  Without it each
-# temporary array is paid for in page faults: 119 instead of 28 ns a float were measured.
+# make the C library keep freed memory instead of returning it to the system after every block: freeing one large
+# unused allocation raises glibc's thresholds for that (mallopt(3), M_MMAP_THRESHOLD: dynamic); without it each
+# temporary array costs page faults: 119 instead of 28 ns per float were measured
 np.empty(1 << 24, np.uint8)
 
 

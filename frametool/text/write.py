@@ -1,6 +1,6 @@
 """Floats to text in bulk: the shortest that reads back the same, or a fixed number of decimals.
 
-Byte for byte as `repr` and `{:z.{precision}f}` write them; floats of 32 bits as the shortest that reads back to these.
+The same bytes as `repr` and `{:z.{precision}f}`; for floats of 32 bits the shortest text that reads back to them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from frametool.text.spans import Spans
 if TYPE_CHECKING:
     from frametool.text.spans import Bytes, Flags, Floats, Ints, Words
 
-# repr writes an exponent below the first and from the second on; between GREATEST_WHOLE and there Python does it.
+# repr writes an exponent below the first and from the second on; Python writes numbers between GREATEST_WHOLE and it
 _LEAST_PLAIN = 1e-4
 _LEAST_POWER = 1e16
 _MOST_DIGITS = 17
@@ -57,7 +57,7 @@ def _all_spans(flat: Floats) -> Spans:
 
 
 def _unusual(size: Floats, unsure: Ints) -> tuple[Ints, Ints]:
-    """Return the places written with an exponent, and those left to Python."""
+    """Return the indices of numbers written with an exponent, and those left to Python."""
     single = unsure[size[unsure] != 0]
     inner = size[size != 0] if not size.all() else size
     if inner.min(initial=1) >= _LEAST_PLAIN and inner.max(initial=1) < GREATEST_WHOLE:
@@ -70,7 +70,7 @@ def _unusual(size: Floats, unsure: Ints) -> tuple[Ints, Ints]:
 
 
 def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
-    """Cut numbers at the point. A whole part is never rounded up: an integer in reach would be the float itself."""
+    """Split numbers at the point. A whole part is never rounded up: an integer in reach would be the float itself."""
     whole = size.astype(np.int64)
     digits, places = decimals.digits, decimals.places
     fraction = digits - whole * TENS.take(places, mode="clip")
@@ -80,7 +80,7 @@ def _plain_parts(size: Floats, decimals: Decimals) -> _Parts:
 
 
 def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
-    """Rewrite those with an exponent to one digit before the point; return their exponents."""
+    """Convert numbers with an exponent to one digit before the point; return their exponents."""
     digits, places = decimals.digits[powered], decimals.places[powered]
     behind = count_digits(digits) - 1
     scale = TENS.take(behind)
@@ -92,7 +92,7 @@ def _power_parts(parts: _Parts, decimals: Decimals, powered: Ints) -> Ints:
 
 
 def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
-    """Write all parts; return where each number starts, without its sign, and ends."""
+    """Write all parts; return the start of each number, without its sign, and its end."""
     fields.write_whole(parts.whole)
     shown = significant_digits(fields.write_fraction(parts.fraction, _MOST_DIGITS))
     starts = fields.whole_starts(parts.whole)
@@ -104,7 +104,7 @@ def _write(fields: Fields, parts: _Parts) -> tuple[Ints, Ints]:
 
 
 def _write_exponents(fields: Fields, ends: Ints, powered: Ints, exponents: Ints) -> None:
-    """Put the exponents behind their numbers; over the point and the 0 behind it, if nothing else follows the point."""
+    """Append the exponents to their numbers; they overwrite the point and the 0 after it if nothing else follows."""
     rows, lengths = _exponent_texts()
     begins = ends[powered]
     is_whole = (begins == fields.origins[powered] + POINT + 2) & (fields.data[begins - 1] == ord("0"))
@@ -117,20 +117,20 @@ def _write_exponents(fields: Fields, ends: Ints, powered: Ints, exponents: Ints)
 
 @cache
 def _small_prefixes() -> Words:
-    """Tabulate the word before the first digit that counts: `0.`, `0.0`, `0.00`, .."""
+    """Return a table of the word before the first significant digit: `0.`, `0.0`, `0.00`, .."""
     texts = [("0." + "0" * zeros).rjust(8) for zeros in range(6)]
     return np.frombuffer("".join(texts).encode(), "<u8")
 
 
 @cache
 def _exponent_texts() -> tuple[Bytes, Ints]:
-    """Tabulate `e-330` .. `e+330` as rows of five bytes, with their lengths."""
+    """Return a table of `e-330` .. `e+330` as rows of five bytes, with their lengths."""
     texts = [f"e{exponent:+03d}" for exponent in range(-_MOST_EXPONENT, _MOST_EXPONENT + 1)]
     rows = np.frombuffer("".join(text.ljust(5) for text in texts).encode(), np.uint8).reshape(-1, 5)
     return rows, np.array([len(text) for text in texts])
 
 
-_DIGITS = (6, 7, 8, 9)  # six always differ from one float to the next, nine always tell them apart
+_DIGITS = (6, 7, 8, 9)  # neighbouring floats always differ in six digits, nine always identify them
 _LEAST, _GREATEST = 1e-12, 1e20  # between them the power of ten is exact
 
 
@@ -138,7 +138,7 @@ def rounded_to_single(values: Floats) -> Floats:
     """Return the doubles with the fewest digits that are the same floats of 32 bits.
 
     values: any shape; each is rounded to 32 bits first.  Their shortest text as doubles is then the shortest text
-    that a reader of 32 bits takes for the same float.  What is not finite stays.
+    that a 32-bit reader takes for the same float.  Values that are not finite are unchanged.
     """
     single = values.astype(np.float32)
     exact = single.astype(np.float64).ravel()
@@ -161,15 +161,15 @@ def rounded_to_single(values: Floats) -> Floats:
     return found.reshape(values.shape)
 
 
-# Below this every scaled value and its nearest integer are exact.
+# below this every scaled value and its nearest integer are exact
 _GREATEST_SCALED = 9e15
-# A product is off by half an ulp of itself; twice that is safe.
+# a product is off by half an ulp of itself; twice that is safe
 _DOUBT = 2.0**-52
 _MOST_DECIMALS = 15
 
 
 def fixed_spans(values: Floats, precision: int, separators: bytes) -> Spans:
-    """Write rows of floats with so many decimals, as spans (n, c), each with its separator.
+    """Write rows of floats with a fixed number of decimals, as spans (n, c), each with its separator.
 
     values: (n, c); separators: c bytes, the one that follows each column.
     Nan and infinity become `nan` and `inf`, as in `%`.

@@ -97,7 +97,7 @@ def test_a_formula_is_the_same_arithmetic_in_text_and_latex(formula: str, text: 
 
 def test_the_forms_of_the_option_are_those_there_are() -> None:
     assert list(FORMS) == list(explaining.FORMS)
-    with pytest.raises(frametool.FrametoolError, match="no form 'html'; forms: markdown, text"):
+    with pytest.raises(frametool.FrametoolError, match="unknown format 'html'; formats: markdown, text"):
         MADE[0].render("html")
 
 

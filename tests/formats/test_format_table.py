@@ -357,23 +357,23 @@ def test_a_suffix_tells_of_a_form_that_is_not_read_where_no_sign_does(run: Calla
 
 
 UNKNOWN: dict[str, tuple[bytes, str]] = {
-    "prose": (b"The quick brown fox\njumps over it\n", "cannot tell the form of this text; forms: yaml, "),
-    "a note": (b"Note: my password is hunter2\nother: thing\n", "cannot tell the form of this text; forms: yaml, "),
-    "a letter": (b"Dear reader, my password is hunter2.\nThis is prose: it has a colon.\nbye\n", "cannot tell the form of this text"),
-    "a word": (b"hunter2", "cannot tell the form of this text"),
+    "prose": (b"The quick brown fox\njumps over it\n", "cannot detect the format of this text; formats: yaml, "),
+    "a note": (b"Note: my password is hunter2\nother: thing\n", "cannot detect the format of this text; formats: yaml, "),
+    "a letter": (b"Dear reader, my password is hunter2.\nThis is prose: it has a colon.\nbye\n", "cannot detect the format of this text"),
+    "a word": (b"hunter2", "cannot detect the format of this text"),
     "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "not text but a PNG picture; `frametool formats` lists what is read"),
-    "code": (b"import os\nprint(1)\n", "cannot tell the form of this text; forms: yaml, "),
-    "a huge line": (b"abc " * 200_000, "cannot tell the form of this text"),
-    "XML": (b'<?xml version="1.0"?>\n<!-- c --><note><to>Bob</to></note>', "form of XML with the root element note; forms: "),
-    "HTML": (b"<!DOCTYPE html>\n<html><body>" + b"x" * 9999, "form of XML with the root element html; forms: "),
+    "code": (b"import os\nprint(1)\n", "cannot detect the format of this text; formats: yaml, "),
+    "a huge line": (b"abc " * 200_000, "cannot detect the format of this text"),
+    "XML": (b'<?xml version="1.0"?>\n<!-- c --><note><to>Bob</to></note>', "format of XML with the root element note; formats: "),
+    "HTML": (b"<!DOCTYPE html>\n<html><body>" + b"x" * 9999, "format of XML with the root element html; formats: "),
     "binary data": (bytes(range(256)) * 9, "not text but binary data"),
     "gzip": (b"\x1f\x8b\x08\0abc", "not text but gzip data; unpack it first"),
     "zip": (b"PK\x03\x04abc", "not text but a zip archive; unpack it first"),
     "UTF-16 without a mark": ("frames: {a: {b: {}}}".encode("utf-16-le"), "UTF-16LE without a byte order mark"),
-    "escapes": (b"\x1b[31mred\x1b[0m fox\n", "cannot tell the form of this text"),
+    "escapes": (b"\x1b[31mred\x1b[0m fox\n", "cannot detect the format of this text"),
     "keys of no tree": (b"".join(b"key_%d: 1\n" % each for each in range(999)), "no frame tree: "),
     "long keys of no tree": (b"{" + b"".join(b'"%d%s": 1,' % (each, b"x" * 500) for each in range(9)) + b'"a": 1}', "no frame tree: "),
-    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "cannot tell the form of this text"),
+    "text under dashes": (b"--- |\n" + b"  words and more words\n" * 999, "cannot detect the format of this text"),
 }
 
 
@@ -387,7 +387,7 @@ def test_what_is_no_form_is_told_in_one_line_without_its_content(run: Callable[.
     assert len(first) <= 260
     assert all(len(line) <= 81 for line in snippet)
     if "cannot tell" in first:
-        assert first.endswith("; `frametool formats` lists all, --in FORM names one")
+        assert first.endswith("; `frametool formats` lists all, --in FORMAT sets one")
 
 
 @pytest.mark.parametrize("data", [b"", b"  \n\n", b"# only a comment\n", b"\xef\xbb\xbf"])
@@ -476,9 +476,9 @@ def test_a_form_that_was_written_is_refused_as_an_output_with_what_to_write(run:
 
 
 @pytest.mark.parametrize(("data", "said"), [
-    (b"<note/>", "cannot tell the form of XML with the root element note; none of those read here is XML; `frametool "),
-    (b"<!DOCTYPE note [" + b"<!ELEMENT a>" * 6000, "cannot tell the form of XML without an element in its first 64 KiB; none of"),
-    (b"<!DOCTYPE note", "cannot tell the form of XML without an element; none of those read here is XML; `frametool "),
+    (b"<note/>", "cannot detect the format of XML with the root element note; none of those read here is XML; `frametool "),
+    (b"<!DOCTYPE note [" + b"<!ELEMENT a>" * 6000, "cannot detect the format of XML without an element in its first 64 KiB; none of"),
+    (b"<!DOCTYPE note", "cannot detect the format of XML without an element; none of those read here is XML; `frametool "),
 ])  # fmt: skip
 def test_xml_where_no_form_is_xml_names_no_forms(run: Callable[..., Any], data: bytes, said: str) -> None:
     found = run("convert", "file.xml", files={"file.xml": data})

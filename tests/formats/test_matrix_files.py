@@ -351,11 +351,11 @@ def test_positions_are_written_to_the_same_bits_for_an_imu(run: Callable[..., An
 @pytest.mark.parametrize(
     ("tree", "form", "said"),
     [
-        *(("{frames: {alone: {}}}", form, f"{form} holds poses, and there is none: alone") for form in ("autoware", "camchain", "opencv", "handeye")),
+        *(("{frames: {alone: {}}}", form, f"{form} holds poses, and the tree has none: alone") for form in ("autoware", "camchain", "opencv", "handeye")),
         ("{frames: {a: {b: {xyz: [1, 0, 0]}}, c: {d: {xyz: [1, 0, 0]}}}}", "camchain", "camchain holds one tree of cameras; the roots here: a, c"),
         ("{frames: {a/x: {b: {xyz: [1, 0, 0]}}}}", "opencv", "opencv cannot name the pose of 'b' in 'a/x'"),
         ("{frames: {a_T_b: {c: {xyz: [1, 0, 0]}}}}", "opencv", "opencv cannot name the pose of 'c' in 'a_T_b'"),
-        ("{name: b, parent: a, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [0, 0, 1]}]}", "opencv", "opencv holds no frames that move, and 'b' does; give --at TIME"),
+        ("{name: b, parent: a, samples: [{stamp: 0, xyz: [0, 0, 0]}, {stamp: 1, xyz: [0, 0, 1]}]}", "opencv", "opencv holds no moving frames, and 'b' moves; give --at TIME"),
     ],
 )
 def test_what_a_form_cannot_hold_is_an_error(run: Callable[..., Any], tree: str, form: str, said: str) -> None:

@@ -85,7 +85,7 @@ def test_a_deeper_tree_is_written_whole_and_told(run: Callable[..., Any]) -> Non
     tree = "{frames: {a: {b: {xyz: [1, 0, 0], children: {c: {xyz: [0, 1, 0]}}}}, alone: {}}}"
     done = run("tree", tree, "-f", "autoware")
     assert "Autoware has a file for each frame that holds others; here in one: a, b" in done.err
-    assert "autoware has no place for frames without a pose: 'alone' left out" in done.err
+    assert "autoware cannot store frames without a pose: 'alone' left out" in done.err
     assert run("lookup", "-", "a", "c", "-f", "json", stdin=done.out).out == run("lookup", tree, "a", "c", "-f", "json").out
 
 

@@ -267,7 +267,7 @@ def test_in_python_stated_axes_turn_nothing(tmp_path: Path) -> None:
     with pytest.raises(ValueInvalid, match="camera_axes is optical or opengl, not 'upright'"):
         load(tmp_path / "file", camera_axes="upright")
     (tmp_path / "tree.yaml").write_text("frames: {map: {base: {xyz: [1, 2, 3]}}}")
-    with pytest.warns(FrametoolWarning, match="camera_axes changes nothing: yaml does not leave that open"):
+    with pytest.warns(FrametoolWarning, match="camera_axes has no effect: yaml specifies this itself"):
         load(tmp_path / "tree.yaml", camera_axes="optical")
 
 

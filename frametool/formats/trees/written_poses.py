@@ -59,9 +59,9 @@ def static_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
     """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
     tracks = list(tree.tracks())
     if moving := next((track.child for track in tracks if not track.is_static), None):
-        raise ValueInvalid(f"{form} holds no frames that move, and {shown(moving)} does; give --at TIME")
+        raise ValueInvalid(f"{form} holds no moving frames, and {shown(moving)} moves; give --at TIME")
     if not tracks:
-        raise ValueInvalid(f"{form} holds poses, and there is none: {listing(tree.frames)}")
+        raise ValueInvalid(f"{form} holds poses, and the tree has none: {listing(tree.frames)}")
     return [(track.parent, track.child, track.components) for track in tracks]
 
 
@@ -69,7 +69,7 @@ def warn_lonely_roots(tree: Frames, form: str) -> None:
     """Warn about frames that a format cannot name because nothing is connected to them."""
     parents = {track.parent for track in tree.tracks()}
     if lonely := [frame for frame in tree.roots if frame not in parents]:
-        warn(f"{form} has no place for frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
+        warn(f"{form} cannot store frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
 
 
 class Precision:
