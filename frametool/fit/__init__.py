@@ -1,4 +1,4 @@
-"""The arithmetic of fitting: pairs, alignments, clocks, mountings, errors of trajectories.
+"""Estimation: pairing, alignment, clock offsets, mounting, errors of trajectories, and calibration.
 
-Pure functions over arrays, free of files, text and options, that read like the papers they name.
+Pure functions over arrays, free of files, text and options, in the notation of the papers they cite.
 """

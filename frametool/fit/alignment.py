@@ -1,6 +1,6 @@
-"""Trajectories brought together: pairs of poses, one clock, and the transform and scale that bring one onto the other.
+"""Pairing of trajectories, clock offsets, and alignment by a transform and a scale.
 
-Poses are paired at common stamps, or with the nearest ones; those of a gripper with those of a target too.  Clocks:
+Poses are paired at common stamps, or with the nearest ones; those of a gripper and of a target too.  Clocks:
 t_ref = t_est + offset.  point_in_ref = scale * ref_from_est.apply(point_in_est): p' = c R p + t, R' = R R_i.
 """
 
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
 ALIGNMENTS = ("none", "origin", "yaw", "se3", "sim3")
 SCALED = ("sim3", "origin+scale")
 FEWEST = 3  # pairs
-STILL = 1e-9  # rms, of 1 + the largest coordinate: what rounding moves
-THIN = 1e-5  # of the second axis over the first: a line
+STILL = 1e-9  # rms, relative to 1 + the largest coordinate: the effect of rounding
+THIN = 1e-5  # ratio of the second axis to the first: a straight line
 
 
 class Unaligned(ValueInvalid):
-    """What pairs do not determine; `other` names the alignments that they do."""
+    """Pairs that do not determine an alignment; `other` names alignments that they determine."""
 
 
 class Fit(NamedTuple):
-    """An alignment: ref_from_est, and the scale that comes before it."""
+    """An alignment: ref_from_est, and the scale applied before it."""
 
     transform: Transform
     scale: float = 1.0
 
     def moved(self, est: Trajectory) -> Trajectory:
-        """Return an estimate as the fit places it."""
+        """Return the aligned estimate."""
         rotation, shift = self.transform.rotation, self.transform.xyz
         xyz = self.scale * rotation.apply(est.xyz) + shift
         if est.rotation is None:
@@ -56,17 +56,17 @@ def fitted(
     kind: str, ref: Trajectory, est: Trajectory, up: Array, names: tuple[str, str] = ("ref", "est"), *,
     tied: bool = False,
 ) -> Fit:
-    """Fit paired poses; raises Unaligned, with the name of the side, where they do not determine the alignment.
+    """Fit paired poses; raises Unaligned, with the name of the trajectory, if they do not determine the alignment.
 
-    tied: the first position of the estimate comes to that of the reference
-    `origin+scale` takes the scale of sim3, then the first pose, as evo does with --correct_scale --align_origin.
+    tied: the first position of the estimate is aligned exactly with that of the reference
+    `origin+scale` uses the scale of sim3, then the first pose, as evo does with --correct_scale --align_origin.
     """
     if kind == "none":
         return Fit(Transform.identity())
     if kind == "origin":
         if ref.xyzw is None or est.xyzw is None:
             raise Unaligned("origin needs rotations of both; --align se3, yaw or none")
-        return Fit(ref.poses[0] @ est.poses[0].inverse())  # the first pose of the estimate on that of the reference
+        return Fit(ref.poses[0] @ est.poses[0].inverse())  # the first poses coincide
     if kind == "yaw":
         return _yaw(ref.xyz, est.xyz, up, names, tied=tied)
     for name, each in zip(names, (ref, est), strict=True):
@@ -78,7 +78,7 @@ def fitted(
 
 
 def principal_axes(xyz: Array) -> Array:
-    """Return the rms of positions along their principal axes, the largest first."""
+    """Return the rms of positions along their principal axes, in descending order."""
     spread: Array = np.linalg.svd(xyz - centre(xyz), compute_uv=False) / np.sqrt(len(xyz))
     return spread
 
@@ -96,11 +96,11 @@ def _require_plane(kind: str, xyz: Array, name: str) -> None:
 def umeyama(
     ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool, tied: bool = False
 ) -> Fit:
-    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991.  tied: among those with c R e_0 + t = r_0."""
+    """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991.  tied: subject to c R e_0 + t = r_0."""
     mass = np.ones(len(ref)) if weights is None else weights
     ref_mean, est_mean = (each[0] if tied else centre(each, mass) for each in (ref, est))
     r, e = ref - ref_mean, est - est_mean
-    e = e if tied else e - centre(e, mass)  # what rounding left of the mean
+    e = e if tied else e - centre(e, mass)  # corrects the rounding of the mean
     rotation = align_vectors(e, mass[:, None] * r)
     scale = float((mass[:, None] * rotation.apply(e) * r).sum() / (mass[:, None] * e**2).sum()) if with_scale else 1.0
     return Fit(Transform(rotation, ref_mean - scale * rotation.apply(est_mean)), scale)
@@ -113,7 +113,7 @@ def centre(xyz: Array, mass: Array | None = None) -> Array:
 
 
 def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str], *, tied: bool) -> Fit:
-    """Minimise the same over turns about `up` alone."""
+    """Minimise the same over rotations about `up` only."""
     ref_mean, est_mean = (each[0] if tied else centre(each) for each in (ref, est))
     r, e = ref - ref_mean, est - est_mean
     across = [each - np.outer(each @ up, up) for each in (r, e)]
@@ -126,15 +126,15 @@ def _yaw(ref: Array, est: Array, up: Array, names: tuple[str, str], *, tied: boo
 
 
 ARM_STEPS = 50
-SEEN = 1e-6  # rms of metres that a metre of the arm moves: along a direction that the turns show
+SEEN = 1e-6  # rms of metres per metre of the arm: a direction that is observable from the rotations
 DONE = 1e-13
 
 
 def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
-    """Return the shift l of p_ref = c R (p_i + R_i l) + t that fits best together with the alignment, metres.
+    """Return the lever arm l of p_ref = c R (p_i + R_i l) + t estimated jointly with the alignment, metres.
 
-    What the turns do not show stays 0.  Gauss-Newton: the alignment is fitted anew after each step, and the step is
-    the least-squares one of what its own parameters cannot explain (variable projection, Golub and Pereyra 1973).
+    Unobservable directions are 0.  Gauss-Newton: the alignment is fitted again after each step, and the step is
+    the least-squares one of what the alignment parameters cannot explain (variable projection, Golub and Pereyra 1973).
     Raises ValueInvalid without rotations of the estimate.
     """
     if est.rotation is None:
@@ -144,7 +144,7 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
         shifted = est._replace(xyz=est.xyz + est.rotation.apply(arm))
         fit = fitted(kind, ref, shifted, up)
         placed = fit.moved(shifted)
-        turns = fit.scale * (fit.transform.rotation @ est.rotation).as_matrix()  # what a step of the arm moves
+        turns = fit.scale * (fit.transform.rotation @ est.rotation).as_matrix()  # the effect of a step of the arm
         own = _tangents(kind, placed.xyz, up)
         free = turns.reshape(-1, 3)
         residual = (ref.xyz - placed.xyz).reshape(-1)
@@ -160,7 +160,7 @@ def lever_arm(kind: str, ref: Trajectory, est: Trajectory, up: Array) -> Array:
 
 
 def _tangents(kind: str, xyz: Array, up: Array) -> Array | None:
-    """Return how the parameters of an alignment move positions: shifts, turns about x, y, z or up, and scale."""
+    """Return the derivatives of positions by alignment parameters: shifts, rotations about x, y, z or up, scale."""
     if kind.startswith(("none", "origin")):
         return None
     centred = xyz - centre(xyz)
@@ -171,16 +171,16 @@ def _tangents(kind: str, xyz: Array, up: Array) -> Array | None:
     return np.stack([part.reshape(-1) for part in parts], -1)
 
 
-GAP = 3  # median intervals that may lie between two neighbours which are interpolated
-NEAR_NS = 50_000_000  # between stamps of a gripper and a target that are paired
+GAP = 3  # median intervals between two neighbours that may be interpolated
+NEAR_NS = 50_000_000  # maximum between stamps of a gripper and a target that are paired
 
 
 class Pairs(NamedTuple):
-    """Poses of the reference and of the estimate, one each, at the stamps of the reference's clock.
+    """Paired poses of the reference and of the estimate, at the stamps of the reference's clock.
 
-    possible: how many there could be: poses of the walked trajectory within the time of the other
-    shared: how many poses of one trajectory have more than one partner
-    interpolated: "ref", "est" or None; max_gap_s: how far its neighbours may be apart
+    possible: the possible number of pairs: poses of the sampled trajectory within the time of the other
+    shared: the number of poses of one trajectory with more than one partner
+    interpolated: "ref", "est" or None; max_gap_s: the maximum interval for interpolation
     """
 
     ref: Trajectory
@@ -191,20 +191,20 @@ class Pairs(NamedTuple):
     max_gap_s: float | None = None
 
     def at(self, index: Array | slice) -> Pairs:
-        """Choose pairs as numpy does."""
+        """Select pairs as numpy does."""
         return self._replace(ref=self.ref.at(index), est=self.est.at(index))
 
 
 def by_number(ref: Trajectory, est: Trajectory) -> Pairs:
-    """Pair two trajectories without stamps, pose by pose."""
+    """Pair two trajectories without stamps by index."""
     count = min(ref.size, est.size)
     return Pairs(ref.at(slice(count)), est.at(slice(count)), est.size)
 
 
 def interpolated(ref: Trajectory, est: Trajectory, max_gap_ns: float | None = None) -> Pairs:
-    """Pair the stamps of one with poses between two of the other, the denser one: straight line and slerp.
+    """Pair the stamps of one with interpolated poses of the other, the denser one: linear and slerp.
 
-    Never beyond its ends, nor where its neighbours are more than a gap apart; an equal stamp needs none.
+    Never beyond its ends, nor in gaps longer than the maximum; equal stamps need no interpolation.
     """
     walks_est = interval(ref.stamps_ns) <= interval(est.stamps_ns)
     walked, dense = (est, ref) if walks_est else (ref, est)
@@ -218,7 +218,7 @@ def interpolated(ref: Trajectory, est: Trajectory, max_gap_ns: float | None = No
 
 
 def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Trajectory, Array]:
-    """Return poses at the stamps that lie between neighbours of a trajectory, and which stamps those are."""
+    """Return poses at the stamps within a trajectory and not in a gap, and the mask of these stamps."""
     own = dense.stamps_ns
     after = np.searchsorted(own, stamps_ns).clip(0, len(own) - 1)
     before = np.where(own[after] == stamps_ns, after, (after - 1).clip(0))
@@ -234,7 +234,7 @@ def between(dense: Trajectory, stamps_ns: Array, max_gap_ns: float) -> tuple[Tra
 
 
 def nearest(ref: Trajectory, est: Trajectory, max_diff_ns: float) -> Pairs:
-    """Pair each pose of the shorter one with that of the nearest stamp of the other, of two the earlier."""
+    """Pair each pose of the shorter one with the nearest stamp of the other, the earlier one of a tie."""
     walks_est = est.size <= ref.size
     walked, other = (est, ref) if walks_est else (ref, est)
     other = other.at(np.argsort(other.stamps_ns, kind="stable"))
@@ -250,7 +250,7 @@ def nearest(ref: Trajectory, est: Trajectory, max_diff_ns: float) -> Pairs:
 
 
 def interval(stamps_ns: Array) -> float:
-    """Return the median time from one stamp to the next; of a single one endless."""
+    """Return the median interval between stamps; infinite for a single one."""
     return float(np.median(np.diff(stamps_ns))) if len(stamps_ns) > 1 else float("inf")
 
 
@@ -261,10 +261,10 @@ def _inside(stamps_ns: Array, span: Array) -> int:
 def paired_samples(
     gripper: Trajectory, target: Trajectory, files: tuple[str, str], max_gap_ns: int | None
 ) -> HandEyeSamples:
-    """Pair poses: the gripper's at the target's stamps, or row by row where not both have stamps.
+    """Pair poses: the gripper's at the target's stamps, or by row if not both have stamps.
 
-    Between two that are no more than a gap apart it is interpolated, else the nearest within the gap is taken.
-    Raises ValueInvalid where there are as many as nothing pairs.
+    Within the maximum gap the gripper is interpolated, else the nearest pose within the gap is used.
+    Raises ValueInvalid if nothing pairs.
     """
     names = [name if each.world != WORLD or each.body != BODY else None
              for each in (gripper, target) for name in (each.world, each.body)]  # fmt: skip
@@ -297,7 +297,7 @@ def paired_samples(
 
 
 def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:
-    """Name where poses stand: by line, or by row where there are none."""
+    """Return the places of poses: by line, or by row if there are none."""
     if each.lines is None:
         return [f"{file} row {row + 1}" for row in rows]
     return [f"{file}:{line}" for line in each.lines.tolist()]
@@ -306,23 +306,23 @@ def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:
 LIMIT_S = 10.0
 REFINED_S = 1e-7
 STEPS = 8
-LEAST = 3  # poses: two speeds make the least course
-NEARBY = 1.2  # of a step: what the best of all lags and its neighbours may miss
-DOUBT = 0.25  # of a step: the standard error that least squares may have
+LEAST = 3  # poses: two speeds are the shortest signal
+NEARBY = 1.2  # of a step: the largest error of the best of all lags and its neighbours
+DOUBT = 0.25  # of a step: the largest acceptable standard error of least squares
 TINY = 1e-12
 AS_GOOD = 0.99  # of the best score: another lag may be the true one
 DIGITS = 9  # of a score, and of seconds: stamps are whole nanoseconds
 
 
 class ClockOffset(NamedTuple):
-    """The offset in seconds, how well speeds agree there (1 is perfectly), and another that is about as good."""
+    """The offset in seconds, the correlation of speeds there (1 is perfect), and another offset about as good."""
 
     seconds: float
     score: float
     rival: float | None = None
 
     def shifted(self, change: float, shift_ns: int) -> ClockOffset:
-        """Return it refined by a change, on clocks that had been shifted."""
+        """Return the offset refined by a change, for clocks that had been shifted."""
         rival = None if self.rival is None else self.rival + shift_ns / 1e9
         return ClockOffset(self.seconds + change + shift_ns / 1e9, self.score, rival)
 
@@ -332,8 +332,8 @@ def clock_offset(
 ) -> ClockOffset:
     """Find the lag at which angular speeds, or else speeds, correlate best; refine it by least squares.
 
-    by_turning: by angular speeds alone if both turn, as those do not depend on where a body is measured
-    Where the two spans do not meet, their first stamps are put together and every lag is tried.
+    by_turning: use angular speeds only if both rotate, because they do not depend on the sensor's position
+    If the two spans do not overlap, their first stamps are aligned and every lag is tried.
     """
     if min(ref.size, est.size) < LEAST:
         return ClockOffset(0.0, -1.0)
@@ -359,7 +359,7 @@ def clock_offset(
 
 
 def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Array] | None:
-    """Return the times between poses and the angular speed or speed there; None where there is none to speak of."""
+    """Return the intervals between poses and the angular speed or speed there; None if there is none."""
     if turning and each.rotation is None:
         return None
     if turning:
@@ -372,9 +372,9 @@ def _speeds(each: Trajectory, times: Array, *, turning: bool) -> tuple[Array, Ar
 
 
 def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit_s: float) -> ClockOffset:
-    """Return the lag of the highest correlation, normalised over what overlaps at it; between samples by a parabola.
+    """Return the lag of the highest correlation, normalised over the overlap, refined between samples by a parabola.
 
-    At least half of the shorter course overlaps.  All sums are correlations of courses, masks and squares: by FFT.
+    At least half of the shorter signal overlaps.  All sums are correlations of signals, masks and squares, by FFT.
     """
     low, high = min(a[0][0], b[0][0]), max(a[0][-1], b[0][-1])
     grid = low + step * np.arange(int((high - low) / step) + 1)
@@ -397,7 +397,7 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
     shortest = min(at[-1] - at[0] for at, _ in (a, b))
     tried = (np.abs(lags * step) <= limit_s) & (count * step >= shortest / 2)
     score = np.where(tried, covariance / np.sqrt(spread[0]) / np.sqrt(spread[1]), -1.0)
-    score = np.round(score, DIGITS)  # further digits are those of the FFT, which adds as the processor likes
+    score = np.round(score, DIGITS)  # further digits are those of the FFT, which depend on the processor
     at = int(np.argmax(score))
     before, here, after = score[at - 1], score[at], score[(at + 1) % size]
     bend = before - 2 * here + after
@@ -408,7 +408,7 @@ def _best_lag(a: tuple[Array, Array], b: tuple[Array, Array], step: float, limit
 
 
 def _rival(score: Array, best: int) -> int | None:
-    """Return the index of another peak that is as good to a per cent, None where the best stands alone."""
+    """Return the index of another peak that is within one per cent of the best, or None."""
     near = score >= AS_GOOD * score[best]
     valleys = np.flatnonzero(~near)
     at = np.searchsorted(valleys, best)
@@ -417,7 +417,7 @@ def _rival(score: Array, best: int) -> int | None:
 
 
 def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: float, step: float) -> float:
-    """Refine a lag until the speeds a agree best with the speeds b (Gauss-Newton on one number)."""
+    """Refine a lag until the speeds a match the speeds b best (Gauss-Newton on one number)."""
     found = seconds
     for _ in range(STEPS):
         at = b[0] + found
@@ -432,10 +432,11 @@ def _refined_speeds(a: tuple[Array, Array], b: tuple[Array, Array], seconds: flo
 
 
 def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step: float, kind: str) -> float:
-    """Let what is left along the velocity after the fit be time: Gauss-Newton on one number.
+    """Refine the offset from the residuals along the velocity after the fit: Gauss-Newton on one number.
 
-    Drift is along the velocity too, but alike from pose to pose: where what is left is so alike that it says less
-    than the correlation did, or wants a lag beyond what that leaves open (a lever arm does), the lag stays.
+    Drift is along the velocity too, but correlated from pose to pose: if the residuals are so correlated that they are
+    less accurate than the correlation, or require a lag outside of its uncertainty (as with a lever arm), it is
+    unchanged.
     """
     up = np.array([0.0, 0.0, 1.0])
     plain = ref._replace(xyzw=None)
@@ -452,7 +453,7 @@ def _refined(ref: Trajectory, est: Trajectory, shift: int, seconds: float, step:
         except Unaligned:
             return seconds
         left, unsteady = ((fit.moved(own).xyz - here) * velocity).sum(-1), velocity - centre(velocity)
-        squared = max(float((unsteady**2).sum()), TINY)  # a constant velocity is a shift of the fit
+        squared = max(float((unsteady**2).sum()), TINY)  # a constant velocity is equivalent to a shift of the fit
         change = min(max(float(left.sum()) / squared, -step), step)
         found += change
         if abs(change) < REFINED_S:
@@ -468,15 +469,15 @@ BILLION = 10**9
 
 
 def resampled(each: Trajectory, stamps_ns: Array, max_gap_ns: float | None = None) -> Trajectory:
-    """Return a trajectory at stamps that lie within it: straight line and slerp, as pairs are interpolated.
+    """Return a trajectory at stamps within it: interpolated linearly and by slerp, as pairs are.
 
-    Stamps between poses that are more than a gap apart, 3 median intervals if none is said, have no pose.
+    Stamps in gaps longer than max_gap_ns (default: 3 median intervals) have no pose.
     """
     return between(each, stamps_ns, GAP * interval(each.stamps_ns) if max_gap_ns is None else max_gap_ns)[0]
 
 
 def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:
-    """Return stamps from the first pose on, so many a second, each rounded by itself."""
+    """Return stamps from the first pose on at a rate, each rounded independently."""
     first, last = int(each.stamps_ns[0]), int(each.stamps_ns[-1])
     count = int((last - first) * rate_hz / BILLION * (1 + 1e-12)) + 1
     if count > MOST:
@@ -486,7 +487,7 @@ def stamps_at_rate(each: Trajectory, rate_hz: float) -> Array:
 
 
 def stamps_every(each: Trajectory, delta: Delta) -> Array:
-    """Return the stamps at which a trajectory is a whole number of steps along its path, or its turning."""
+    """Return the stamps at which a trajectory has covered whole multiples of a step of path or rotation."""
     along = delta.along(each)
     if along is None:
         raise ValueInvalid(f"steps of {delta} need rotations")

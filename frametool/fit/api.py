@@ -1,4 +1,4 @@
-"""Comparing and solving from Python: paths, transforms or arrays in, numbers and arrays out."""
+"""Compare trajectories and solve for transforms in Python: files, transforms or arrays in, numbers and arrays out."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ BILLION = 1_000_000_000
 
 
 class Alignment(NamedTuple):
-    """Where an estimate's world is in the reference's, p' = scale R p + t; moved is all of the estimate there."""
+    """The estimate's world in the reference's, p' = scale R p + t; moved is the whole aligned estimate."""
 
     transform: Transform
     scale: float
@@ -51,11 +51,11 @@ def compare(
 ) -> Comparison:  # fmt: skip
     """Compare a trajectory with a reference.
 
-    ref, est: a Trajectory, or the path of a file as `load_trajectory` takes it
-    offset: seconds that est's clock is behind, or "auto"; align: se3, sim3, yaw, origin or none
-    mount: ref's body in est's, or "auto"; deltas: as "1m", "10frames", "1s", "5deg"; like: "evo" for its ways
+    ref, est: a Trajectory, or the path of a file as for `load_trajectory`
+    offset: seconds by which est's clock lags, or "auto"; align: se3, sim3, yaw, origin or none
+    mount: pose of the reference sensor in est's body, or "auto"; deltas: as "1m", "10frames", "1s", "5deg"; like: "evo"
     more: other fields of `frametool.fit.comparison.Settings`; align_first as "10s", times in nanoseconds
-    Raises ValueInvalid where the two have no stamps in common, or a fit is not determined; FormatError.
+    Raises ValueInvalid if the two have no stamps in common, or a fit is not determined; FormatError.
     """
     if like not in (None, "evo"):
         raise ValueInvalid(f"like {like!r}: only evo is known")
@@ -77,7 +77,7 @@ def compare(
 
 
 def align(ref: Given, est: Given, **settings: Any) -> Alignment:
-    """Fit a trajectory to a reference; settings as those of `compare`."""
+    """Align a trajectory with a reference; settings as for `compare`."""
     found = compare(ref, est, **settings)
     return Alignment(found.fit.transform, found.fit.scale, found.offset_ns / BILLION, whole_estimate(found))
 
@@ -86,9 +86,9 @@ def resample(
     trajectory: Given, *, rate: float | None = None, at: Sequence[int] | None = None, every: str | None = None,
     max_gap_ns: float | None = None,
 ) -> Trajectory:  # fmt: skip
-    """Interpolate a trajectory: `rate` poses a second, `at` stamps in nanoseconds, or `every` "1m" or "5deg".
+    """Interpolate a trajectory: `rate` poses per second, `at` stamps in nanoseconds, or `every` "1m" or "5deg".
 
-    Moments beyond its ends, or between poses more than a gap apart (3 median intervals if none is said), have none.
+    Times beyond its ends, or in gaps longer than max_gap_ns (default: 3 median intervals), have no pose.
     """
     given = _taken(trajectory, "trajectory")
     for hint in given.disorder("trajectory"):
@@ -109,13 +109,13 @@ def solve(
     measurements: Measured, *, root: str | None = None, fix: Iterable[FrameTree | str | PathLike[str]] = (),
     robust: bool = True,
 ) -> TreeSolution:  # fmt: skip
-    """Solve for the tree that measurements mean; what does not agree with the rest is left out.
+    """Estimate the tree that fits measurements; outliers are rejected.
 
     measurements: (parent, child, transform) or (parent, child, transform, covariance), the covariance as 36 numbers or
-    (6, 6); or the path of a file as `frametool solve` takes it
-    root: the frame that the others are given in; fix: trees, or paths of them, that are exact
+        (6, 6); or the path of a file as for `frametool solve`
+    root: the frame in which the others are expressed; fix: trees, or paths of them, that are exact
     Returns .tree, .covariance(target, source), .residuals (n, 6), .u, .used, .fits, .checked and more.
-    Raises ValueInvalid for what is not connected or undecided; FormatError.
+    Raises ValueInvalid if frames are not connected or an outlier cannot be identified; FormatError.
     """
     from frametool.formats.load import load
 
@@ -149,7 +149,7 @@ def _measurements(given: Measured) -> list[Measurement]:
 
 
 def _measurement(given: Any, place: str) -> Measurement:
-    """Check one of what Python gives; raises ValueInvalid that names it."""
+    """Check one measurement passed from Python; raises ValueInvalid that names it."""
     if isinstance(given, Measurement):
         return given
     if not (isinstance(given, tuple | list) and len(given) in (3, 4) and isinstance(given[2], Transform)):
@@ -166,12 +166,12 @@ def _measurement(given: Any, place: str) -> Measurement:
 
 
 def solve_hand_eye(gripper: Batch, target: Batch, *, eye_to_hand: bool = False, robust: bool = True) -> HandEye:
-    """Solve for where a camera is on a gripper, and where the target is; wrong samples are left out.
+    """Estimate the pose of a camera on a gripper, and of the target; outliers are rejected.
 
     gripper: base_from_gripper; target: camera_from_target; as many, transforms or matrices (n, 4, 4)
-    eye_to_hand: the camera is beside the robot, the target in the gripper
+    eye_to_hand: the camera is fixed to the base, the target is on the gripper
     Returns .x (gripper_from_camera, or base_from_camera), .z (base_from_target, or gripper_from_target),
-    .covariance_x, .covariance_z, .noise_at, .used and more.  Raises ValueInvalid where they are not determined.
+    .covariance_x, .covariance_z, .noise_at, .used and more.  Raises ValueInvalid if they are not determined.
     """
     from frametool.fit import hand_eye
 
@@ -185,11 +185,11 @@ def solve_hand_eye(gripper: Batch, target: Batch, *, eye_to_hand: bool = False, 
 def solve_points(
     target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True
 ) -> PointsFit:
-    """Fit source points to the target points that they are, (n, 3) each; wrong pairs are left out.
+    """Estimate the transform from source points to the matching target points, (n, 3) each; outliers are rejected.
 
-    weights: (n,), in proportion to 1 / variance; scale: fit one too, target = scale R source + t
+    weights: (n,), proportional to 1 / variance; scale: estimate one too, target = scale R source + t
     Returns .transform (target_from_source), .scale, .covariance, .used and more.
-    Raises ValueInvalid where the points are too few, lie on a line, or are mirrored.
+    Raises ValueInvalid if the points are too few, on a line, or mirrored.
     """
     from frametool.fit import closed_forms
 
@@ -200,10 +200,10 @@ def solve_points(
 
 
 def solve_mean(poses: Batch, *, weights: Numbers | None = None, robust: bool = True) -> MeanFit:
-    """Return the mean of poses, transforms or matrices (n, 4, 4); wrong ones are left out.
+    """Return the mean of poses, transforms or matrices (n, 4, 4); outliers are rejected.
 
-    weights: (n,), in proportion to 1 / variance
-    Returns .transform, .covariance (of one pose), .used and more.  Raises ValueInvalid where there is no mean.
+    weights: (n,), proportional to 1 / variance
+    Returns .transform, .covariance (of one pose), .used and more.  Raises ValueInvalid if there is no mean.
     """
     from frametool.fit import closed_forms
 
@@ -211,7 +211,7 @@ def solve_mean(poses: Batch, *, weights: Numbers | None = None, robust: bool = T
 
 
 def _poses(given: Any, name: str) -> Transform:
-    """Take a batch of transforms, a sequence of single ones, or matrices; raises ValueInvalid with the shape."""
+    """Convert a batch of transforms, a sequence of single ones, or matrices; raises ValueInvalid with the shape."""
     if not isinstance(given, Transform) and len(given) and all(isinstance(each, Transform) for each in given):
         if many := next((each.shape for each in given if each.shape), ()):
             raise ValueInvalid(f"{name}: expected single transforms, got shape {many}")

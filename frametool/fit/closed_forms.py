@@ -1,4 +1,4 @@
-"""The mean of poses, and the transform between matched points, a = c R b + t: each without the wrong ones."""
+"""The mean of poses, and the transform between matched points, a = c R b + t: both robust against outliers."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
     from frametool.stream.gathering import Gathered
 
 
-FEWEST_POSES = 3  # of two poses nobody knows which is wrong
+FEWEST_POSES = 3  # with two poses the outlier cannot be identified
 MOST_TRIED = 200  # poses that are tried as the middle of the others
 
 
 class MeanFit(NamedTuple):
-    """The mean of the poses kept and how far they lie from it, as `mean_and_spread` returns them.
+    """The mean of the inliers and their spread, as `mean_and_spread` returns them.
 
-    used: which were kept; left_out: which were not, though they have a weight; u: how many sigmas each is off
+    used: the inliers; left_out: outliers with a weight; u: the residual of each in sigmas
     residuals: [t_i - t, Log(R_i R')], (n, 6); sigma: of each axis of a pose of weight 1, metres and radians
-    dof: 3 n - 3 of those used, for each sigma; covariance: of one pose, 6x6 as ROS has it, None of one alone
+    dof: 3 n - 3 of the inliers, for each sigma; covariance: of one pose, 6x6 as in ROS, None for a single pose
     """
 
     transform: Transform
@@ -59,10 +59,10 @@ class MeanFit(NamedTuple):
 
 
 def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool = True) -> MeanFit:
-    """Return the mean of poses (n,), wrong ones left out; where none is, the bits are those of `mean_and_spread`.
+    """Return the mean of poses (n,), outliers rejected; without outliers exactly that of `mean_and_spread`.
 
-    weights: (n,), in proportion to 1 / variance; a pose of weight 0 counts for nothing
-    Raises ValueInvalid where there is no pose, or no mean.
+    weights: (n,), proportional to 1 / variance; a pose of weight 0 is ignored
+    Raises ValueInvalid if there is no pose, or no mean.
     """
     if len(poses.shape) != 1:
         raise ValueInvalid(f"poses: expected shape (n,), got {poses.shape}")
@@ -96,7 +96,7 @@ def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool
 
 
 def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = None) -> Array | None:
-    """Return the covariance of one of the poses (n,) whose mean is known, 6x6 as ROS has it; None of one alone."""
+    """Return the covariance of one of the poses (n,) whose mean is known, 6x6 as in ROS; None for a single pose."""
     mass = validation.masses(weights, poses.shape)
     count = int((mass > 0.0).sum())
     off = PoseArrays.of(poses).errors(PoseArrays.of(mean)) * np.sqrt(mass)[:, None]
@@ -104,7 +104,7 @@ def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = N
 
 
 def _middle(poses: Transform, roots: Array) -> Transform:
-    """Return the pose that the others are nearest to, by the medians of metres and radians."""
+    """Return the pose closest to the others, by the medians of metres and radians."""
     count = len(poses)
     tried = range(count) if count <= MOST_TRIED else next(draws(1, MOST_TRIED, count))
 
@@ -115,23 +115,23 @@ def _middle(poses: Transform, roots: Array) -> Transform:
 
 
 FEWEST = 3
-FEWEST_ROBUST = 5  # three always fit, so that four cannot say which of them is wrong
+FEWEST_ROBUST = 5  # three always fit, so that with four the outlier cannot be identified
 TRIPLES = 500
-MOST = 2000  # points that a triple is tried on
-ROUNDING = 1e-12  # of the largest coordinate: no distance is known better
-BETTER = 5.0  # times: a scale or a mirror that fits so much better is what happened
+MOST = 2000  # points on which a triple is tested
+ROUNDING = 1e-12  # relative to the largest coordinate: no distance is more accurate
+BETTER = 5.0  # ratio: a scale or a reflection that fits this much better is the likely explanation
 UNITS = {1000.0: "millimetres?", 100.0: "centimetres?"}
-ABOUT = 0.05  # of a scale: still that of a unit
+ABOUT = 0.05  # of a scale: still a unit conversion
 IDENTITY = Transform.identity()
 MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 class PointsFit(NamedTuple):
-    """target_from_source and the scale c, with their covariance (6x6, as ROS has it) and the scale's sigma.
+    """target_from_source and the scale c, with their covariance (6x6, as in ROS) and the scale's sigma.
 
-    used: which pairs were kept; left_out: which were not, though they have a weight
-    residuals: target - (c R source + t), (n, 3); u: how many sigmas each is off; sigma: of each axis where weight is 1
-    dof: 3 n - 6, with a scale 3 n - 7; rms_distance: of those used; hints: sentences
+    used: the inliers; left_out: outliers with a weight
+    residuals: target - (c R source + t), (n, 3); u: the residual of each in sigmas; sigma: of each axis for weight 1
+    dof: 3 n - 6, with a scale 3 n - 7; rms_distance: of the inliers; hints: warnings
     """
 
     transform: Transform
@@ -152,11 +152,11 @@ def solve_points(
     target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True,
     names: tuple[str, str] = ("A", "B"),
 ) -> PointsFit:  # fmt: skip
-    """Fit matched points (n, 3) by weighted least squares; wrong pairs are left out.
+    """Fit matched points (n, 3) by weighted least squares; outliers are rejected.
 
-    weights: (n,), in proportion to 1 / variance; a pair of weight 0 counts for nothing
-    names: what messages call target and source
-    Raises ValueInvalid where the points are too few, lie on a line, or are mirrored.
+    weights: (n,), proportional to 1 / variance; a pair of weight 0 is ignored
+    names: of target and source, for messages
+    Raises ValueInvalid if the points are too few, on a line, or mirrored.
     """
     a, b = _points(target, "target"), _points(source, "source")
     if len(a) != len(b):
@@ -193,7 +193,7 @@ def solve_points(
 
 
 class _Pairs(NamedTuple):
-    """Matched points (n, 3) and what each weighs."""
+    """Matched points (n, 3) and their weights."""
 
     target: Array
     source: Array
@@ -212,7 +212,7 @@ class _Pairs(NamedTuple):
     def start(self, *, with_scale: bool, robust: bool) -> tuple[Fit, float]:
         """Return the fit of all or of a triple with the least typical distance, and that distance.
 
-        The typical one is in the middle, but at least the fourth: three always fit.  It is never below rounding.
+        The typical distance is the median, but at least the fourth: three always fit.  It is never below rounding.
         """
         count = len(self.mass)
         seen = self.at(next(draws(1, MOST, count))) if count > MOST else self
@@ -229,7 +229,7 @@ class _Pairs(NamedTuple):
         return best[1], max(sqrt(best[0]), ROUNDING * max(np.abs(self.target).max(), np.abs(self.source).max()))
 
     def is_line(self) -> bool:
-        """Return True if target or source lie on a line, or in one place."""
+        """Return True if target or source are on a line, or in one point."""
         for xyz in self[:2]:
             first, second, _ = principal_axes(xyz)
             if second <= max(THIN * first, STILL * np.abs(xyz).max()):
@@ -247,7 +247,7 @@ class _Pairs(NamedTuple):
             raise ValueInvalid(f"a mirror image fits ({off}): one set is left-handed")
 
     def scale_hints(self, typical: float, names: tuple[str, str], *, robust: bool) -> list[str]:
-        """Return a warning where a scale would fit much better."""
+        """Return a warning if a scale would fit much better."""
         fit, scaled = self.start(with_scale=True, robust=robust)
         if BETTER * scaled > typical or fit.scale <= 0.0:
             return []
@@ -256,7 +256,7 @@ class _Pairs(NamedTuple):
         return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
 
     def line_hints(self, sigma: float, covariance: Array) -> list[str]:
-        """Return a warning where points lie nearly on a line: the rotation about it is uncertain."""
+        """Return a warning if points are nearly on a line: the rotation about it is uncertain."""
         first, second, _ = principal_axes(self.target)
         if not second < KEPT * sigma < first:
             return []
@@ -264,9 +264,10 @@ class _Pairs(NamedTuple):
         return [f"the points lie nearly on a line: the turn about it is uncertain (sigma {turn:.1f} deg)"]
 
     def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
-        """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is fitted.
+        """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is estimated.
 
-        At the points' centre place, turn and scale do not mix; the lever arm carries this to the source's origin.
+        At the points' centre position, rotation and scale are independent; the lever arm transforms it to the source's
+        origin.
         """
         middle = centre(self.source, self.mass)
         arms = fit.transform.rotation.apply(self.source - middle)
@@ -296,7 +297,7 @@ def _points(given: Numbers, name: str) -> Array:
 
 
 def mean_of_rows(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
-    """Return the mean of what was gathered, with its spread, and what to say of each pose that was left out."""
+    """Return the mean of gathered poses, with its spread, and a message for each outlier."""
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain
 

@@ -1,4 +1,4 @@
-"""A trajectory against a reference: paired, put on one clock, mounted, aligned, and how far it is off then."""
+"""Compare a trajectory with a reference: pairing, clock offset, mounting, alignment, and errors."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Rigid
 
 AUTO = "auto"
-CLEAR = 0.5  # score of a clock offset that can be relied on
-SURE = 0.8  # of one that is told without having been asked for
+CLEAR = 0.5  # score of a reliable clock offset
+SURE = 0.8  # score of one that is reported without being requested
 MOST_TRIED = 20_000  # points of its grid then
 FEW = 0.5  # of the possible pairs
-APART = radians(2.0)  # a turn between bodies that is told, where it is also
-STEADY = 5.0  # times as large as its spread
+APART = radians(2.0)  # a rotation between bodies that is reported, if it is also
+STEADY = 5.0  # this many times as large as its spread
 NEAR_A_LINE = 3.0  # residuals that the second axis of positions must exceed
-SLENDER = 0.1  # of the first axis: what is wider is no line
+SLENDER = 0.1  # of the first axis: what is wider is not a line
 SEGMENTS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 
 
 class Delta(NamedTuple):
-    """How far two poses are apart: metres, seconds, degrees of turning, or frames."""
+    """The distance between two poses: metres, seconds, degrees of rotation, or frames."""
 
     amount: float
     unit: str
 
     def __str__(self) -> str:
-        """Write it as it is read."""
+        """Format it as it is parsed."""
         return f"{self.amount:g}{self.unit}"
 
     def along(self, each: Trajectory) -> Array | None:
-        """Return how far each pose of a trajectory is along it, in the unit; None where nothing says so."""
+        """Return the cumulative distance at each pose of a trajectory, in the unit; None if it is not known."""
         if self.unit == "frames":
             return np.arange(each.size, dtype=float)
         if self.unit == "m":
@@ -74,17 +74,17 @@ def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -
 
 
 class Settings(NamedTuple):
-    """What a comparison does.
+    """The settings of a comparison.
 
-    match: "interpolate" or "nearest"; max_gap_ns, max_diff_ns, min_match (a share): what counts as a partner
-    offset: nanoseconds that EST's clock is behind, or "auto" within offset_limit_s; None: none, but one may be told of
-    align, up: one of ALIGNMENTS or origin+scale, and the axis of yaw; align_first: the fit takes the pairs so far only;
-        tie_first: it puts the first position onto that of the reference
-    mount: REF's body in EST's, or "auto"
-    deltas: None for 1m, 10m and 100m as far as the path is long; all_pairs, tolerance, pairs_from: which poses
+    match: "interpolate" or "nearest"; max_gap_ns, max_diff_ns, min_match (a share): conditions for a pair
+    offset: nanoseconds by which EST's clock lags, or "auto" within offset_limit_s; None: none, but one may be reported
+    align, up: one of ALIGNMENTS or origin+scale, and the axis of yaw; align_first: the fit uses only the first pairs;
+        tie_first: it aligns the first positions exactly
+    mount: pose of REF's body in EST's, or "auto"
+    deltas: None for 1m, 10m and 100m up to the length of the path; all_pairs, tolerance, pairs_from: which poses
     segments: of KITTI, in metres, from every segment_step-th pair
     start, stop: (True, nanoseconds) after the first pair, or (False, a stamp on REF's clock)
-    evo: what evo does where nothing else is said, and its two more numbers
+    evo: evo's defaults, and its two additional numbers
     """
 
     match: str = "interpolate"
@@ -114,14 +114,14 @@ DELTAS = (Delta(1.0, "m"), Delta(10.0, "m"), Delta(100.0, "m"))
 
 
 class Comparison(NamedTuple):
-    """How far an estimate is from its reference.
+    """The errors of an estimate relative to its reference.
 
-    names, sizes: of the two; ref_duration_ns: 0 where poses are counted
+    names, sizes: of the two; ref_duration_ns: 0 if poses have no stamps
     est: all of it, in order; pairs: as they were compared, in their own worlds
-    moved: the estimate's side of them as the fit places it
-    ate_by_alignment: the rmse under each of ALIGNMENTS, None where it is not determined
-    relative: errors of the way for each delta; segments: KITTI's, None without rotations
-    hints: what a person should know
+    moved: the aligned poses of the estimate
+    ate_by_alignment: the rmse under each of ALIGNMENTS, None if it is not determined
+    relative: relative errors for each delta; segments: KITTI's, None without rotations
+    hints: warnings
     """
 
     names: tuple[str, str]
@@ -159,7 +159,7 @@ def compare(
 ) -> Comparison:
     """Compare an estimate with its reference.
 
-    Raises ValueInvalid where they have no stamps in common, or what is asked is not determined.
+    Raises ValueInvalid if they have no stamps in common, or a requested quantity is not determined.
     """
     hints: list[str] = []
     sizes = (ref.size, est.size)
@@ -193,7 +193,7 @@ def compare(
 def _on_the_ground(
     ref: Trajectory, est: Trajectory, names: tuple[str, str], hints: list[str]
 ) -> tuple[Trajectory, Trajectory]:
-    """Return trajectories of the Earth's frame along east, north, up of the first position: there z is up."""
+    """Return trajectories of the Earth's frame along east, north, up of the first position, so that z is up."""
     found = next(((each, name) for each, name in ((ref, names[0]), (est, names[1])) if _is_of_earth(each)), None)
     if found is None:
         return ref, est
@@ -211,7 +211,7 @@ def _is_of_earth(each: Trajectory) -> bool:
 
 
 def _seen_from(each: Trajectory, pose: Rigid) -> Trajectory:
-    """Return a trajectory as it is seen from a pose in its world."""
+    """Return a trajectory relative to a pose in its world."""
     xyz = np.stack(earth.seen_from(*pose, *each.xyz.T), -1)
     if each.xyzw is None:
         return each._replace(xyz=xyz, world=ENU)
@@ -222,7 +222,7 @@ def _seen_from(each: Trajectory, pose: Rigid) -> Trajectory:
 def _paired(
     ref: Trajectory, est: Trajectory, settings: Settings, names: tuple[str, str], hints: list[str]
 ) -> tuple[Pairs, int, float | None]:
-    """Return the pairs, and the offset of the clocks with its score if it was looked for."""
+    """Return the pairs, and the offset of the clocks with its score if it was estimated."""
     if ref.stamps_ns is None or est.stamps_ns is None:
         if (ref.stamps_ns is None) != (est.stamps_ns is None):
             raise ValueInvalid(f"{names[ref.stamps_ns is not None]} has no stamps; give them with --stamps FILE")
@@ -268,7 +268,7 @@ def _span(each: Trajectory, name: str) -> str:
 
 
 def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]) -> None:
-    """Warn of an offset that is larger than half an interval and clear, where looking for it costs little."""
+    """Warn about an offset that is clearly larger than half an interval, if estimating it is cheap."""
     intervals = [pairing.interval(each.stamps_ns) for each in (ref, est)]
     span = max(ref.stamps_ns[-1], est.stamps_ns[-1]) - min(ref.stamps_ns[0], est.stamps_ns[0])
     if span > MOST_TRIED * min(intervals) / 2:
@@ -281,7 +281,7 @@ def _warn_of_clock(ref: Trajectory, est: Trajectory, name: str, hints: list[str]
 
 
 def _cut(pairs: Pairs, settings: Settings) -> Pairs:
-    """Keep the pairs from the start to the end that are asked for, both inclusive."""
+    """Keep the pairs from the start to the end, both inclusive."""
     if settings.start is None and settings.stop is None:
         return pairs
     stamps = pairs.ref.stamps_ns
@@ -299,7 +299,7 @@ def _cut(pairs: Pairs, settings: Settings) -> Pairs:
 
 
 def _mounted(pairs: Pairs, settings: Settings) -> tuple[Pairs, Transform | None]:
-    """Put REF's body in the place of EST's: est_i X."""
+    """Replace EST's body by REF's body: est_i X."""
     mount = settings.mount
     if mount is None:
         return pairs, None
@@ -312,7 +312,7 @@ def _mounted(pairs: Pairs, settings: Settings) -> tuple[Pairs, Transform | None]
 
 
 def _found_mount(ref: Trajectory, est: Trajectory, settings: Settings) -> Transform:
-    """Return REF's body in EST's: the lever arm with the fit, and a rotation that all pairs share."""
+    """Return REF's body in EST's: the lever arm from the fit, and a rotation common to all pairs."""
     up = np.array(settings.up)
     arm = lever_arm(settings.align, ref, est, up)
     shifted = est.with_poses(est.poses @ Transform(Rotation.identity(), arm))
@@ -353,13 +353,13 @@ def _spread(rotations: Rotation) -> float:
 
 
 def _is_nearly_line(xyz: Array, noise: float | None) -> bool:
-    """Return True if the second axis of positions is short, and not clear of what even a fit with a scale leaves."""
+    """Return True if the second axis of positions is short and not significant, even for a fit with a scale."""
     long, second, _ = principal_axes(xyz)
     return noise is not None and second < min(NEAR_A_LINE * noise, SLENDER * long)
 
 
 def _warn_of_bodies(ref: Trajectory, moved: Trajectory, settings: Settings, hints: list[str]) -> None:
-    """Warn of a rotation between the two bodies, or of worlds that nothing aligned, that is the same all the way."""
+    """Warn about a constant rotation between the two bodies, or between worlds that were not aligned."""
     if ref.rotation is None or moved.rotation is None:
         return
     of_bodies, of_worlds = moved.rotation.inverse() @ ref.rotation, moved.rotation @ ref.rotation.inverse()
@@ -376,7 +376,7 @@ def _warn_of_bodies(ref: Trajectory, moved: Trajectory, settings: Settings, hint
 
 
 def _shared(rotations: Rotation) -> Rotation | None:
-    """Return the mean of rotations if it is clear and about the same for all."""
+    """Return the mean of rotations if it is significant and about the same for all."""
     mean = rotations.mean()
     return mean if float(mean.angle()) > max(APART, STEADY * _spread(rotations)) else None
 
@@ -384,7 +384,7 @@ def _shared(rotations: Rotation) -> Rotation | None:
 def _relative(
     ref: Trajectory, est: Trajectory, walked: Trajectory, settings: Settings, hints: list[str]
 ) -> Iterator[tuple[Delta, RelativeErrors]]:
-    """Yield the errors of the way for every delta that the path is long enough for."""
+    """Yield the relative errors for every delta that the path is long enough for."""
     for delta in settings.deltas or DELTAS:
         along = delta.along(walked)
         if along is None:

@@ -1,6 +1,6 @@
 """The graph of measurements: frames that are fixed to each other form bodies, and rows join pairs of bodies.
 
-Which bodies rows join, in which order a tree reaches them, what no loop checks.  Bodies are numbered, 0 is the root.
+Connectivity, spanning trees, and rows that are in no loop.  Bodies are numbered, 0 is the root.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     Fixed = Sequence[tuple[str, str, Rigid]]
 
 class SpanningTree(NamedTuple):
-    """Rows that reach every body from the root on one way.
+    """Rows that connect every body to the root by one path.
 
-    order: the bodies, each after the one it hangs from
-    above: the body each hangs from, itself for the root; row: the row that joins them, -1 for the root
-    depth: how many rows from the root
+    order: the bodies, each after its parent
+    above: the parent of each body, itself for the root; row: the row that joins them, -1 for the root
+    depth: the number of rows from the root
     """
 
     order: list[int]
@@ -45,7 +45,7 @@ class SpanningTree(NamedTuple):
         return rows
 
     def beyond(self, row: int) -> list[int]:
-        """Return the bodies that hang by a row."""
+        """Return the bodies below a row."""
         hang = [False] * len(self.order)
         for body in self.order:
             hang[body] = self.row[body] == row or (self.row[body] >= 0 and hang[self.above[body]])
@@ -53,7 +53,7 @@ class SpanningTree(NamedTuple):
 
 
 def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree:
-    """Grow the tree of the first rows that close no loop (Kruskal); together the rows join all bodies."""
+    """Return the tree of the first rows that close no loop (Kruskal); together the rows join all bodies."""
     groups = Groups[int]()
     near: list[list[tuple[int, int]]] = [[] for _ in range(count)]
     for row in rows:
@@ -62,7 +62,7 @@ def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree
             near[a].append((b, row))
             near[b].append((a, row))
     order, above, by, depth = [0], [0] * count, [-1] * count, [0] * count
-    for body in order:  # grows while it is walked
+    for body in order:  # grows during the loop
         for other, row in near[body]:
             if row != by[body]:
                 above[other], by[other], depth[other] = body, row, depth[body] + 1
@@ -73,7 +73,7 @@ def spanning_tree(count: int, pairs: Pairs, rows: Iterable[int]) -> SpanningTree
 def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
     """Return the rows of a spanning tree that are in no loop with any of these rows."""
     found = {row for row in tree.row if row >= 0}
-    looped = Groups[int]()  # bodies that loops found so far join, the highest of each for all
+    looped = Groups[int]()  # bodies joined by loops so far; the highest represents them
     for row in set(rows) - found:
         a, b = map(looped.of, pairs[row])
         while a != b:
@@ -86,15 +86,15 @@ def bridges(tree: SpanningTree, pairs: Pairs, rows: Iterable[int]) -> set[int]:
 
 
 MOST = 1000  # frames
-APART = 1e-6  # metres, radians: what two exact ways to one frame may differ by
-LISTED = 150  # characters of names in the message on frames that nothing connects
+APART = 1e-6  # metres, radians: the largest difference between two exact paths to one frame
+LISTED = 150  # characters of names in the message about unconnected frames
 
 
 class Bodies(NamedTuple):
-    """The bodies that measured and fixed frames form.
+    """The bodies formed by measured and fixed frames.
 
-    frames: in order of first mention; number: the body of each, 0 that of the root
-    pose: where each is in its body; in the root's body that is where it is in the root
+    frames: in order of first mention; number: the body of each, 0 for the root's
+    pose: of each frame in its body; in the root's body, in the root
     parent: of each frame that keeps its entry, the frame it is fixed in
     """
 
@@ -111,7 +111,7 @@ class Bodies(NamedTuple):
 
 
 def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixed) -> Bodies:
-    """Gather frames into bodies; raises ValueInvalid for an unknown root and edges that contradict each other."""
+    """Group frames into bodies; raises ValueInvalid for an unknown root and contradictory edges."""
     edges = [*((m.parent, m.child) for m in measurements), *((parent, child) for parent, child, _ in fixed)]
     frames = tuple(dict.fromkeys(name for edge in edges for name in edge))
     if len(frames) > MOST:
@@ -131,7 +131,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
         if start not in number:
             number[start], pose[start] = len(set(number.values())), Transform.identity()
             reached = [start]
-            for name in reached:  # grows while it is walked
+            for name in reached:  # grows during the loop
                 for other, edge in near[name]:
                     if other not in number:
                         number[other], pose[other] = number[start], pose[name] @ edge
@@ -145,7 +145,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
 
 
 def _entries(fixed: Fixed) -> dict[str, str]:
-    """Return the parent of each frame that keeps one: every fixed edge but those that would close a loop."""
+    """Return the parent of each frame that keeps one: all fixed edges except those that would close a loop."""
     groups, parents = Groups[str](), dict[str, str]()
     for parent, child, _ in fixed:
         if child not in parents and groups.join(child, parent):
@@ -154,7 +154,7 @@ def _entries(fixed: Fixed) -> dict[str, str]:
 
 
 def require_connected(bodies: Bodies, pairs: Iterable[tuple[int, int]]) -> None:
-    """Raise ValueInvalid, with the frames in their groups, where rows do not join all bodies."""
+    """Raise ValueInvalid, with the groups of frames, if rows do not join all bodies."""
     joined = Groups[int]()
     for pair in pairs:
         joined.join(*pair)

@@ -1,7 +1,7 @@
-"""Where a camera is on a hand, or beside a robot: G X C = Z solved for X and Z from pairs of poses.
+"""Hand-eye calibration: G X C = Z solved for X and Z from pairs of poses.
 
-G: base_from_gripper, C: camera_from_target, X: gripper_from_camera, Z: base_from_target.  With the camera beside the
-robot inv(G) stands for G, so that X is base_from_camera and Z gripper_from_target.
+G: base_from_gripper, C: camera_from_target, X: gripper_from_camera, Z: base_from_target.  With a camera fixed to the
+base, inv(G) replaces G, so that X is base_from_camera and Z gripper_from_target.
 """
 
 from __future__ import annotations
@@ -42,31 +42,31 @@ if TYPE_CHECKING:
 
 NAMES = ("base", "gripper", "camera", "target")
 FEWEST = 3  # samples
-FEWEST_ROBUST = 5  # fewer cannot say which of them is wrong
-FEWEST_APART = 4  # of three the turns alone can fit all places: metres count beside radians as in the closed form
-FEWEST_CERTAIN = 6  # fewer leave the sigmas rough: at 8 they are within a few per cent on average
+FEWEST_ROBUST = 5  # with fewer the outlier cannot be identified
+FEWEST_APART = 4  # with three, rotations alone can fit all positions: metres are weighted as in the closed form
+FEWEST_CERTAIN = 6  # with fewer the sigmas are rough: with 8 they are within a few per cent on average
 DRAWS, DRAWN = 60, 5
-MOST = 10_000  # pairs that are looked at, or one of each sample
+MOST = 10_000  # pairs that are used, or one of each sample
 STEPS, ROUGH_STEPS = 100, 4
 DONE = 1e-12  # of the extent, and radians
 STUCK = 1e9  # damping
 UNDAMPED = 1e-12
 ROUNDING = 1e-8
-BETTER = 5.0  # times: what fits so much better is what was meant
-CLEARLY = 2.0  # times, that both metres and radians must be better
-FLAT, FLAT_SHARE = radians(0.5), 0.02  # turns about the second axis: none, also as a part of those about the first
+BETTER = 5.0  # ratio: an alternative that fits this much better was meant
+CLEARLY = 2.0  # ratio by which both metres and radians must be better
+FLAT, FLAT_SHARE = radians(0.5), 0.02  # about the second axis: none, also relative to the first
 SLIGHT = radians(5.0)
-CLEAR = (radians(1.0), radians(175.0))  # turns of a pair whose axis is certain
+CLEAR = (radians(1.0), radians(175.0))  # rotations of a pair whose axis is certain
 ONE = PoseArrays(np.eye(3), np.zeros(3))
 
 
 class HandEye(NamedTuple):
-    """X and Z with their covariances (6x6, as ROS has them), and how the samples fit.
+    """X and Z with their covariances (6x6, as in ROS), and the fit of the samples.
 
-    noise_at: the frame at which errors are alike, None where there are none
-    used: which samples were kept; u: how many sigmas each is off; residuals: (n, 6), metres and radians
-    sigma: of each axis, metres and radians; dof: 3 n - 6 for each of them; rms_distance, rms_angle: of those used
-    turns: rms about the two main axes of the pairs of samples used, radians; warnings: sentences
+    noise_at: the frame in which errors are equal, None if there are none
+    used: the inliers; u: the residual of each sample in sigmas; residuals: (n, 6), metres and radians
+    sigma: of each axis, metres and radians; dof: 3 n - 6 for each of them; rms_distance, rms_angle: of the inliers
+    turns: rms about the two main axes of the pairs of inliers, radians; warnings: messages
     """
 
     x: Transform
@@ -89,10 +89,10 @@ def solve_hand_eye(
     gripper: Transform, target: Transform, *, eye_to_hand: bool = False, robust: bool = True,
     names: tuple[str, str, str, str] = NAMES,
 ) -> HandEye:  # fmt: skip
-    """Solve for X and Z by least squares, the noise being where it is likeliest; wrong samples are left out.
+    """Solve for X and Z by least squares, with the most likely location of the noise; outliers are rejected.
 
     gripper: base_from_gripper; target: camera_from_target; as many, (n,)
-    Raises ValueInvalid where the samples are too few, turn about one axis only, or fit the other way round.
+    Raises ValueInvalid if the samples are too few, rotate about one axis only, or fit the inverse setting.
     """
     if len(gripper) != len(target):
         raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
@@ -154,7 +154,7 @@ def solve_hand_eye(
 
 
 class _Model(NamedTuple):
-    """X and Z, where the noise is, and what a fit with it knows: sigmas, its Hessian (12, 12) and 2 ln s_t + 2 ln s_r.
+    """X and Z, the location of the noise, and the results of a fit: sigmas, Hessian (12, 12) and 2 ln s_t + 2 ln s_r.
 
     ratio: sigmas that the fit may only scale
     """
@@ -169,7 +169,7 @@ class _Model(NamedTuple):
 
 
 class _Loop(NamedTuple):
-    """The same errors E = left X right = before inv(Z) after: how X and how Z stand in them."""
+    """The errors E = left X right = before inv(Z) after: the factors around X and Z."""
 
     left: PoseArrays
     right: PoseArrays
@@ -203,7 +203,7 @@ class _Samples(NamedTuple):
         return fitted_sigmas(self.residuals(model), weights, 6)
 
     def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
-        """Minimise ln S_t + ln S_r by Gauss-Newton steps with sigmas that follow, damped where one does not help."""
+        """Minimise ln S_t + ln S_r by Gauss-Newton steps with updated sigmas, damped if a step does not help."""
         extent = max(np.abs(poses.translations).max() for poses in self)
         units = np.repeat([extent or 1.0, 1.0, extent or 1.0, 1.0], 3)
         now, gradient = self._linear(model, weights)
@@ -222,7 +222,7 @@ class _Samples(NamedTuple):
         return now
 
     def _linear(self, model: _Model, weights: Array) -> tuple[_Model, Array]:
-        """Return a model with its Hessian and its misfit, and the gradient."""
+        """Return a model with its Hessian and its cost, and the gradient."""
         loop = CUTS[model.cut](*self, model.x, model.z)
         errors = _errors(loop, model.x)
         sigmas = fitted_sigmas(errors, weights, 6)
@@ -242,7 +242,7 @@ def _errors(loop: _Loop, x: PoseArrays) -> Array:
 
 
 def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
-    """Return how errors (n, 6) move with steps of X and of Z: (n, 6, 12)."""
+    """Return the derivatives of errors (n, 6) by steps of X and of Z: (n, 6, 12)."""
     left, back = loop.left.rotations, loop.before.rotations @ model.z.rotations.T
     bent = inverse_left_jacobian(turned)
     slopes = np.zeros((len(turned), 6, 12))
@@ -256,7 +256,7 @@ def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
 
 
 def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
-    """Return the best closed form of all samples and of draws of few, with the medians of its errors."""
+    """Return the best closed form of all samples and of small random subsets, with the medians of its errors."""
     count = len(samples.gripper.translations)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
     fives: Iterable[Rows] = draws(DRAWS * robust, min(DRAWN, count - 1), count)
@@ -272,9 +272,9 @@ def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
 
 
 def park_martin(gripper: PoseArrays, camera: PoseArrays) -> PoseArrays:
-    """Return the X of A X = X B, in closed form: first the rotation, then the place; source: Park and Martin 1994.
+    """Return the X of A X = X B, in closed form: first the rotation, then the position; source: Park and Martin 1994.
 
-    A and B are the motions of gripper and camera between two samples: R_X turns the rotation vectors of B onto those
+    A and B are the motions of gripper and camera between two samples: R_X rotates the rotation vectors of B to those
     of A, and (R_A - I) t_X = R_X t_B - t_A.
     """
     a, b = _motions(gripper, camera)
@@ -294,7 +294,7 @@ def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseA
 
 
 def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
-    """Return a warning where a factor on the target's translations fits better: (R_A - I) t_X - s R_X t_B = -t_A."""
+    """Return a warning if a factor on the target's translations fits better: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
     lever, turned = (a.rotations - np.eye(3)).reshape(-1, 3), applied(x.rotations, b.translations).reshape(-1)
     place, plain = _least_squares(lever, turned - a.translations.reshape(-1))
@@ -305,13 +305,13 @@ def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
 
 
 def _least_squares(slopes: Array, wanted: Array) -> tuple[Array, float]:
-    """Return the least-squares solution, and how long what it leaves is."""
-    found: Any = np.linalg.lstsq(slopes, wanted, rcond=ROUNDING)[0]  # what no row settles is 0
+    """Return the least-squares solution, and the norm of the residuals."""
+    found: Any = np.linalg.lstsq(slopes, wanted, rcond=ROUNDING)[0]  # unobservable components are 0
     return found, float(length(slopes @ found - wanted))
 
 
 def _pairs(count: int) -> tuple[Indices, Indices]:
-    """Return all pairs of samples; of many each with those that follow it at some distances that are drawn."""
+    """Return all pairs of samples; of many, each with others at some random distances."""
     if count * count <= 2 * MOST:
         return np.triu_indices(count, 1)
     lags = np.array(next(draws(1, max(MOST // count, 1), count - 1))) + 1
@@ -320,7 +320,7 @@ def _pairs(count: int) -> tuple[Indices, Indices]:
 
 
 class _Turns(NamedTuple):
-    """Turns of pairs of samples: rms about their first and second axis, radians, and the first axis as text."""
+    """Rotations of pairs of samples: rms about their first and second axis, radians, and the first axis as text."""
 
     rms: tuple[float, float]
     axis: str
@@ -365,7 +365,7 @@ def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str,
 
 
 def _way_warnings(medians: Array, others: Array, count: int, *, eye_to_hand: bool) -> list[str]:
-    """Warn where few samples fit the other setting about as well; three always do."""
+    """Warn if few samples fit the other setting about as well; three always do."""
     if count >= FEWEST_CERTAIN or others.prod() > BETTER**2 * medians.prod():
         return []
     more = "a fourth sample" if count == FEWEST else "more samples"

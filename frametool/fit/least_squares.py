@@ -1,9 +1,9 @@
-"""What fits share: normal equations, poses as arrays of matrices, and which measurements are kept.
+"""Common parts of all fits: normal equations, poses as arrays of matrices, and robust outlier rejection.
 
 rotations: (n, 3, 3); translations: (n, 3), metres.  An error or a step is (n, 6): metres and a rotation vector, both
-along the fixed axes of the parent frame, as the covariances of ROS: t + d[:3], Exp(d[3:]) R.
-u is how many sigmas a measurement is off, as the root of the mean square of its numbers; the sigmas come from medians
-where nobody gave them.
+along the fixed axes of the parent frame, as in the covariances of ROS: t + d[:3], Exp(d[3:]) R.
+u is the residual of a measurement in sigmas, the root mean square of its components; sigmas that the user does not
+state are estimated from medians.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
     Rows: TypeAlias = slice | list[int] | Mask
 
 class NotSettled(ValueInvalid):
-    """Report equations that have no solution."""
+    """Equations that have no solution."""
 
     def __init__(self) -> None:
-        """Say so."""
+        """Set the message."""
         super().__init__("the numbers do not settle what is asked for: too few, too alike or too far apart")
 
 
 def solve_normal(matrix: Array, right: Array) -> Array:
     """Return inv(matrix) right, (n, k), of a symmetric positive definite matrix; its rows may differ in units.
 
-    Raises NotSettled where there is no solution.
+    Raises NotSettled if there is no solution.
     """
     scaled, units = _scaled(matrix)
     try:
@@ -53,7 +53,7 @@ def solve_normal(matrix: Array, right: Array) -> Array:
 
 
 def _scaled(matrix: Array) -> tuple[Array, Array]:
-    """Return a matrix whose diagonal is 1, and the units of its rows, (n, 1); raises NotSettled without a diagonal."""
+    """Return the matrix scaled to a diagonal of 1, and the units of its rows, (n, 1); NotSettled without one."""
     diagonal = np.diagonal(matrix)[:, None]
     if not (diagonal > 0.0).all():
         raise NotSettled
@@ -62,7 +62,7 @@ def _scaled(matrix: Array) -> tuple[Array, Array]:
 
 
 def inverse(matrix: Array) -> Array:
-    """Return the inverse of a symmetric positive definite matrix, symmetric; raises NotSettled where there is none."""
+    """Return the inverse of a symmetric positive definite matrix, symmetric; raises NotSettled if there is none."""
     scaled, units = _scaled(matrix)
     try:
         np.linalg.cholesky(scaled)
@@ -86,7 +86,7 @@ def applied(matrices: Array, vectors: Array) -> Array:
 
 
 def length(vectors: Array) -> Array:
-    """Return the lengths of vectors, which lie along the last axis."""
+    """Return the lengths of vectors along the last axis."""
     found: Array = np.linalg.norm(vectors, axis=-1)
     return found
 
@@ -114,7 +114,7 @@ class PoseArrays(NamedTuple):
 
     @property
     def inverse(self) -> PoseArrays:
-        """The poses the other way round."""
+        """The inverse poses."""
         back = np.swapaxes(self.rotations, -1, -2)
         return PoseArrays(back, -applied(back, self.translations))
 
@@ -123,12 +123,12 @@ class PoseArrays(NamedTuple):
         return PoseArrays(self.rotations @ other.rotations, self.apply(other.translations))
 
     def apply(self, points: Array) -> Array:
-        """Move points."""
+        """Transform points."""
         moved: Array = applied(self.rotations, points) + self.translations
         return moved
 
     def at(self, index: Any) -> PoseArrays:
-        """Choose poses as numpy does."""
+        """Select poses as numpy does."""
         return PoseArrays(self.rotations[index], self.translations[index])
 
     def stepped(self, steps: Array) -> PoseArrays:
@@ -183,15 +183,15 @@ def inverse_left_jacobian(rotvecs: Array) -> Array:
 
 Model = TypeVar("Model")
 
-KEPT = 3.0  # sigmas: what is further off is left out
+KEPT = 3.0  # sigmas: a larger residual is an outlier
 CERTAIN = 2.5  # sigmas: up to here a first weight is 1
 MEDIAN_OF_THREE = 1.538  # the median of |r| of three numbers of deviation 1: the root of that of chi2 with 3 degrees
 MEDIAN_OF_SIX = 0.944  # the median of u of six numbers: the root of that of chi2 with 6 degrees, over 6
-LEAST = 1e-9  # metres, radians: no sigma is below
+LEAST = 1e-9  # metres, radians: the minimum of a sigma
 FARTHEST = 1e100  # metres: sums of squares stay finite
-STEADY = 1e-3  # change of a first weight that is rest
+STEADY = 1e-3  # change of a first weight at convergence
 FIRST_ROUNDS = 30
-ROUNDS = 20  # of leaving out and taking back; in the second half nothing more is left out, so that they end
+ROUNDS = 20  # of rejecting and readmitting; in the second half nothing more is rejected, so that it terminates
 
 
 def require_near(translations: Array, name: str) -> None:
@@ -201,9 +201,9 @@ def require_near(translations: Array, name: str) -> None:
 
 
 def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
-    """Yield so many seeded choices of rows, the same for ever.
+    """Yield this many random choices of rows, seeded and reproducible.
 
-    Of Python's generators only `random()` keeps its sequence between versions by promise, and numpy's keep none.
+    Of Python's generators only `random()` guarantees its sequence between versions, and numpy's none.
     """
     source = Random(0)  # noqa: S311 - no secret
     for _ in range(count):
@@ -214,7 +214,7 @@ def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
 
 
 class Settled(NamedTuple, Generic[Model]):
-    """A fit of the rows kept: residuals of all (n, 3 or 6), a sigma for each three of them, and u of all."""
+    """A fit of the inliers: residuals of all (n, 3 or 6), a sigma for each three of them, and u of all."""
 
     model: Model
     kept: Mask
@@ -227,10 +227,10 @@ def settled(
     model: Model, residuals: Callable[[Model], Array], rough: Callable[[Model, Array], Model],
     fit: Callable[[Model, Array], Model], *, unknown: int, robust: bool,
 ) -> Settled[Model]:  # fmt: skip
-    """Fit, leave out what is further off than 3 sigmas, and fit the rest again until the rows stay.
+    """Fit, reject rows beyond 3 sigmas, and fit the rest again until the inliers do not change.
 
-    residuals: (n, 3) or (n, 6) of a model; unknown: how many numbers each three of them share
-    rough, fit: a better model and the best one, by a weight for each row
+    residuals: (n, 3) or (n, 6) of a model; unknown: the number of unknowns that each three of them share
+    rough, fit: return an improved model and the best one, for a weight per row
     """
     count = len(residuals(model))
     kept = np.ones(count, bool)
@@ -262,14 +262,14 @@ def lengths(residuals: Array) -> Array:
 
 
 def deviations(residuals: Array, sigmas: Array) -> Array:
-    """Return u of rows: the root of the mean square of their numbers in sigmas."""
+    """Return u of rows: the root mean square of their numbers in sigmas."""
     off = lengths(residuals) / sigmas
     u: Array = np.sqrt((off**2).sum(-1) / (3.0 * off.shape[1]))
     return u
 
 
 def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Array:
-    """Return the sigma of each three numbers of weighted rows that share so many unknown ones."""
+    """Return the sigma of each three numbers of weighted rows that share this many unknowns."""
     dof = max(3.0 * float(weights.sum()) - unknown, 1.0)
     squares = (weights[:, None] * lengths(residuals) ** 2).sum(0)
     return np.array([rms_sigma(each, dof) for each in squares.tolist()])
@@ -282,10 +282,10 @@ def first_weights(u: Array) -> Array:
 
 
 def median_sigma(lengths: Array, share: float = 1.0) -> float:
-    """Return the sigma of three numbers each by the median of their lengths; share q: what the fit leaves of noise."""
+    """Return the sigma of three numbers each from their median length; share q: the noise left by a fit."""
     return max(float(np.median(lengths)) / (MEDIAN_OF_THREE * share), LEAST)
 
 
 def rms_sigma(squares: float, dof: float) -> float:
-    """Return the sigma per axis of a sum of squares with so many degrees of freedom."""
+    """Return the sigma per axis from a sum of squares with this many degrees of freedom."""
     return max(float(np.sqrt(squares / dof)), LEAST)

@@ -1,7 +1,7 @@
-"""The tree that measurements mean: where each frame is in the root, how sure that is, what was left out and why.
+"""Estimate a tree from measurements: the pose of each frame in the root, its covariance, and the outliers.
 
-Blunders are named, rivals exchanged, and loops where nothing tells are errors.  Covariances are first order, the
-inverse of the normal equations, all loops in.
+Outliers are explained by common mistakes; if another row of the loop has one, that row is rejected instead; a loop
+whose outlier cannot be identified is an error.  Covariances are first order, the inverse of the normal equations.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 class Uncertainty:
     """Covariances (6, 6) of poses between frames of bodies, along the axes of the target frame.
 
-    None where a pose depends on rows whose noise is neither given nor shown by a loop.
+    None if a pose depends on rows whose noise is neither stated nor observable from a loop.
     """
 
     def __init__(self, problem: TreeProblem, found: Fitted) -> None:
-        """Take a fit; nothing is computed before it is asked for."""
+        """Store a fit; nothing is computed yet."""
         self._problem, self._found = problem, found
         self._known = Groups[int]()
         for row in np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist():
@@ -69,12 +69,12 @@ class Uncertainty:
         return whole
 
 
-NEAR = Tolerance(0.01, math.radians(1.0))  # where nothing says how sure a measurement is
+NEAR = Tolerance(0.01, math.radians(1.0))  # the tolerance without any sigmas
 LEAST = 1e-9  # metres, radians
-FITTING = 4.0  # sigmas: a blunder explains a measurement that it brings this near
-ALIKE = 0.5  # sigmas: blunders that make so nearly the same of a measurement are equally good
-TIE = 1e-9  # of u: what is not nearer than this explains nothing
-O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, as in papers
+FITTING = 4.0  # sigmas: a mistake explains a measurement that it brings this near
+ALIKE = 0.5  # sigmas: mistakes with so similar results are equally good
+TIE = 1e-9  # of u: an improvement below this does not count
+O = Transform(axes_change("flu", "optical"), (0.0, 0.0, 0.0))  # body_from_optical, in the notation of papers
 
 
 def _translation_of_inverse(m: Measurement) -> Transform:
@@ -88,7 +88,7 @@ def _yaw_first(m: Measurement) -> Transform | None:
     return m.turned(*Rotation.from_rpy(m.written[1][::-1]).components)
 
 
-# what a measurement was meant to be, if this blunder was made
+# the intended measurement, if this mistake was made
 BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
     "inverted": lambda m: m.transform.inverse(),
     "rotation inverted": lambda m: m.turned(*m.transform.rotation.inverse().components),
@@ -106,11 +106,12 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
 
 
 def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array) -> str | None:
-    """Name the blunder that best explains a measurement of a pose; None where none does.
+    """Return the mistake that best explains a measurement of a pose; None if none does.
 
-    pose: where the child is in the parent; information: the inverse covariance (6, 6) of the measurement
-    It must bring the measurement within 4 sigmas, and nearer than it is as it stands.  Of blunders that noise cannot
-    tell from the best, the first is named: half a turn is its own inverse.
+    pose: of the child in the parent; information: the inverse covariance (6, 6) of the measurement
+    It must bring the measurement within 4 sigmas, and nearer than it is.  Of mistakes that noise cannot distinguish
+    from
+    the best, the first is returned: a rotation by 180 degrees is its own inverse.
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
@@ -127,9 +128,9 @@ def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array)
 def loops(
     tree: FrameTree, measurements: Sequence[Measurement], tolerance: Tolerance | None
 ) -> tuple[list[Finding], list[str], int]:
-    """Compare measurements with a tree: findings of those that are off, frames it lacks, how many have no way in it.
+    """Compare measurements with a tree: findings for those that differ, missing frames, number of unconnected rows.
 
-    tolerance: what still agrees; None: 3 sigmas where a measurement has a covariance, else 10 mm and 1 deg
+    tolerance: of agreement; None: 3 sigmas if a measurement has a covariance, else 10 mm and 1 deg
     """
     findings, lacking, apart = [], dict[str, None](), 0
     for each in measurements:
@@ -151,7 +152,7 @@ def loops(
         else:
             near = tolerance or NEAR
             agrees, sigmas = metres <= near.metres and radians <= near.radians, ""
-            # `FITTING` sigmas are reached where both halves reach the tolerance
+            # `FITTING` sigmas are reached if both parts reach the tolerance
             sigma = np.maximum(np.repeat([near.metres, near.radians], 3), LEAST) / FITTING / 3**0.5
             information = np.diag(sigma**-2.0)
         if not agrees:
@@ -173,10 +174,10 @@ ONE_LINE = 200  # characters
 
 
 class Verdicts(NamedTuple):
-    """The words for each row, and what is not settled.
+    """The explanations of rows, and open questions.
 
-    noise: rows without a blunder that the doubt about the fit explains; swaps: rows to exchange, (left out, rival)
-    undecided: the first row of whose loop nothing tells which is wrong, with its rivals
+    noise: rows without a mistake that the uncertainty of the fit explains; swaps: rows to exchange, (rejected, rival)
+    undecided: the first row whose loop does not identify the outlier, with its rivals
     """
 
     fits: list[str | None]
@@ -186,9 +187,9 @@ class Verdicts(NamedTuple):
 
 
 def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> tuple[Fitted, list[str | None]]:
-    """Name the blunders in what was left out; where a rival has one instead, leave out the rival.
+    """Explain the rejected rows; if a rival has a mistake instead, reject the rival.
 
-    Raises ValueInvalid where none of a row and its rivals, or more than one, has a blunder that fits.
+    Raises ValueInvalid if none of a row and its rivals, or more than one, has a mistake that fits.
     """
     tried = {found.kept.tobytes()}
     while True:
@@ -210,12 +211,12 @@ def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fit
 
 
 def place_of(measurements: Sequence[Measurement], row: int) -> str:
-    """Return where a measurement stands, else its number."""
+    """Return the place of a measurement, else its number."""
     return printable(measurements[row].place) or f"measurement {row + 1}"
 
 
 class _Case:
-    """A fit, and the rows that it keeps and leaves out."""
+    """A fit, and its inliers and outliers."""
 
     def __init__(self, problem: TreeProblem, measurements: Sequence[Measurement], found: Fitted) -> None:
         self.problem, self.measurements, self.found = problem, measurements, found
@@ -231,7 +232,7 @@ class _Case:
         self.uncertainty = Uncertainty(problem, found)
 
     def verdicts(self) -> Verdicts:
-        """Try the blunders on each row left out, and on its rivals: kept rows that only it checks."""
+        """Try the mistakes on each rejected row, and on its rivals: used rows that only it checks."""
         fits: list[str | None] = [None] * self.problem.size
         noise, swaps, undecided = [], [], None
         for row in np.flatnonzero(~self.found.kept).tolist():
@@ -256,13 +257,13 @@ class _Case:
         return Verdicts(fits, noise, swaps, undecided)
 
     def _beside_doubt(self, row: int, information: Array) -> Array:
-        """Return the information on a row beside the doubt about the pose that the fit has between its frames."""
+        """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
         parent, child = self.problem.pairs[row]
         doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
         return information if doubt is None else inverse(inverse(information) + doubt)
 
     def _pose_without(self, rival: int, row: int) -> PoseArrays:
-        """Return the pose that a rival would measure, were the bodies that hang by it placed by a row left out."""
+        """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
         measured, pairs = self.problem.rows.measured.at(row), self.problem.pairs
         hanging = set(self.tree.beyond(rival))
         parent, child = self.parents.at(row), self.children.at(row)
@@ -275,7 +276,7 @@ class _Case:
         return parent.inverse @ child
 
     def open_loop(self, row: int, rivals: list[int]) -> str:
-        """Return which rows form a loop, and how far it is open, on one line."""
+        """Return the rows of a loop and its closure error, on one line."""
         error = self.errors[row]
         open_by = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm {np.degrees(np.linalg.norm(error[3:])):.1f} deg"
         places = [place_of(self.measurements, each) for each in sorted([row, *rivals])]
@@ -290,8 +291,8 @@ class _Case:
 
 
 ROOT = PoseArrays(np.eye(3), np.zeros(3))
-FEW_LOOPS = 6  # fewer leave the sigmas rough where rotations can close them
-SINGULAR = 1e-12  # of the correlations: the least eigenvalue that a covariance has
+FEW_LOOPS = 6  # with fewer the sigmas are rough if rotations can close them
+SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
 
 
 def solve_tree(
@@ -300,10 +301,10 @@ def solve_tree(
 ) -> TreeSolution:  # fmt: skip
     """Find the tree that fits measurements best.
 
-    root: the frame that the others are given in; else the first that is never a child
+    root: the frame in which the others are expressed; default the first that is never a child
     fixed: (parent, child, components) of exact edges, whose frames move as one body
-    robust: leave out what does not agree with the rest; progress: called with the share that is done
-    Raises ValueInvalid: nothing or not everything is connected, an unknown root, undecided.
+    robust: reject outliers; progress: called with the finished share
+    Raises ValueInvalid: frames are not connected, an unknown root, undecided.
     """
     if not measurements:
         raise ValueInvalid("no measurements")
@@ -350,7 +351,7 @@ def _poses(transforms: list[Transform]) -> PoseArrays:
 
 
 def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
-    """Return a warning where too few loops separate the sigma of metres from that of radians."""
+    """Return a warning if there are too few loops to separate the sigma of metres from that of radians."""
     loops = int(found.kept.sum()) - problem.unknown
     if not (found.estimated and found.few_loops and loops < FEW_LOOPS):
         return []
@@ -359,17 +360,19 @@ def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
 
 
 class TreeSolution:
-    """A tree of measured frames, and what the measurements say about it.
+    """A tree of measured frames, and the results for the measurements.
 
-    root, frames: the frame that all are given in; all, in order of first mention
+    root, frames: the reference frame; all frames, in order of first mention
     parents: of each frame, the one its entry names: the root, or the frame that it is fixed in (`fixed`)
     residuals (n, 6), u, used, checked, fits: of each measurement
-    sigma: estimated (metres, radians) of those without a covariance, or None; sigma_factor: 1, or how much too small
-    the given sigmas are; they are believed all the same
-    dof: degrees of freedom of either half; rms_distance, rms_angle: of those used
-    tree: all of that as a tree with covariances, where `frametool.solve` made it
-    hints: what a person should know of the sigmas
-    rows: how many measurements of each frame are used; frame_checked: whether its pose in the root rests on loops only
+    sigma: estimated (metres, radians) of those without a covariance, or None; sigma_factor: 1, or the factor by which
+    the
+        stated sigmas are too small, without changing them
+    dof: degrees of freedom of metres and of radians; rms_distance, rms_angle: of the inliers
+    tree: all of that as a tree with covariances, if `frametool.solve` made it
+    hints: warnings about the sigmas
+    rows: the number of used measurements of each frame; frame_checked: whether its pose in the root depends only on
+    loops
     """
 
     tree: FrameTree
@@ -378,7 +381,7 @@ class TreeSolution:
         self, measurements: Sequence[Measurement], bodies: Bodies, problem: TreeProblem, found: Fitted,
         fits: list[str | None],
     ) -> None:  # fmt: skip
-        """Look at a fit from all sides."""
+        """Compute the results of a fit."""
         self.measurements, self.fits = tuple(measurements), fits
         self.root, self.frames, self.fixed = bodies.root, bodies.frames, frozenset(bodies.parent)
         self._of, self._uncertainty = bodies, Uncertainty(problem, found)
@@ -412,7 +415,7 @@ class TreeSolution:
 
     @property
     def count(self) -> int:
-        """Return how many measurements there were."""
+        """Return the number of measurements."""
         return len(self.measurements)
 
     def pose(self, frame: str, parent: str | None = None) -> Transform:
@@ -421,14 +424,14 @@ class TreeSolution:
         return pose if parent is None else self.poses[self._known(parent)].inverse() @ pose
 
     def covariance(self, target: str, source: str) -> Array | None:
-        """Return the covariance (6, 6) of the pose of source in target, all loops in; None where it is not known.
+        """Return the covariance (6, 6) of the pose of source in target, from all loops; None if it is not known.
 
-        As in ROS: x, y, z, turns about X, Y, Z, in metres and radians along the axes of target.
+        As in ROS: x, y, z, rotation about X, Y, Z, in metres and radians along the axes of target.
         """
         return self._uncertainty.between(self._at(target), self._at(source))
 
     def marginal(self, frame: str) -> Array | None:
-        """Return the covariance (6, 6) of the pose of a frame in the root; None where it is not known."""
+        """Return the covariance (6, 6) of the pose of a frame in the root; None if it is not known."""
         return self._uncertainty.between((0, ROOT), self._at(frame))
 
     def _known(self, frame: str) -> str:
@@ -440,7 +443,7 @@ class TreeSolution:
         return self._of.number[self._known(frame)], self._poses.at(self.frames.index(frame))
 
     def _entries(self) -> dict[str, str]:
-        """Return the parent of every frame but one: the root, or what the root itself hangs from if that is fixed."""
+        """Return the parent of every frame but one: the root, or the parent of the root if that is fixed."""
         fixed = self._of.parent
         top = self.root
         while top in fixed:

@@ -1,6 +1,6 @@
-"""How far an estimate is from its reference: the errors, their statistics as a mapping and as rows, and limits on them.
+"""Errors of an estimate relative to its reference: statistics as a mapping and as rows, and limits on them.
 
-Limits are for machines that watch over a comparison: `ate>5cm,rpe:10m>1%,paired<90%`.
+Limits are for continuous integration: `ate>5cm,rpe:10m>1%,paired<90%`.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Array, Indices
 
 
-CHORD = 0.1  # metres of path before and behind a pose that say which way it goes
+CHORD = 0.1  # metres of path before and after a pose that define its direction
 ROUNDING = 1e-9  # of a delta
 
 
 class Statistics(NamedTuple):
-    """What is said of many numbers: std is that of all of them (n), p95 the linear percentile."""
+    """Statistics of many numbers: std is the population's (n), p95 the linear percentile."""
 
     rmse: float
     mean: float
@@ -46,7 +46,7 @@ class Statistics(NamedTuple):
 
 
 def statistics(values: Array) -> Statistics:
-    """Sum numbers up."""
+    """Compute the statistics of numbers."""
     count, sse, mean = len(values), float((values**2).sum()), float(values.mean())
     return Statistics(
         sqrt(sse / count), mean, float(np.median(values)), float(values.std()),
@@ -55,7 +55,7 @@ def statistics(values: Array) -> Statistics:
 
 
 class AbsoluteErrors(NamedTuple):
-    """Errors in place, one a pair: the distance and, signed, its parts along, across and above the path, metres.
+    """Absolute errors, one per pair: the distance and, signed, its parts along, across and above the path, metres.
 
     rad: the angle of inv(ref) est, None without rotations of both
     """
@@ -68,7 +68,7 @@ class AbsoluteErrors(NamedTuple):
 
 
 def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErrors:
-    """Compare an estimate, as it was aligned, with its reference pose by pose."""
+    """Compare an aligned estimate with its reference pose by pose."""
     gap = est.xyz - ref.xyz
     along, above = _path_axes(ref.xyz, up)
     across = np.cross(above, along)
@@ -78,7 +78,7 @@ def absolute_errors(ref: Trajectory, est: Trajectory, up: Array) -> AbsoluteErro
 
 
 def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
-    """Return which way the path goes at each position, and up at right angles to it; where that is parallel, x."""
+    """Return the direction of the path at each position, and the orthogonal up; if these are parallel, x."""
     path = way(xyz)
     behind = (np.searchsorted(path, path - CHORD, "right") - 1).clip(0)
     ahead = np.searchsorted(path, path + CHORD).clip(0, len(path) - 1)
@@ -101,7 +101,7 @@ def _path_axes(xyz: Array, up: Array) -> tuple[Array, Array]:
 
 
 class RelativeErrors(NamedTuple):
-    """Errors of the way from pose `start` to pose `end`: of its translation and angle, and of the distance covered.
+    """Relative errors from pose `start` to pose `end`: of translation and angle, and of the distance covered.
 
     m and rad are None without rotations of both.
     """
@@ -114,7 +114,7 @@ class RelativeErrors(NamedTuple):
 
 
 def relative_errors(ref: Trajectory, est: Trajectory, start: Indices, end: Indices) -> RelativeErrors:
-    """Compare the ways from pose to pose: E = inv(inv(ref_i) ref_j) inv(est_i) est_j."""
+    """Compare relative poses: E = inv(inv(ref_i) ref_j) inv(est_i) est_j."""
     covered = [length(each.xyz[end] - each.xyz[start]) for each in (ref, est)]
     distance = np.abs(covered[1] - covered[0])
     if ref.xyzw is None or est.xyzw is None:
@@ -125,7 +125,7 @@ def relative_errors(ref: Trajectory, est: Trajectory, start: Indices, end: Indic
 
 
 def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
-    """Return pairs (i, j), each from the end of the one before: j is the first that is delta further along."""
+    """Return pairs (i, j), each from the end of the previous one: j is the first that is delta further along."""
     following = np.searchsorted(along, along + delta * (1 - ROUNDING)).tolist()
     found = [0]
     while (after := following[found[-1]]) < len(along):
@@ -135,12 +135,12 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
 
 
 def is_lost(along: Array, delta: float) -> bool:
-    """Return True if a delta is so short beside the path that adding it changes nothing."""
+    """Return True if a delta is so short compared with the path that adding it changes nothing."""
     return bool(along[-1] + delta * (1 - ROUNDING) == along[-1])
 
 
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
-    """Return for each i the j whose way from there is the nearest to delta, within a share of it."""
+    """Return for each i the j whose distance from there is the nearest to delta, within a share of it."""
     wanted = along + delta
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
     end = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)
@@ -150,7 +150,7 @@ def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, In
 
 
 class SegmentErrors(NamedTuple):
-    """Errors over stretches of path of some lengths: each one's ends, length, and errors a metre of it."""
+    """Errors over path segments of some lengths: the ends and length of each, and its errors per metre."""
 
     start: Indices
     end: Indices
@@ -160,7 +160,7 @@ class SegmentErrors(NamedTuple):
 
 
 def segment_errors(ref: Trajectory, est: Trajectory, lengths: Sequence[float], step: int) -> SegmentErrors | None:
-    """Compare stretches of path from every so-manieth pair, as the KITTI benchmark does; None without rotations.
+    """Compare path segments from every n-th pair, as the KITTI benchmark does; None without rotations.
 
     Source: Geiger, Lenz, Urtasun 2012, and its devkit: up to the first pose that is more than the length further.
     """
@@ -171,7 +171,7 @@ def segment_errors(ref: Trajectory, est: Trajectory, lengths: Sequence[float], s
     ends = np.stack([np.searchsorted(path, path[firsts] + length, "right") for length in lengths], -1)
     there = ends < ref.size
     shares = np.zeros((2, *ends.shape))
-    for at, metres in enumerate(lengths):  # one by one, which takes an eighth of the memory
+    for at, metres in enumerate(lengths):  # one by one, which needs an eighth of the memory
         fits = there[:, at]
         errors = relative_errors(ref, est, firsts[fits], ends[fits, at])
         shares[:, fits, at] = errors.m, errors.rad
@@ -184,7 +184,7 @@ SQRT8 = 8**0.5
 
 
 def numbers(found: Comparison) -> dict[str, Any]:
-    """Return every setting and number of a comparison; what does not apply is None."""
+    """Return every setting and number of a comparison; inapplicable ones are None."""
     pairs, ate = found.pairs, found.ate
     stamps = pairs.ref.stamps_ns
     return {
@@ -213,13 +213,13 @@ def numbers(found: Comparison) -> dict[str, Any]:
 
 
 def worlds(found: Comparison) -> tuple[str, str]:
-    """Name the worlds of the reference and of the estimate; what is called alike is `ref` and `est`."""
+    """Return the names of the worlds of reference and estimate; equal ones become `ref` and `est`."""
     ref, est = found.pairs.ref.world, found.pairs.est.world
     return ("ref", "est") if ref == est else (ref, est)
 
 
 def whole_estimate(found: Comparison) -> Trajectory:
-    """Return all of the estimate as it was compared: on the reference's clock, mounted and moved."""
+    """Return the whole estimate as it was compared: on the reference's clock, mounted and aligned."""
     est = found.est
     if est.stamps_ns is not None:
         est = est._replace(stamps_ns=est.stamps_ns + found.offset_ns)
@@ -227,7 +227,7 @@ def whole_estimate(found: Comparison) -> Trajectory:
 
 
 def transform_entry(found: Comparison) -> dict[str, Any]:
-    """Return the alignment as an entry of a tree, EST's world in REF's; its scale only where one was fitted."""
+    """Return the alignment as an entry of a tree, EST's world in REF's; its scale only if one was estimated."""
     parent, name = worlds(found)
     entry = _pose(found.fit.transform) | ({"scale": found.fit.scale} if found.settings.align in SCALED else {})
     return {"name": name, "parent": parent, **entry}
@@ -264,7 +264,7 @@ def _summed(values: Array | None) -> dict[str, float] | None:
 
 
 def _errors(m: Array | None, rad: Array | None, *, evo: bool) -> dict[str, Any]:
-    """Sum up distances and angles, and as evo does the norm of R - I and of the whole matrix."""
+    """Return the statistics of distances and angles, and as evo does the norm of R - I and of the whole matrix."""
     found = {"m": _summed(m), "deg": None if rad is None else _summed(np.degrees(rad))}
     if evo and m is not None and rad is not None:
         rot = SQRT8 * half_sincos(rad, arrays)[0]
@@ -303,7 +303,7 @@ def _kitti(found: Comparison) -> dict[str, Any] | None:
 
 
 def rows(found: Comparison, which: str = "ate") -> Iterator[dict[str, Any]]:
-    """Yield one row for each pair (`ate`), each two poses of a delta (`rpe`) or each stretch of path (`kitti`)."""
+    """Yield one row per pair (`ate`), two poses of a delta (`rpe`) or path segment (`kitti`)."""
     stamps = found.pairs.ref.stamps_ns
     counted = np.arange(found.pairs.ref.size) if stamps is None else stamps
     if which == "ate":
@@ -353,7 +353,7 @@ _LIMIT = r"([\w:.]+?)\s*(>=|<=|>|<)\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d+)?
 
 
 class Limit(NamedTuple):
-    """A number by its name or its path in the JSON, and what it may not be."""
+    """A number by its name or its path in the JSON, and its limit."""
 
     text: str
     name: str
@@ -362,9 +362,9 @@ class Limit(NamedTuple):
     unit: str
 
     def passed(self, found: dict[str, Any]) -> float | None:
-        """Return the number of a comparison that passes the limit, None where it holds.
+        """Return the number of a comparison if it exceeds the limit, else None.
 
-        Raises ValueInvalid where there is no such number.
+        Raises ValueInvalid if there is no such number.
         """
         value = self._value(found)
         return value if SIGNS[self.sign](value, self.bound) else None
@@ -385,7 +385,7 @@ class Limit(NamedTuple):
 
 
 def parse_limits(text: str) -> list[Limit]:
-    """Read limits with commas between them: a name or path, > >= < or <=, a number with its unit.
+    """Parse limits separated by commas: a name or path, > >= < or <=, a number with its unit.
 
     Bare numbers are metres, degrees, poses, and percent of KITTI.  Raises ValueInvalid.
     """
@@ -406,7 +406,7 @@ def parse_limits(text: str) -> list[Limit]:
 
 
 def _at(value: Any, path: str) -> Any:
-    """Follow a path of keys and indices into a mapping; None where it ends."""
+    """Follow a path of keys and indices into a mapping; None if it ends."""
     for step in path.split("."):
         if isinstance(value, dict):
             value = value.get(step)

@@ -1,6 +1,6 @@
-"""Poses of bodies that fit measurements between them best, and which measurements to keep: Gauss-Newton, robust.
+"""Robust least squares for poses of bodies from measurements between them: Gauss-Newton, with outlier rejection.
 
-Bodies are numbered; body 0 stands still.  A row measures a frame of one body in a frame of another:
+Bodies are numbered; body 0 is fixed.  A row measures a frame of one body in a frame of another:
 r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.
 """
 
@@ -39,32 +39,32 @@ TREES = 200
 ROWS_AT_ONCE = 20_000  # of trees that are tried together
 STEPS = 100
 MOST_DAMPED = 1e12
-REST = 1e-12  # of the extent, radians, and of a sigma: a smaller step is the last
-STEADY = 1e-4  # of a weight: the first weights are at rest
+REST = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
+STEADY = 1e-4  # convergence of the first weights
 FIRST_ROUNDS, ROUNDS = 50, 20
-BORROWED = 0.3  # degrees of freedom of metres that radians count for, and the other way round, where loops are few
-LEAST_SHARE = 0.04  # of the rows in loops that the unknowns leave over
+BORROWED = 0.3  # degrees of freedom of metres that radians add, and vice versa, if loops are few
+LEAST_SHARE = 0.04  # of the rows in loops, relative to the unknowns
 
 
 class Noise(NamedTuple):
-    """The sigmas of the measurements that have none of their own, and how much too small given ones are."""
+    """The sigmas of measurements without their own, and the factor by which stated ones are too small."""
 
     place: float = 0.01
     turn: float = math.radians(1.0)
     factor: float = 1.0
 
     def at_least(self, other: Noise) -> Noise:
-        """Return sigmas that are nowhere below those of another."""
+        """Return sigmas that are at least those of another."""
         return self._replace(place=max(self.place, other.place), turn=max(self.turn, other.turn))
 
 
-LOWEST = Noise(0.001, math.radians(0.1))  # medians where loops are few: most rows of a tree are off by nothing
+LOWEST = Noise(0.001, math.radians(0.1))  # medians if loops are few: most rows of a tree have no residual
 
 
 class TreeRows(NamedTuple):
     """Measurements as arrays.
 
-    parent, child: the bodies; in_parent, in_child: where the measured frames are in them
+    parent, child: the bodies; in_parent, in_child: poses of the measured frames in them
     given: which have a covariance; information: its inverse, (n, 6, 6), zeros for the others
     """
 
@@ -78,10 +78,10 @@ class TreeRows(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """Bodies that fit the kept rows best.
+    """Bodies that fit the inliers best.
 
-    estimated: whether these rows tell their own noise
-    few_loops: whether rotations can close all loops, so that metres alone do not show their sigma
+    estimated: whether these rows determine their own noise
+    few_loops: whether rotations can close all loops, so that metres alone do not determine their sigma
     """
 
     bodies: PoseArrays
@@ -108,7 +108,7 @@ def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Arr
 
 
 def of_body(jacobian: Array, body: PoseArrays, frame: PoseArrays) -> Array:
-    """Return the Jacobian by the step of a body from that by the step of a frame in it: the lever arm turns along."""
+    """Return the Jacobian by the step of a body from that by the step of a frame in it, by its lever arm."""
     moved = jacobian.copy()
     moved[..., 3:] -= jacobian[..., :3] @ skew(frame.translations - body.translations)
     return moved
@@ -118,15 +118,15 @@ class TreeProblem:
     """Rows between bodies, and the poses that fit them."""
 
     def __init__(self, rows: TreeRows, count: int) -> None:
-        """Take rows between so many bodies."""
+        """Store rows between this many bodies."""
         self.rows, self.count, self.size = rows, count, len(rows.parent)
         self.unknown = count - 1
         self.pairs = list(zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
         self.arm = max(float(np.median(length(rows.measured.translations))), LEAST) if self.size else 1.0
-        self._moves = (rows.parent != rows.child)[:, None, None]  # a row within a body moves nothing
+        self._moves = (rows.parent != rows.child)[:, None, None]  # a row within a body has no effect
 
     def ends(self, bodies: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
-        """Return where the frames are that each row is between."""
+        """Return the poses of the frames of each row."""
         rows = self.rows
         return bodies.at(rows.parent) @ rows.in_parent, bodies.at(rows.child) @ rows.in_child
 
@@ -136,12 +136,12 @@ class TreeProblem:
         return (parent.inverse @ child).errors(self.rows.measured)
 
     def information(self, noise: Noise, factor: float = 1.0) -> Array:
-        """Return the inverse covariances, (n, 6, 6); factor: of given sigmas."""
+        """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
         diagonal = [noise.place**-2] * 3 + [noise.turn**-2] * 3
         return np.where(self.rows.given[:, None, None], self.rows.information / factor**2, np.diag(diagonal))
 
     def u(self, errors: Array, noise: Noise) -> Array:
-        """Return how many sigmas each row is off: the root mean square of its six numbers."""
+        """Return the residual of each row in sigmas: the root mean square of its six numbers."""
         squares = (errors * applied(self.information(noise, noise.factor), errors)).sum(-1)
         found: Array = np.sqrt(np.maximum(squares, 0.0) / 6)
         return found
@@ -150,12 +150,13 @@ class TreeProblem:
         """Return the spanning tree of the first rows that close no loop."""
         return spanning_tree(self.count, self.pairs, rows)
 
-    # the start
+    # initial values
 
     def start(self, trees: int) -> PoseArrays:
-        """Place the bodies by the spanning tree that the other rows, wrong ones too, agree with most.
+        """Place the bodies by the spanning tree with which most other rows, including outliers, agree.
 
-        Tried are the rows in their order, shuffled, and last by how well each ever closed a loop: wrong rows never do.
+        The rows are tried in their order, shuffled, and last sorted by how well each ever closed a loop: outliers never
+        do.
         """
         shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
         rows = range(self.size)
@@ -176,7 +177,7 @@ class TreeProblem:
         return best
 
     def placed(self, trees: list[SpanningTree]) -> PoseArrays:
-        """Return where the rows of trees put the bodies, (trees, bodies): ways to the root by doubling."""
+        """Return the poses of bodies in trees of rows, (trees, bodies): paths to the root by doubling."""
         rows = self.rows
         above, row = np.array([tree.above for tree in trees]), np.array([tree.row for tree in trees])
         across = rows.in_parent @ rows.measured @ rows.in_child.inverse
@@ -214,7 +215,7 @@ class TreeProblem:
         return matrix, gradient[1:].reshape(size), float((errors * weighed).sum())
 
     def improved(self, bodies: PoseArrays, information: Array, damping: float) -> tuple[PoseArrays, float, float]:
-        """Take one step, damped until it helps; returns the bodies, the size of the step and the damping."""
+        """Take one step, damped until it helps; return the bodies, the size of the step and the damping."""
         normal, gradient, before = self.normal_equations(bodies, information)
         diagonal = np.diagonal(normal).copy()
         extent = max(float(np.abs(bodies.translations).max()), LEAST)
@@ -233,7 +234,7 @@ class TreeProblem:
     def settled(
         self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
     ) -> tuple[PoseArrays, Noise]:
-        """Return the least squares of the kept rows, and their noise, both at rest."""
+        """Return the least-squares solution of the used rows, and their noise, both converged."""
         damping = 0.0
         for _ in range(STEPS):
             information = self.information(noise) * kept[:, None, None]
@@ -244,12 +245,12 @@ class TreeProblem:
                 break
         return bodies, noise
 
-    # noise, and which rows to keep
+    # noise, and selection of rows
 
     def estimated(
         self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
     ) -> Noise:
-        """Return the noise of the kept rows: sums of squares over their degrees of freedom."""
+        """Return the noise of the used rows: sums of squares over their degrees of freedom."""
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:
             return Noise()
@@ -273,7 +274,7 @@ class TreeProblem:
     def redundancies(self, bodies: PoseArrays, kept: Any, noise: Noise) -> list[float]:
         """Return the degrees of freedom of metres and of radians of rows without sigmas.
 
-        With these the sigmas rest where the restricted likelihood (REML) is greatest; source: Foerstner 1979.
+        With these the sigmas converge to the maximum of the restricted likelihood (REML); source: Foerstner 1979.
         """
         information = self.information(noise) * kept[:, None, None]
         covariance = inverse(self.normal_equations(bodies, information)[0])
@@ -285,8 +286,8 @@ class TreeProblem:
         return found
 
     def medians(self, errors: Array, looped: Any) -> Noise:
-        """Return the noise by the medians of the rows in loops."""
-        unknown = self.unknown - (self.size - looped.sum())  # every row in no loop settles one
+        """Return the noise from the medians of the rows in loops."""
+        unknown = self.unknown - (self.size - looped.sum())  # every row in no loop determines one
         share = math.sqrt(max(1 - unknown / looped.sum(), LEAST_SHARE))
         free, given = looped & ~self.rows.given, looped & self.rows.given
         noise = Noise()
@@ -299,7 +300,7 @@ class TreeProblem:
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
     def weighed_down(self, bodies: PoseArrays, looped: Any) -> tuple[PoseArrays, Noise]:
-        """Return the fit with first weights and the noise by medians, both at rest."""
+        """Return the fit with first weights and the noise from medians, both converged."""
         noise, weights, damping = self.medians(self.errors(bodies), looped), np.ones(self.size), 0.0
         for _ in range(FIRST_ROUNDS):
             before, weights = weights, first_weights(self.u(self.errors(bodies), noise))
@@ -310,7 +311,7 @@ class TreeProblem:
         return bodies, noise
 
     def fitted(self, *, robust: bool, told: Callable[[float], None]) -> Fitted:
-        """Keep the rows that agree, or all, and fit them by plain least squares."""
+        """Select the rows that agree, or all, and fit them by plain least squares."""
         every = range(self.size)
         bodies, noise = self.start(TREES if robust and self.size > self.unknown else 1), Noise()
         told(0.3)
@@ -324,7 +325,7 @@ class TreeProblem:
         return self.selected(bodies, kept, noise, robust=robust)
 
     def selected(self, bodies: PoseArrays, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
-        """Fit the kept rows and test all of them again, until the set stays."""
+        """Fit the used rows and test all of them again, until the set does not change."""
         for _ in range(ROUNDS):
             found = self.refitted(bodies, kept, noise)
             kept, bodies, noise = self.u(self.errors(found.bodies), found.noise) <= KEPT, found.bodies, found.noise
@@ -333,7 +334,7 @@ class TreeProblem:
         return found
 
     def refitted(self, bodies: PoseArrays, kept: Any, noise: Noise) -> Fitted:
-        """Fit the kept rows, and the nearest of the others where frames would be cut off without."""
+        """Fit the used rows, and the nearest of the others if frames would be disconnected."""
         u = self.u(self.errors(bodies), noise)
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
         reached = np.isin(np.arange(self.size), tree.row)
@@ -351,5 +352,5 @@ def _halves(errors: Array) -> tuple[Array, Array]:
 
 
 def _odd(values: Array) -> Array:
-    """Return an odd number of values, the largest left out if need be: of two rows that disagree one is wrong."""
+    """Return an odd number of values, without the largest if necessary: of two rows that disagree one is wrong."""
     return values if len(values) % 2 else np.sort(values)[:-1]
