@@ -1,6 +1,6 @@
 """`frametool.calc(..)`: expressions in Python, with values that carry their frames.
 
-Values as results: the mappings that machine formats write and read back, and the line a person reads.
+Results are also converted to the mappings of machine formats, and to text for people.
 """
 
 from __future__ import annotations
@@ -30,59 +30,59 @@ if TYPE_CHECKING:
 
 
 class Measure(float):
-    """A number that knows its unit: `m`, `rad`, `s`; "" for a plain one.  Angles are in radians."""
+    """A number with a unit: `m`, `rad`, `s`; "" for a plain one.  Angles are in radians."""
 
     __slots__ = ("unit",)
     unit: str
 
     def __new__(cls, value: float, unit: str) -> Self:
-        """Keep the two together."""
+        """Store both."""
         made = super().__new__(cls, value)
         made.unit = unit
         return made
 
     def __reduce__(self) -> tuple[type[Self], tuple[float, str]]:
-        """Let it be copied and pickled with its unit."""
+        """Allow copying and pickling with the unit."""
         return type(self), (float(self), self.unit)
 
 
 class Framed:
-    """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles seen in `target`.
+    """A value with its frames: a pose `target<-source`, or a point, vector, twist or angles in `target`.
 
-    kind: pose, point, vector, twist, angles, list.  A frame that is not known is None.
+    kind: pose, point, vector, twist, angles, list.  An unknown frame is None.
     """
 
     __slots__ = ("_term",)
 
     def __init__(self, term: Term) -> None:
-        """Wrap what an expression came to."""
+        """Wrap the result of an expression."""
         self._term = term
 
     @property
     def kind(self) -> str:
-        """What it is."""
+        """The kind of the value."""
         return self._term.type.kind
 
     @property
     def target(self) -> str | None:
-        """The frame it is seen from."""
+        """The frame in which it is expressed."""
         return self._term.type.target
 
     @property
     def source(self) -> str | None:
-        """The frame that a pose is the pose of."""
+        """The frame whose pose it is."""
         return self._term.type.source
 
     @property
     def components(self) -> Components:
-        """Its numbers, floats or arrays: those of a pose are tx, ty, tz, x, y, z, w."""
+        """Its numbers, floats or arrays; those of a pose are tx, ty, tz, x, y, z, w."""
         return self._term.at(None)
 
     @property
     def transform(self) -> Transform:
         """The transform target_from_source of a pose."""
         if self.kind != POSE:
-            raise ValueInvalid(f"{self._term.type.named} is no pose")
+            raise ValueInvalid(f"{self._term.type.named} is not a pose")
         return Transform.of(*self.components)
 
     @property
@@ -102,19 +102,19 @@ class Framed:
         return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
     def __iter__(self) -> Iterator[Any]:
-        """Go through a list."""
+        """Iterate over a list."""
         if self.kind != LIST:
-            raise TypeError(f"{self._term.type.named} is no list")
+            raise TypeError(f"{self._term.type.named} is not a list")
         return map(_result, self._term.items)
 
     def __len__(self) -> int:
-        """Count a list."""
+        """Return the length of a list."""
         if self.kind != LIST:
             raise TypeError(f"{self._term.type.named} has no length")
         return len(self._term.items)
 
     def __repr__(self) -> str:
-        """Return kind, frames and numbers."""
+        """Show kind, frames and numbers."""
         if self.kind == LIST:
             return f"<list of {len(self)}>"
         frames = str(self._term.type) if self.kind == POSE else f"in {frame_text(self.target)}"
@@ -124,23 +124,23 @@ class Framed:
 def calc(
     text: str, /, *, tree: Frames | None = None, degrees: bool = False, normalize: bool = False, **names: Any
 ) -> Any:
-    """Return the value of an expression such as `inv(map<-base_link) * (map<-tool)`; `help calc` is the language.
+    """Return the value of an expression such as `inv(map<-base_link) * (map<-tool)`; see `help calc`.
 
-    tree: where bare look-ups are made.  names: values the expression may name: trees, transforms, rotations, numbers,
-        three numbers (a point), six (a twist), lists of transforms, results of other expressions.
-    degrees, normalize: how the literals of poses are read.
+    tree: for look-ups without a tree name.  names: values for use in the expression: trees, transforms, rotations,
+    numbers, three numbers (a point), six (a twist), lists of transforms, results of other expressions.
+    degrees, normalize: how literals of poses are read.
     Returns a Measure, which is a float, or a Framed: `.transform`, `.xyz`, `.target`, `.source`.
-    Raises CalcError for frames or units that do not fit, LookupFailed.
+    Raises CalcError for frames or units that do not match, LookupFailed.
     """
     terms = {name: _term(name, value) for name, value in names.items()}
     scope = Scope(tree=tree, names=terms, degrees=degrees, normalize=normalize)
     for name in names:
-        read_line(f"{name}=0")  # refuses what has a meaning of its own
+        read_line(f"{name}=0")  # refuses reserved names
     return _result(evaluate_line(read_line(text), scope))
 
 
 def _result(term: Term) -> Any:
-    """Return what Python gets."""
+    """Return the Python value of a term."""
     if term.type.kind == TREE:
         return term.tree
     if term.type.kind != NUMBER:
@@ -150,7 +150,7 @@ def _result(term: Term) -> Any:
 
 
 def _term(name: str, value: Any) -> Term:
-    """Take a Python value."""
+    """Convert a Python value."""
     if isinstance(value, Framed):
         found = value._term  # noqa: SLF001 - its own module
     elif isinstance(value, Frames):
@@ -162,7 +162,7 @@ def _term(name: str, value: Any) -> Term:
     elif isinstance(value, Measure):
         found = Term(Type(NUMBER, unit=value.unit), (float(value),))
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses what is not finite
+        found = Term(PLAIN_NUMBER, (parse_number(repr(float(value))),))  # refuses values that are not finite
     elif isinstance(value, (list, tuple)) and value and isinstance(value[0], (Transform, Framed)):
         found = Term(Type(LIST), (), items=tuple(_term(name, each) for each in value))
     else:
@@ -171,7 +171,7 @@ def _term(name: str, value: Any) -> Term:
 
 
 def _of_numbers(name: str, value: Any) -> Term:
-    """Take an array: (..., 3) is points, (..., 6) twists, others numbers."""
+    """Convert an array: (..., 3) is points, (..., 6) twists, others numbers."""
     import numpy as np
 
     try:
@@ -188,7 +188,7 @@ def _of_numbers(name: str, value: Any) -> Term:
 
 
 def plain_result(term: Term, style: Style) -> Any:
-    """Return one value as a result: a pose as a Result, a number bare, all else as a mapping."""
+    """Return a value as a result: a pose as a Result, a number bare, anything else as a mapping."""
     type_, numbers = term.type, term.at(None)
     frame = {} if type_.target is None else {"frame": type_.target}
     if type_.kind == POSE:
@@ -205,7 +205,7 @@ def plain_result(term: Term, style: Style) -> Any:
 
 
 def angle_in(term: Term, *, degrees: bool) -> float:
-    """Return an angle in degrees or radians; one in degrees comes out as it was written."""
+    """Return an angle in degrees or radians; one written in degrees is exact."""
     if degrees and term.type.degrees:
         return float(term.at(None)[0])
     radians = float(in_radians(term).at(None)[0])
@@ -213,7 +213,7 @@ def angle_in(term: Term, *, degrees: bool) -> float:
 
 
 def line_of_value(term: Term, style: Style) -> str:
-    """Return a value other than a pose or a point on a line, for a person."""
+    """Return a value other than a pose or a point as a line for people."""
 
     def text(*values: float) -> str:
         return "  ".join(style.number(value + 0.0) for value in values)
@@ -231,7 +231,7 @@ def line_of_value(term: Term, style: Style) -> str:
 
 
 def machine_text(term: Term, style: Style) -> str:
-    """Write one value as a document or line of a machine format."""
+    """Write a value as a document or line of a machine format."""
     result = plain_result(term, style)
     if isinstance(result, Result) and is_trajectory(style.form):
         from frametool.stream.writers import write_poses

@@ -1,12 +1,12 @@
-"""From an expression to its value: each part is understood once, in order; what depends on a row is computed later.
+"""Evaluate expressions: each part is checked once, in order; what depends on a row is computed later.
 
-What an expression may name stands in its scope; a literal in braces is a pose in the grammar that files share, or a
-point, a vector or a twist as results are written.
+A scope holds the names of an expression; a literal in braces is a pose in the grammar that files share, or a point, a
+vector or a twist in the notation of results.
 
-scope = Scope(tree=frametool.load("robot.yaml"))
-evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
-{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
-{frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
+    scope = Scope(tree=frametool.load("robot.yaml"))
+    evaluate("inv(map<-base_link) * (map<-tool)", scope).type      # base_link<-tool
+    {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
+    {frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("v
 
 
 def literal(value: Any, reading: Reading) -> Term:
-    """Read a pose, or a point, a vector or a twist as results are written; raises Misfit."""
+    """Read a pose, or a point, a vector or a twist in the notation of results; raises Misfit."""
     if type(value) is not dict:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     key = next((key for key in PLACED if key in value), "")
     if not key:
         pose = read_pose(value, reading)
         if pose.position is not None and pose.rotation is None and any(map(may_be_on_earth, value)):
-            return Term(Type(POINT, pose.parent), pose.position)  # a place that nothing turns
+            return Term(Type(POINT, pose.parent), pose.position)  # a position on the Earth without a rotation
         return term_of_pose(pose)
     if unknown := [each for each in value if each not in (key, "frame")]:
         hint = did_you_mean(unknown[0], ("frame",))
@@ -63,42 +63,42 @@ def literal(value: Any, reading: Reading) -> Term:
 
 
 def term_of_pose(pose: Pose) -> Term:
-    """Return the value of a pose that names its frames or not."""
+    """Return the value of a pose with or without frame names."""
     return Term(Type(POSE, pose.parent, pose.name), pose.components)
 
 
 class Scope:
-    """What an expression may name: values, trees, the tree of bare look-ups, the row of a stream.
+    """The names available to an expression: values, trees, the default tree, the row of a stream.
 
-    names: of values and trees; it grows as lines bind
+    names: of values and trees; extended by assignments
     row: the type of a row; None outside of streams
-    degrees, normalize: of literals: what bare angles are, and whether rotations that are off are accepted
-    seen: the frames of all that was evaluated
+    degrees, normalize: for literals: the unit of bare angles, and whether inexact rotations are accepted
+    seen: the frames of all evaluated values
     """
 
     def __init__(
         self, *, tree: Frames | None = None, names: dict[str, Term] | None = None, row: Type | None = None,
         degrees: bool = False, normalize: bool = False,
     ) -> None:  # fmt: skip
-        """Begin with a tree and names."""
+        """Start with a tree and names."""
         self.tree = tree
         self.names = {} if names is None else names
         self.row = row
         self.degrees = degrees
         self.normalize = normalize
-        self.earth: Earth | None = None  # what is said of all places
+        self.earth: Earth | None = None  # options for all positions on the Earth
         self.seen: set[str | None] = {None}
-        self.told: set[str] = set()  # what is told once
+        self.told: set[str] = set()  # warnings that are emitted once
 
     def leave_out(self, covariances: object) -> None:
-        """Tell once that no expression calculates with covariances, where there are any."""
+        """Warn once that expressions ignore covariances, if there are any."""
         told = LEFT_OUT.format("calc")
         if covariances and told not in self.told:
             self.told.add(told)
             warn(told)
 
     def with_row(self, row: Type) -> Scope:
-        """Return the same scope for rows of a type, its names its own."""
+        """Return a copy of the scope for rows of a type."""
         scope = Scope(
             tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
         )  # fmt: skip
@@ -111,20 +111,20 @@ class Scope:
 
     @property
     def trees(self) -> list[tuple[str, Frames]]:
-        """Return the trees by the names that look-ups in them have; the tree of bare ones first."""
+        """Return the trees by their names in look-ups; the default tree first."""
         named = [(name, term.tree) for name, term in self.names.items() if term.tree is not None]
         return [("", self.tree), *named] if self.tree is not None else named
 
 
 def pointed(error: FrametoolError, text: str) -> FrametoolError:
-    """Add the expression with a caret to an error that says its place."""
+    """Add the expression with a caret to an error with a position."""
     at = getattr(error, "at", None)
     if at is not None and not getattr(error, "snippet", ""):
         from frametool.documents.source import line_of, places_of, pointer
 
         if at < len(text):
             ((row, column),) = places_of(f"{text}.", [at])
-        else:  # behind the last character that shows
+        else:  # after the last visible character
             lines = text.rstrip().splitlines() or [""]
             row, column = len(lines), len(lines[-1]) + 1
         error.fields = {**error.fields, "column": column}
@@ -134,19 +134,19 @@ def pointed(error: FrametoolError, text: str) -> FrametoolError:
 
 
 def placed(error: FrametoolError, at: int) -> FrametoolError:
-    """Say where in the expression an error is, unless it says so."""
+    """Add the position in the expression to an error without one."""
     if getattr(error, "at", None) is None:
         error.at = at  # type: ignore[attr-defined]
     return error
 
 
 def evaluate(text: str, scope: Scope) -> Term:
-    """Return the value of a line, bind its name if it has one, and `ans`; errors point into the line."""
+    """Return the value of a line, assign it to its name, if any, and to `ans`; errors point into the line."""
     return evaluate_line(read_line(text), scope)
 
 
 def read_line(text: str) -> Line:
-    """Read a line; errors point into it."""
+    """Parse a line; errors point into it."""
     try:
         return parse_line(text, TAKEN)
     except CalcError as error:
@@ -154,7 +154,7 @@ def read_line(text: str) -> Line:
 
 
 def evaluate_line(line: Line, scope: Scope) -> Term:
-    """Return the value of a line that was read; otherwise as `evaluate`."""
+    """Return the value of a parsed line; otherwise as `evaluate`."""
     try:
         term = _Walk(line.text, scope).term(line.tree)
     except FrametoolError as error:
@@ -166,14 +166,14 @@ def evaluate_line(line: Line, scope: Scope) -> Term:
 
 
 class _Walk:
-    """Understands the parts of one expression."""
+    """Evaluates the parts of one expression."""
 
     def __init__(self, text: str, scope: Scope) -> None:
         self.text = text
         self.scope = scope
 
     def term(self, branch: Branch) -> Term:
-        """Return the value of a part, written as it was typed; an error says where."""
+        """Return the value of a part, with its text; an error has the position."""
         try:
             found: Term = getattr(self, f"_{branch.kind}")(branch)
         except FrametoolError as error:
@@ -182,7 +182,7 @@ class _Walk:
         return found._replace(text=self.text[branch.start : branch.end])
 
     def _value(self, branch: Branch) -> Term:
-        """Return what is one value, neither a tree nor a list."""
+        """Return the value of a part that is neither a tree nor a list."""
         term = self.term(branch)
         try:
             return rules.wanted(term)
@@ -193,7 +193,7 @@ class _Walk:
         text, unit = branch.value
         if unit and unit not in UNITS:
             if unit in ("pi", *self.scope.names):
-                raise CalcError(f"{shown(unit)} is no unit; write {text} * {unit}")
+                raise CalcError(f"{shown(unit)} is not a unit; write {text} * {unit}")
             raise CalcError(f"unknown unit {shown(unit)}{did_you_mean(unit, UNITS) or ';'} units: {' '.join(UNITS)}")
         value = float(text)
         times, below, dimension = UNITS[unit] if unit else (1.0, 1.0, PLAIN)
@@ -295,9 +295,9 @@ class _Walk:
         return rules.in_frame(self._value(branch.parts[0]), self._bare(branch.value.strip('"')))
 
     def _bare(self, name: str, tree: Frames | None = None) -> str:
-        """Take a leading `/` off a frame's name, which tf2 has given up, unless a frame is called so.
+        """Remove one leading `/` from a frame's name, as tf2 does, unless a frame has this name.
 
-        The Earth's frame is called `ecef` here, as places call it, by either name.
+        Both names of the Earth's frame become `ecef`.
         """
         if name in EARTH_FRAMES:
             return EARTH_FRAMES[0]
@@ -314,7 +314,7 @@ class _Walk:
         type_ = Type(POSE, target, source)
         if when == "row":
             self._row("@ row")
-            tree.latest(target, source)  # raises what is wrong at all times
+            tree.latest(target, source)  # raises errors that do not depend on the time
             return Term(type_, None, _at_row(tree, target, source))
         return Term(type_, tree.lookup_components(target, source, None if when == "latest" else when))
 
@@ -339,12 +339,12 @@ class _Walk:
 
 
 def _at_row(tree: Frames, target: str, source: str) -> Callable[[RowValues], Components]:
-    """Return what looks up at the times of rows; rows without data then are nan."""
+    """Return a function that looks up at the times of rows; rows without data are nan."""
 
     def compute(row: RowValues) -> Components:
         if row.xp is not floats:
             return tree.lookup_many(target, source, row.times_ns, missing="nan").components
-        found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # to the bit as of many
+        found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # the bits of many
         single = tuple(float(column[0]) for column in found)
         return single if single[6] == single[6] else tree.lookup_components(target, source, row.times_ns)
 
@@ -352,7 +352,7 @@ def _at_row(tree: Frames, target: str, source: str) -> Callable[[RowValues], Com
 
 
 def once_a_block(term: Term) -> Term:
-    """Return the same value, computed once for each block however often it is named."""
+    """Return the same value, computed once per block however often it is used."""
     compute = term.compute
     if term.parts is not None or compute is None:
         return term

@@ -1,6 +1,6 @@
-"""The functions of expressions: one literal table of what each takes, gives and does.
+"""The functions of expressions: a table of their arguments, results and kernels.
 
-Functions of numbers: sines and their kin, roots; angles in degrees keep right angles exact.
+Functions of numbers: trigonometry, roots; angles in degrees keep right angles exact.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ LENGTH, ANGLE = Type(NUMBER, unit=METRE), Type(NUMBER, unit=RADIAN)
 
 
 def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
-    """Return the rule of a function of an angle, made of its sine and cosine; exact at quarter turns in degrees."""
+    """Return the rule of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
 
     def rule(name: str, terms: Sequence[Term]) -> Term:
         angle = rules.scalar(rules.wanted(terms[0]), f"{name}()", angle=True)
@@ -50,7 +50,7 @@ def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
 
 
 def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
-    """Return the rule of a function whose value is an angle; `bound` is the largest number it takes."""
+    """Return the rule of a function whose value is an angle; `bound` is the largest argument."""
 
     def rule(name: str, terms: Sequence[Term]) -> Term:
         def check(value: float) -> str:
@@ -63,17 +63,17 @@ def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
 
 
 def arcsine(value: Number, xp: Namespace) -> Number:
-    """Return the angle of a sine."""
+    """Return the angle with a sine."""
     return floats.bearing(value, xp.sqrt((1.0 - value) * (1.0 + value)), 1.0, xp)
 
 
 def arccosine(value: Number, xp: Namespace) -> Number:
-    """Return the angle of a cosine."""
+    """Return the angle with a cosine."""
     return floats.bearing(xp.sqrt((1.0 - value) * (1.0 + value)), value, 1.0, xp)
 
 
 def arctangent(value: Number, xp: Namespace) -> Number:
-    """Return the angle of a tangent of any size."""
+    """Return the angle with a tangent of any size."""
     steep = abs(value) > 1.0
     small = xp.where(steep, 1.0 / xp.where(steep, value, 1.0), value)
     angle = xp.doubled_arctan(small / (1.0 + xp.sqrt(1.0 + small * small)))
@@ -81,7 +81,7 @@ def arctangent(value: Number, xp: Namespace) -> Number:
 
 
 def sqrt(name: str, terms: Sequence[Term]) -> Term:
-    """Take the square root of a plain number."""
+    """Return the square root of a plain number."""
 
     def check(value: float) -> str:
         return f"{name}() takes what is not negative, found {value:g}" if value < 0.0 else ""
@@ -91,9 +91,9 @@ def sqrt(name: str, terms: Sequence[Term]) -> Term:
 
 
 class Builtin(NamedTuple):
-    """A function: how many values it takes, in words what and what for, and its rule.
+    """A function: the number of its arguments, descriptions of the arguments and the result, and its rule.
 
-    rule: from its name and its values to the result
+    rule: from its name and its arguments to the result
     """
 
     least: int
@@ -165,7 +165,7 @@ def _mean_parts(width: int) -> Kernel:
 
 
 def _mean_pose(*parts: Number) -> Components:
-    """Return the mean of translations and the chordal one of rotations (Markley et al. 2007)."""
+    """Return the mean of translations and the chordal mean of rotations (Markley et al. 2007)."""
     *numbers, xp = parts
     poses = [numbers[at : at + 7] for at in range(0, len(numbers), 7)]
     count = len(poses)
@@ -221,7 +221,7 @@ def _no_direction(*parts: float) -> str:
 def _between_vectors(
     ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number, xp: Namespace
 ) -> Components:
-    """Return the angle of two vectors: 2 atan2(|b - a|, |a + b|) of their directions (Kahan)."""
+    """Return the angle between two vectors: 2 atan2(|b - a|, |a + b|) of their directions (Kahan)."""
     ax, ay, az = quaternion.unit_vector(ax, ay, az, xp)
     bx, by, bz = quaternion.unit_vector(bx, by, bz, xp)
     apart = quaternion.length(0.5 * (bx - ax), 0.5 * (by - ay), 0.5 * (bz - az), xp)
@@ -287,19 +287,19 @@ class Completer:
     """Completes frames on both sides of an arrow, names, and functions with their bracket."""
 
     def __init__(self, scope: Scope, line: Any) -> None:
-        """Take what there is to name, and readline, which knows the line."""
+        """Store the scope, and readline, which knows the line."""
         self.scope = scope
         self.line = line
         self.found: list[str] = []
 
     def __call__(self, text: str, state: int) -> str | None:
-        """Return one completion after the other."""
+        """Return one completion after another."""
         if state == 0:
             self.found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
         return self.found[state] if state < len(self.found) else None
 
     def completions(self, text: str, before: str) -> list[str]:
-        """Return all completions of a word behind the rest of a line."""
+        """Return all completions of a word after the rest of a line."""
         asked = self._tree_before(before)
         tree = asked or self.scope.tree
         frames = sorted(map(frame_text, tree.frames)) if tree else []
@@ -310,7 +310,7 @@ class Completer:
         return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
 
     def _tree_before(self, before: str) -> Any:
-        """Return the tree whose bracket is open right before a word."""
+        """Return the tree whose bracket was opened right before a word."""
         name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
         term = self.scope.names.get(name.lstrip("()[]{},*^@+=-/"))
         return None if term is None else term.tree

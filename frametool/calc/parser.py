@@ -1,13 +1,13 @@
-"""An expression as a small tree: its words, each with its place, and their grammar, by precedence climbing.
+"""The parser of expressions: tokens with their positions, and a grammar by precedence climbing.
 
-Knows neither frames nor numbers.  A look-up such as `map<-base_link` is one word: a frame's name may hold `/`, `:`, `.`
-and `-`.
+Knows neither frames nor numbers.  A look-up such as `map<-base_link` is one token: a frame's name may contain `/`, `:`,
+`.` and `-`.
 
-sum     = product {("+" | "-") product}        product = factor {("*" | "/") factor}
-factor  = {"-" | "+"} power                    power   = named ["^" factor]
-named   = atom {"as" TARGET<-SOURCE | "in" FRAME}
-atom    = NUMBER[UNIT] | LOOKUP ["@" time] | NAME "[" LOOKUP ["@" time] "]" | NAME "(" .. ")" | NAME
-          | row | row.COLUMN | {pose} | "[" .. "]" | "(" sum ")"
+    sum     = product {("+" | "-") product}        product = factor {("*" | "/") factor}
+    factor  = {"-" | "+"} power                    power   = named ["^" factor]
+    named   = atom {"as" TARGET<-SOURCE | "in" FRAME}
+    atom    = NUMBER[UNIT] | LOOKUP ["@" time] | NAME "[" LOOKUP ["@" time] "]" | NAME "(" .. ")" | NAME
+            | row | row.COLUMN | {pose} | "[" .. "]" | "(" sum ")"
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 LONGEST = 1 << 16  # characters of an expression
-DEEPEST = 100  # levels of brackets, signs and exponents within one another
+DEEPEST = 100  # levels of nested brackets, signs and exponents
 RESERVED = ("row", "as", "in", "ans", "pi")
 PLAIN, METRE, RADIAN, SECOND = "", "m", "rad", "s"
-# how many of the base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
+# per base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
 UNITS: dict[str, tuple[float, float, str]] = {
     "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
@@ -51,30 +51,30 @@ _OPERATORS = "-+*/^@()[],="
 
 
 class CalcError(FrametoolError):
-    """Report an expression that cannot be read, whose frames or units do not fit, or that has no value.
+    """An expression that cannot be parsed, whose frames or units do not match, or that has no value.
 
-    at: the place in the expression, from 0; None where the whole is meant
-    snippet: the expression with a caret below the place
+    at: the position in the expression, from 0; None for the whole expression
+    snippet: the expression with a caret below the position
     """
 
     def __init__(self, message: str, at: int | None = None) -> None:
-        """Keep the place with the message."""
+        """Store the position with the message."""
         super().__init__(message)
         self.at = at
         self.snippet = ""
 
 
 class NoTree(CalcError):
-    """Report a look-up where no tree was given."""
+    """A look-up without a tree."""
 
     exit_code = 2
 
 
 class Token(NamedTuple):
-    """A word: its kind, its text and where it stands.
+    """A token: its kind, text and position.
 
-    kind: lookup, number, name, column, text (in quotes), frame (behind `in`), pose (in braces), op, end
-    unit: what stands close behind a number; frames: target and source of a look-up
+    kind: lookup, number, name, column, text (in quotes), frame (after `in`), pose (in braces), op, end
+    unit: of a number, directly after it; frames: target and source of a look-up
     """
 
     kind: str
@@ -86,7 +86,7 @@ class Token(NamedTuple):
 
 
 def tokens_of(text: str) -> list[Token]:
-    """Split an expression into words; the last one is the end.  Behind `in` stands a frame."""
+    """Split an expression into tokens; the last one is the end.  A frame follows `in`."""
     if len(text) > LONGEST:
         raise CalcError(f"an expression of {len(text)} characters; the most are {LONGEST}")
     tokens: list[Token] = []
@@ -103,7 +103,7 @@ def _behind_blanks(text: str, at: int) -> int:
 
 
 def _word(text: str, at: int, before: str) -> Token:
-    """Read the word at a place."""
+    """Read the token at a position."""
     first = text[at]
     if first == "{":
         close = closing_brace(text, at)
@@ -130,9 +130,9 @@ def _word(text: str, at: int, before: str) -> Token:
 
 
 def _behind_frame(text: str, at: int) -> int:
-    """Return the end of the frame's name at a place; the place itself where there is none.
+    """Return the end of the frame's name at a position; the position itself if there is none.
 
-    Within quotes anything; else letters, digits and _ / : . -, but a dash before an arrow does not belong to the name.
+    Anything in quotes; else letters, digits and _ / : . -, but a dash before an arrow is not part of the name.
     """
     found = _FRAME.match(text, at)
     if found is None:
@@ -154,13 +154,13 @@ def _lookup(text: str, begin: int, end: int) -> Token | None:
     second = _behind_blanks(text, arrow + len(ARROW))
     last = _behind_frame(text, second)
     if last == second:
-        raise CalcError("a frame is missing behind <-: TARGET<-SOURCE", second)
+        raise CalcError("a frame is missing after <-: TARGET<-SOURCE", second)
     frames = tuple(each[1:-1] if each.startswith('"') else each for each in (text[begin:end], text[second:last]))
     return Token("lookup", text[begin:last], begin, last, frames=frames)
 
 
 def closing_brace(text: str, at: int) -> int:
-    """Return the place behind the brace that closes the one at a place; braces within quotes do not count."""
+    """Return the position after the brace that closes the one at a position; braces in quotes do not count."""
     depth = 0
     for found in re.compile(_BRACES).finditer(text, at):
         if found["unclosed"]:
@@ -172,7 +172,7 @@ def closing_brace(text: str, at: int) -> int:
 
 
 def frame_text(name: str | None) -> str:
-    """Write a frame's name as an expression has it; a name that is not known is `?`."""
+    """Format a frame's name for an expression; an unknown name is `?`."""
     if name is None:
         return "?"
     plain = name and not name.startswith(('"', "/", "-")) and not name.endswith("-")
@@ -180,12 +180,12 @@ def frame_text(name: str | None) -> str:
 
 
 class Branch(NamedTuple):
-    """A part of an expression.
+    """A node of the syntax tree of an expression.
 
     kind: number, lookup, name, column, call, pose, list, chain, sign, power, as, in
-    at: the place that a message about it points to
-    start, end: where its text stands, without brackets around it
-    value: what it holds apart from its parts, by kind; parts: those in order
+    at: the position for messages about it
+    start, end: the range of its text, without enclosing brackets
+    value: its data apart from its parts, by kind; parts: its children in order
     """
 
     kind: str
@@ -197,7 +197,7 @@ class Branch(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line: the name it binds, if it does, and its expression with the whole text it stands in."""
+    """A line: the name that it assigns, if any, and its expression with the whole text."""
 
     name: str
     tree: Branch
@@ -205,7 +205,7 @@ class Line(NamedTuple):
 
 
 def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
-    """Read `NAME = expression` or an expression; `taken` are names that cannot be bound."""
+    """Parse `NAME = expression` or an expression; `taken` are reserved names."""
     head, equals, _ = text.partition("=")
     name = head.strip() if equals else ""
     if not name.isidentifier():
@@ -217,7 +217,7 @@ def parse_line(text: str, taken: frozenset[str] = frozenset()) -> Line:
 
 
 def walk(tree: Branch) -> Iterator[Branch]:
-    """Yield a part of an expression and all below it."""
+    """Yield a node and all its descendants."""
     waiting = [tree]
     while waiting:
         branch = waiting.pop()
@@ -226,7 +226,7 @@ def walk(tree: Branch) -> Iterator[Branch]:
 
 
 def columns_of(tree: Branch) -> list[str]:
-    """Name the columns that an expression asks for, each once."""
+    """Return the columns that an expression uses, each once."""
     return list(dict.fromkeys(column_name(branch.value) for branch in walk(tree) if branch.kind == "column"))
 
 
@@ -241,7 +241,7 @@ def needs_time(tree: Branch) -> bool:
 
 
 def reads_row(tree: Branch) -> bool:
-    """Return True if an expression reads the row's own pose, point or vector."""
+    """Return True if an expression uses the row's own pose, point or vector."""
     return any(branch.kind == "name" and branch.value == "row" for branch in walk(tree))
 
 
@@ -251,7 +251,7 @@ def mentions_row(tree: Branch) -> bool:
 
 
 class _Parser:
-    """Reads the words of one expression; levels within one another are counted."""
+    """Parses the tokens of one expression; counts nested levels."""
 
     def __init__(self, text: str) -> None:
         self.tokens = tokens_of(text)
@@ -271,21 +271,21 @@ class _Parser:
         return self.next.kind == "op" and self.next.text in texts
 
     def expect(self, text: str) -> Token:
-        """Take an operator, or say that it is missing."""
+        """Take an operator, or raise an error that it is missing."""
         if self.has(text):
             return self.take()
         found = f", found {shown(self.next.text)}" if self.next.kind != "end" else " here"
         raise CalcError(f"expected {text!r}{found}{self._hint()}", self.next.start)
 
     def whole(self) -> Branch:
-        """Read all of the text."""
+        """Parse the whole text."""
         tree = self.sum()
         if self.next.kind != "end":
             raise CalcError(f"unexpected {shown(self.next.text)}{self._hint()}", self.next.start)
         return tree
 
     def _hint(self) -> str:
-        """Say what may be meant by a word that does not go on with what was read."""
+        """Return what may be meant by an unexpected token."""
         token, before = self.next, self.tokens[self.index - 1] if self.index else None
         if before is not None and before.kind == "number" and not before.unit and token.text in UNITS:
             return f"; a unit stands close to its number: {before.text}{token.text}"
@@ -301,11 +301,11 @@ class _Parser:
             raise CalcError(f"nested deeper than {DEEPEST} levels", at)
 
     def sum(self) -> Branch:
-        """Read products joined by + and -."""
+        """Parse products joined by + and -."""
         return self._chain(("+", "-"), self.product)
 
     def product(self) -> Branch:
-        """Read factors joined by * and /."""
+        """Parse factors joined by * and /."""
         return self._chain(("*", "/"), self.factor)
 
     def _chain(self, operators: tuple[str, str], part: Callable[[], Branch]) -> Branch:
@@ -319,7 +319,7 @@ class _Parser:
         return Branch("chain", joined[0][1], parts[0].start, parts[-1].end, tuple(joined), tuple(parts))
 
     def factor(self) -> Branch:
-        """Read signs and what they stand before."""
+        """Parse signs and their operand."""
         if not self.has("-", "+"):
             return self.power()
         token = self.take()
@@ -329,7 +329,7 @@ class _Parser:
         return Branch("sign", token.start, token.start, below.end, token.text, (below,))
 
     def power(self) -> Branch:
-        """Read a value and its exponent."""
+        """Parse a value and its exponent."""
         base = self.named()
         if not self.has("^"):
             return base
@@ -340,7 +340,7 @@ class _Parser:
         return Branch("power", token.start, base.start, exponent.end, None, (base, exponent))
 
     def named(self) -> Branch:
-        """Read a value and the frames that `as` or `in` gives it."""
+        """Parse a value and the frames of `as` or `in`."""
         branch, before = self.atom(), self.depth
         while self.next.kind == "name" and self.next.text in ("as", "in"):
             word = self.take()
@@ -356,7 +356,7 @@ class _Parser:
         return branch
 
     def atom(self) -> Branch:
-        """Read one value."""
+        """Parse one value."""
         token = self.take()
         kind, text, start, end = token[:4]
         if kind == "op" and text == "(":
@@ -386,7 +386,7 @@ class _Parser:
         raise CalcError(f"unexpected {shown(text)}{hint}", start)
 
     def _items(self, close: str, start: int) -> tuple[tuple[Branch, ...], int]:
-        """Read values between commas up to a bracket; return them and where it ends."""
+        """Parse values separated by commas up to a bracket; return them and the end."""
         self._deeper(start)
         items = []
         if not self.has(close):
@@ -399,7 +399,7 @@ class _Parser:
         return tuple(items), end
 
     def _asked(self, name: Token) -> Branch:
-        """Read the look-up in a tree that has a name: d[map<-base @ 2.5s]."""
+        """Parse the look-up in a named tree: d[map<-base @ 2.5s]."""
         self.take()
         token = self.take()
         if token.kind != "lookup":
@@ -417,7 +417,7 @@ class _Parser:
         return Branch("lookup", token.start, start, end, (token.frames, tree, when))
 
     def _time(self) -> tuple[int | str, int]:
-        """Read a time as nanoseconds, never through a float, or one of the words."""
+        """Parse a time as nanoseconds, never through a float, or one of the words."""
         sign = self.take().text if self.has("-", "+") else ""
         token = self.take()
         if token.kind == "name" and token.text in ("latest", "row") and not sign:

@@ -1,9 +1,9 @@
-"""Expressions over the rows of a stream: understood once for each kind of row, computed once a block.
+"""Expressions over the rows of a stream: checked once for each kind of row, computed once per block.
 
-Frames are checked for each pair of names that rows have, numbers for all rows at once: what frames are called changes
-no number.
+Frames are checked for each pair of names in the rows, numbers for all rows at once, because they do not depend on the
+names of frames.
 
-The poses of a table as one list: read as streams read their rows.
+Also the poses of a table as one list, read like the rows of a stream.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Namespace, Number
     from frametool.grammar.result import Style
 
-RESULT = "result"  # the column of a number that nobody has named
+RESULT = "result"  # the column of a number without a name
 NAMES: dict[str, Sequence[str]] = {ANGLES: ("roll", "pitch", "yaw"), **dict(PLACED.values())}
-# stand for the frames of rows that no expression names: whatever they are called, the result is the same
+# placeholders for the frames of rows that no expression names: their names do not affect the result
 SOME, OTHER = "\0some", "\0other"
 
 
 class Bound(NamedTuple):
-    """Lines understood for rows of one type: the results by name, what their numbers are called, all their frames."""
+    """Lines evaluated for rows of one type: the results by name, the names of their numbers, all their frames."""
 
     terms: tuple[tuple[str, Term], ...]
     extras: tuple[str, ...]
@@ -55,11 +55,11 @@ class Bound(NamedTuple):
 class RowExpressions:
     """Lines whose results replace rows (one without a name) or are added to them (all named); a `Formula` of streams.
 
-    bindings: lines that only bind names which the others use
+    bindings: lines that only define names for the others
     """
 
     def __init__(self, lines: Sequence[Line], bindings: Sequence[Line], scope: Scope, style: Style) -> None:
-        """Keep the lines; the style says how poses in columns of their own are written."""
+        """Store the lines; the style defines how poses are written in new columns."""
         self.lines = tuple(lines)
         self.bindings = tuple(bindings)
         self.scope = scope
@@ -76,7 +76,7 @@ class RowExpressions:
         self._bound: dict[Type, Bound] = {}
 
     def check(self, kinds: Sequence[str]) -> None:
-        """Raise the error of the first of some kinds of rows if the lines suit none of them."""
+        """Raise the first error if the lines suit none of several kinds of rows."""
         problems = []
         for kind in kinds if self.reads_row else ("",):
             try:
@@ -95,18 +95,18 @@ class RowExpressions:
         return kind if kind in (POSE, POINT, VECTOR) else ""
 
     def extras(self, row: str) -> tuple[str, ...]:
-        """Name the numbers that come beside a pose or point."""
+        """Return the names of the numbers in addition to a pose or point."""
         return self._for(Type(row)).extras
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
-        """Return the frames of the result of a row with these; raise CalcError where the expressions do not fit."""
+        """Return the frames of the result of a row with these frames; raise CalcError if the expressions do not fit."""
         known = self._for(Type(row)).frames
         first = parent if parent in known else SOME
         second = name if name in known else SOME if name == parent else OTHER
         try:
             bound = self._for(_row_type(row, first, second))
         except FrametoolError:
-            self._bind_all(_row_type(row, parent, name))  # raises the same under the names there are
+            self._bind_all(_row_type(row, parent, name))  # raises the same error with the real names
             raise
         if self.adds or not self.kind(row):
             return parent, name
@@ -118,16 +118,16 @@ class RowExpressions:
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
-        """Return the components of the result and then the extras; of floats raises CalcError where none are."""
+        """Return the components of the result and then the extras; for floats raises CalcError if there are none."""
         bound = self._for(Type(row))
         values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
-        return (*(0.0,) * 7, *numbers)  # a row stays as it is: its own pose is not replaced
+        return (*(0.0,) * 7, *numbers)  # an unchanged row: its own pose is not replaced
 
     def _for(self, type_: Type) -> Bound:
-        """Understand the lines for rows of a type."""
+        """Evaluate the lines for rows of a type."""
         if type_ not in self._bound:
             self._bound[type_] = self._bind_all(type_)
         return self._bound[type_]
@@ -148,9 +148,9 @@ class RowExpressions:
         return term
 
     def _names(self, own: str, type_: Type) -> tuple[str, ...]:
-        """Name the numbers of a value: NAME, or NAME_x, NAME_y .."""
+        """Return the names of the numbers of a value: NAME, or NAME_x, NAME_y .."""
         if type_.kind in (TREE, LIST):
-            raise CalcError(f"a {type_.kind} cannot be written beside rows")
+            raise CalcError(f"a {type_.kind} cannot be added to rows")
         if type_.kind == NUMBER:
             return (f"{own or RESULT}{'_deg' * (self.degrees and type_.unit == RADIAN)}",)
         if type_.kind == POSE:
@@ -160,7 +160,7 @@ class RowExpressions:
         return tuple(f"{own}_{name}" if own else name for name in names)
 
     def _numbers(self, term: Term, row: RowValues) -> Sequence[Number]:
-        """Return the numbers of a value as they are written."""
+        """Return the numbers of a value in their written units."""
         type_ = term.type
         if type_.kind == POSE:
             return self.target.written(term.at(row), row.xp)

@@ -1,4 +1,4 @@
-"""What the operators need and give: frames that touch, units that agree, and the kernels that then run."""
+"""The rules of operators: matching frames, compatible units, and the kernels that compute results."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def in_radians(term: Term) -> Term:
 
 
 def wanted(term: Term) -> Term:
-    """Refuse a tree or a list where one value is wanted."""
+    """Refuse a tree or a list where one value is expected."""
     if term.type.kind == TREE:
         raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
     if term.type.kind == LIST:
@@ -54,15 +54,15 @@ def wanted(term: Term) -> Term:
 
 
 def common(left: Term, right: Term) -> str | None:
-    """Return the one frame that two points or vectors are seen in."""
+    """Return the common frame of two points or vectors."""
     a, b = left.type, right.type
     if not meet(a.target, b.target):
-        raise CalcError(f"{a.named} and {b.named}: both must be seen from one frame")
+        raise CalcError(f"{a.named} and {b.named}: both must be in one frame")
     return a.target if a.target is not None else b.target
 
 
 def same_frames(terms: Sequence[Term], what: str) -> Type:
-    """Return the frames that all of some poses have; refuse poses of different ones."""
+    """Return the frames common to several poses; refuse poses of different frames."""
     type_ = terms[0].type
     for term in terms[1:]:
         other = term.type
@@ -77,13 +77,13 @@ def same_frames(terms: Sequence[Term], what: str) -> Type:
 
 
 def one_target(left: Term, right: Term, what: str) -> None:
-    """Refuse two poses that are not seen from one frame; whose poses they are may differ."""
+    """Refuse two poses with different reference frames; their bodies may differ."""
     if not meet(left.type.target, right.type.target):
-        raise CalcError(f"{what} compares two poses seen from one frame, found {left.type} and {right.type}")
+        raise CalcError(f"{what} compares two poses in one frame, found {left.type} and {right.type}")
 
 
 def scalar(term: Term, what: str, *, angle: bool = False) -> Term:
-    """Refuse what is neither a plain number nor, where one is meant, an angle."""
+    """Refuse anything but a plain number or, if allowed, an angle."""
     if term.type.kind != NUMBER or term.type.unit not in ((PLAIN, RADIAN) if angle else (PLAIN,)):
         raise CalcError(f"{what} takes {'an angle' if angle else 'a plain number'}, found {term.type.named}")
     return term
@@ -98,7 +98,7 @@ def need(term: Term, kinds: Sequence[str], what: str) -> Term:
 
 
 def _by_part(operation: Callable[[Number, Number], Number]) -> Kernel:
-    """Return the kernel that joins two numbers, or two vectors part by part."""
+    """Return the kernel that combines two numbers, or two vectors component by component."""
 
     def kernel(*parts: Number) -> Components:
         half = len(parts) // 2
@@ -122,7 +122,7 @@ def _no_division(*parts: float) -> str:
 
 
 def times(left: Term, right: Term) -> Term:
-    """Multiply: poses whose frames touch, a pose and what it moves, numbers, a number and a vector."""
+    """Multiply: poses whose inner frames match, a pose and what it transforms, numbers, a number and a vector."""
     a, b = left.type.kind, right.type.kind
     if a == b == POSE:
         return _composed(left, right)
@@ -140,7 +140,7 @@ def times(left: Term, right: Term) -> Term:
     if POSE in (a, b) and NUMBER in (a, b):
         raise CalcError("a pose cannot be multiplied by a number; its part is pose ^ 0.5")
     if b == POSE and a in PLACED:
-        raise CalcError(f"the pose stands on the left: {right.type} * {a}")
+        raise CalcError(f"the pose must be on the left: {right.type} * {a}")
     if {a, b} == {NUMBER, POINT}:
         raise CalcError("a point cannot be multiplied by a number; a direction is vector([x, y, z])")
     raise CalcError(f"cannot multiply {left.type.named} by {right.type.named}")
@@ -190,7 +190,7 @@ def over(left: Term, right: Term) -> Term:
 
 
 def _sum(left: Term, right: Term, *, adding: bool) -> Term:
-    """Add or subtract what can be added."""
+    """Add or subtract values that can be added."""
     a, b = left.type, right.type
     verb, sign, kernel = ("add", "+", _PLUS) if adding else ("subtract", "-", _MINUS)
     if a.kind == b.kind == NUMBER:
@@ -208,7 +208,7 @@ def _sum(left: Term, right: Term, *, adding: bool) -> Term:
 
 
 def _kind_of_sum(a: Type, b: Type, *, adding: bool) -> str:
-    """Return what a sum or difference of points and vectors is, or of twists."""
+    """Return the kind of a sum or difference of points and vectors, or of twists."""
     if a.kind == b.kind == POINT:
         if adding and (a.target is not None or b.target is not None):
             raise CalcError("the sum of two points depends on the origin; subtract them, or use mean(..)")
@@ -239,9 +239,9 @@ def negated(term: Term) -> Term:
 
 
 def unsigned(term: Term) -> Term:
-    """Take what a plus stands before."""
+    """Return the operand of a plus sign."""
     if term.type.kind == POSE:
-        raise CalcError("a pose has no sign; leave the + out")
+        raise CalcError("a pose has no sign; remove the +")
     return term
 
 
@@ -254,7 +254,7 @@ def inverse(term: Term) -> Term:
 
 
 def power(base: Term, exponent: Term) -> Term:
-    """Raise a number to a power, or take a part of a pose's screw motion: exp(f log); -1 is the inverse."""
+    """Raise a number to a power, or scale a pose's screw motion: exp(f log); -1 is the inverse."""
     a, b = base.type, exponent.type
     if b.kind != NUMBER or b.unit != PLAIN:
         raise CalcError(f"an exponent is a plain number, found {b.named}")
@@ -279,7 +279,7 @@ def _part_of_motion(*numbers: Number) -> Components:
 
 
 def unit_pose(*parts: Number) -> Rigid:
-    """Return a pose with its quaternion made unit, which products keep only to some eps.
+    """Return a pose with its quaternion normalised, which products preserve only to a few eps.
 
     parts: of the pose, and the namespace
     """
@@ -292,7 +292,7 @@ def _powered(base: Number, exponent: Number, xp: Namespace) -> Components:
         return (_power(base, exponent),)
     import numpy as np
 
-    powers: Any = np.frompyfunc(_row_power, 2, 1)  # arrays' own differ between processors
+    powers: Any = np.frompyfunc(_row_power, 2, 1)  # numpy's own differs between processors
     return (powers(base, exponent).astype(float),)
 
 
@@ -327,7 +327,7 @@ def as_frames(term: Term, target: str | None, source: str | None) -> Term:
 
 
 def in_frame(term: Term, frame: str) -> Term:
-    """Say what frame a point, a vector, a twist or angles are seen in."""
+    """Set the frame of a point, a vector, a twist or angles."""
     type_ = term.type
     if type_.kind not in (POINT, VECTOR, TWIST, ANGLES):
         hint = "; a pose has two: .. as TARGET<-SOURCE" if type_.kind == POSE else ""
@@ -342,7 +342,7 @@ def list_of_numbers(items: Sequence[Term]) -> Term:
     """Return the point of three numbers, or the twist of six."""
     if len(items) not in (3, 6):
         numbers = "1 number" if len(items) == 1 else f"{len(items)} numbers"
-        hint = "a point has 3, a twist 6; rotations say what they are: {rpy_deg: [..]}"
+        hint = "a point has 3, a twist 6; rotations need a name: {rpy_deg: [..]}"
         raise CalcError(f"a list of {numbers}; {hint}")
     units = [METRE] * 3 + [RADIAN] * 3
     for term, unit in zip(items, units, strict=False):

@@ -1,6 +1,6 @@
-"""The values of expressions: what kind they are, in which frames and units, and their numbers, or what computes them.
+"""The values of expressions: their kind, frames and units, and their numbers, or the function that computes them.
 
-A frame that is not known is None, shown as `?`, and meets any.  Numbers are components, floats or arrays of one shape.
+An unknown frame is None, shown as `?`, and matches any.  Numbers are components, floats or arrays of one shape.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ TO_RADIANS = 0.017453292519943295
 class Type(NamedTuple):
     """What is known of a value without its numbers.
 
-    target, source: the frames of a pose; a point, vector, twist or angles are seen in `target`
+    target, source: the frames of a pose; a point, vector, twist or angles are in `target`
     unit: that of a number: m, rad, s or none
-    degrees: of an angle whose number counts degrees, so that right angles stay exact
+    degrees: of an angle whose number is in degrees, so that right angles are exact
     """
 
     kind: str
@@ -43,12 +43,12 @@ class Type(NamedTuple):
     degrees: bool = False
 
     def __str__(self) -> str:
-        """Return the frames of a pose, target<-source."""
+        """Format the frames of a pose, target<-source."""
         return f"{frame_text(self.target)}<-{frame_text(self.source)}"
 
     @property
     def named(self) -> str:
-        """Return what it is, for a message."""
+        """Return a description for messages."""
         if self.kind == POSE:
             return f"the pose {self}"
         if self.kind == NUMBER:
@@ -63,9 +63,9 @@ PLAIN_NUMBER = Type(NUMBER)
 
 
 class RowValues(NamedTuple):
-    """One row, or a block of rows: its pose, point or vector, the columns asked for, its time, and the functions.
+    """One row, or a block of rows: its pose, point or vector, the used columns, its time, and the functions.
 
-    bound: the values of bound names by the id of what computes them, so that each is computed once
+    bound: the values of names by the id of the function that computes them, so that each is computed once
     """
 
     parts: Components
@@ -76,10 +76,10 @@ class RowValues(NamedTuple):
 
 
 class Term(NamedTuple):
-    """A part of an expression, understood: its type, and its numbers, or what computes them from a row.
+    """An evaluated part of an expression: its type, and its numbers, or the function that computes them from a row.
 
-    parts: None where they depend on a row; items: those of a list; tree: what can be asked for look-ups
-    text: as it was written
+    parts: None if they depend on a row; items: those of a list; tree: for look-ups
+    text: as written
     """
 
     type: Type
@@ -90,7 +90,7 @@ class Term(NamedTuple):
     text: str = ""
 
     def at(self, row: RowValues | None) -> Components:
-        """Return the numbers, of a row where they depend on it."""
+        """Return the numbers, computed from a row if necessary."""
         if self.parts is not None:
             return self.parts
         if row is None or self.compute is None:
@@ -98,15 +98,15 @@ class Term(NamedTuple):
         return self.compute(row)
 
 def arithmetic(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
-    """Do as `made` with a kernel that needs no namespace."""
+    """Like `made`, for a kernel that needs no namespace."""
     return made(type_, lambda *numbers: kernel(*numbers[:-1]), *operands, check=check)
 
 
 def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = None) -> Term:
-    """Return what a kernel makes of the numbers of all operands: now if they are known, else for each row.
+    """Return the result of a kernel for the numbers of all operands: at once if they are known, else for each row.
 
     kernel: takes the numbers, then the namespace with their functions
-    check: says why floats have no result, "" where they have one
+    check: returns the reason why floats have no result, "" if they have one
     """
 
     def computed(row: RowValues | None) -> Components:
@@ -121,7 +121,7 @@ def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = Non
 
 
 def _of_floats(kernel: Kernel, numbers: Components, check: Check | None) -> Components:
-    """Run a kernel on floats; what has no finite result is an error."""
+    """Run a kernel on floats; a result that is not finite is an error."""
     if check is not None and (reason := check(*numbers)):
         raise CalcError(reason)
     try:
@@ -154,5 +154,5 @@ def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
 
 
 def meet(a: str | None, b: str | None) -> bool:
-    """Return True if two frames can be one."""
+    """Return True if two frames may be the same."""
     return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)

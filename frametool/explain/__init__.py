@@ -1,6 +1,6 @@
-"""How a result came about: the derivation step by step with the numbers of this run, as text or Markdown.
+"""Derivations of results, step by step with the numbers of a run, as text or Markdown.
 
-The room is a function too: `frametool.explain(..)` is that of `frametool.derivation`.
+The package is callable: `frametool.explain(..)` is that of `frametool.derivation`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ entry = "frametool.derivation"
 
 
 class CallableRoom(ModuleType):
-    """A package that can be called: it runs the function of its own name, which stands in the module `entry`."""
+    """A package that can be called: it runs the function with its own name in the module `entry`."""
 
     entry: str
 

@@ -1,6 +1,6 @@
-"""One derivation for each operation on poses and records: from what is written to the result of the command.
+"""The derivation of each operation on poses and records: from the input as written to the result of the command.
 
-Every derivation ends with the command's own result, after the check that it leads to it.
+Every derivation ends with the command's own result, after a check that it leads to it.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ ANGLE_UNITS = {"distance": METRES, "angle": RADIANS, "angle_deg": DEGREES}
 
 
 class DerivationWrong(FrametoolError):
-    """Report a derivation that does not lead to the result: a mistake in this program, never to be printed."""
+    """A derivation that does not lead to the result: a bug, never to be printed."""
 
 
 class DerivationStyle(NamedTuple):
     """How a derivation is written.
 
     style: notations, unit and sign of the result
-    digits: significant ones; None for all
+    digits: significant digits; None for all
     """
 
     style: Style
@@ -60,7 +60,7 @@ class DerivationStyle(NamedTuple):
 
 
 def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None]) -> Explanation:
-    """Write a derivation; where setting noise to 0 leads too far away, as near singular numbers, without that."""
+    """Write a derivation; if rounding errors shown as 0 lead too far away, as near singular numbers, without that."""
     for clean in dict.fromkeys((plan.digits is not None, False)):
         sheet = Sheet(plan.digits, clean=clean)
         try:
@@ -73,12 +73,12 @@ def explained(plan: DerivationStyle, title: str, write: Callable[[Sheet], None])
 
 
 def derived_pose(plan: DerivationStyle, title: str, own: Result, way: Callable[[Sheet], Rigid]) -> Explanation:
-    """Write the way to a pose, then that to its notations; `own` is what the command makes of it."""
+    """Write the derivation of a pose, then of its notations; `own` is the command's result."""
     return explained(plan, title, lambda sheet: end_with_pose(sheet, way(sheet), own, plan))
 
 
 def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationStyle) -> None:
-    """Go on from the quaternion to the notations asked for, check both, and end with the command's own result."""
+    """Continue from the quaternion to the requested notations, check both, and end with the command's own result."""
     if own.pose.position is not None:
         check_vector(sheet, derived[:3], own.pose.position)
     for each in plan.notations:
@@ -91,7 +91,7 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
 def check_rotation(
     sheet: Sheet, notation: Notation, numbers: Sequence[float], own: Result, plan: DerivationStyle
 ) -> None:
-    """Compare numbers of a notation with the result's as rotations, also near lock; say how a pose is written in it.
+    """Compare numbers of a notation with the result as rotations, also near gimbal lock; explain the 4x4 of a pose.
 
     Raises DerivationWrong.
     """
@@ -132,12 +132,12 @@ def end(sheet: Sheet, own: Result, plan: DerivationStyle) -> None:
 
 
 def row(label: str, names: Sequence[str], numbers: Sequence[float], unit: str = "") -> Row:
-    """Return a line of the result, every digit shown."""
+    """Return a line of the result, with all digits."""
     return Row(label, [(name, repr(number + 0.0)) for name, number in zip(names, numbers, strict=True)], unit)
 
 
 def _rows(label: str, numbers: Sequence[float], size: int) -> list[Row]:
-    """Return a matrix as rows of a size, the label at the first."""
+    """Return a matrix as rows of a size, with the label at the first."""
     return [row(label * (not at), [""] * size, numbers[at : at + size]) for at in range(0, len(numbers), size)]
 
 
@@ -156,9 +156,9 @@ def _rotation_rows(own: Result, notation: Notation, style: Style) -> list[Row]:
 def convert(
     plan: DerivationStyle, pose: WrittenPose, *, own: Pose | None = None, change: OtherAxes | None = None
 ) -> Explanation:
-    """Derive one pose or rotation in the notations asked for.
+    """Derive one pose or rotation in the requested notations.
 
-    own: what the command makes of it.  change: of its axes.
+    own: the command's result.  change: of its axes.
     """
 
     def way(sheet: Sheet) -> Rigid:
@@ -176,7 +176,7 @@ def convert(
 
 
 def _written(sheet: Sheet, poses: Sequence[WrittenPose], labels: Sequence[tuple[str, str]]) -> list[Rigid]:
-    """List the poses as they are written, and add the way from there to each; `labels` are its target and source."""
+    """List the poses as written, and add the derivation of each; `labels` are its target and source."""
     sheet.heading("Given")
     for each, label in zip(poses, labels, strict=True):
         each.say(sheet, *label)
@@ -213,7 +213,7 @@ def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
 
 
 def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanation:
-    """Derive B seen from A, with distance and angle."""
+    """Derive the pose of B in A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
     frames = _three_frames(a, b)
 
@@ -229,7 +229,7 @@ def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanati
 
 
 def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction: float) -> Explanation:
-    """Derive the pose at a fraction of the way from A to B."""
+    """Derive the pose at a fraction from A to B."""
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
     frames = _three_frames(a, b)
@@ -241,13 +241,13 @@ def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction:
 
 
 def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[str, str, str]:
-    """Name the frame that two poses are seen from, and the two that they are the poses of."""
+    """Return the common reference frame of two poses, and their bodies."""
     world = a.pose.parent or b.pose.parent or "world"
     return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
 
 
 def _both(sheet: Sheet, a: WrittenPose, b: WrittenPose, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
-    """Add the way from what is written to both poses."""
+    """Add the derivation of both poses from what is written."""
     world, first, second = frames
     one, other = _written(sheet, [a, b], [(world, first), (world, second)])
     return one, other
@@ -279,7 +279,7 @@ def lookup(
 
 
 class ByTree(NamedTuple):
-    """Move by a lookup: from `source`, or the frame that the record names, at a time or the latest."""
+    """Transform by a lookup: from `source`, or the frame of the record, at a time or the latest."""
 
     frames: Frames
     target: str
@@ -288,12 +288,12 @@ class ByTree(NamedTuple):
 
 
 class MovedRecord(NamedTuple):
-    """A record, and what the command makes of it.
+    """A record, and the command's result for it.
 
-    kind: point, vector, pose, twist or wrench; target, source: the frame it goes to, and that it is given in
-    mover: target_from_source; numbers: as written, of what is no pose; covariance: 36 numbers, or none
+    kind: point, vector, pose, twist or wrench; target, source: its new and its old frame
+    mover: target_from_source; numbers: as written, except for a pose; covariance: 36 numbers, or none
     result: the numbers of the result, then those of its covariance
-    pose: a pose as it is written
+    pose: a pose as written
     """
 
     kind: str
@@ -307,11 +307,11 @@ class MovedRecord(NamedTuple):
 
     @property
     def frames(self) -> tuple[str, str]:
-        """Return the names of target and source as they are printed."""
+        """Return the names of target and source for printing."""
         return printable(self.target), printable(self.source)
 
 
-LABELS = {  # of the vectors of what is moved, and their units
+LABELS = {  # names of vectors, and their units
     "point": (("point", METRES),),
     "vector": (("vector", ""),),
     "twist": (("linear", "m/s"), ("angular", "rad/s")),
@@ -320,7 +320,7 @@ LABELS = {  # of the vectors of what is moved, and their units
 
 
 def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord) -> Explanation:
-    """Derive where a record is in the target's frame; the source and the time of a lookup are those of the record."""
+    """Derive a record in the target's frame; the source and the time of a lookup are those of the record."""
     target, source = record.frames
 
     def write(sheet: Sheet) -> None:
@@ -339,7 +339,7 @@ def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord)
 
 
 def _move_vectors(sheet: Sheet, pose: Rigid, record: MovedRecord) -> None:
-    """Move a point, a vector, a twist or a wrench, and end with the result."""
+    """Transform a point, a vector, a twist or a wrench, and end with the result."""
     sheet.reached(record.numbers)
     found, own = operations.moved(sheet, record.kind, pose, record.numbers, record.frames), record.result
     check_vector(sheet, found, own[: len(found)])
@@ -351,7 +351,7 @@ def _move_vectors(sheet: Sheet, pose: Rigid, record: MovedRecord) -> None:
 
 
 def _move_pose(sheet: Sheet, pose: Rigid, written: WrittenPose, record: MovedRecord, plan: DerivationStyle) -> None:
-    """Move a pose, and end with the result."""
+    """Transform a pose, and end with the result."""
     (target, origin), name = record.frames, printable(written.pose.name or "it")
     own = Result(Pose.of(record.result[:7], written.pose.name, record.target))
     sheet.heading("The record")
@@ -369,7 +369,7 @@ def _check_covariance(sheet: Sheet, found: Sequence[float], own: Sequence[float]
 
 
 class PlanarSample(NamedTuple):
-    """Where a frame was in its parent: stamp, metres, radians."""
+    """The pose of a frame in its parent: stamp, metres, radians."""
 
     stamp_ns: int
     x: float
@@ -378,7 +378,7 @@ class PlanarSample(NamedTuple):
 
 
 class Sighting(NamedTuple):
-    """Where a frame is taken to be: at a time, between two samples or at the first of them."""
+    """The position of a frame at a time, between two samples or at the first of them."""
 
     at_ns: int
     before: PlanarSample
@@ -386,14 +386,14 @@ class Sighting(NamedTuple):
 
 
 class FollowStep(NamedTuple):
-    """What happened in one control step of a follower.
+    """One control step of a follower.
 
-    number, t_ns: which step, and when
-    follower, leader, target: names of frames; the target is the leader or hangs on it
-    own, led: where the two turtles were in the world; carrot: where the target was in the leader's frame
+    number, t_ns: the step, and its time
+    follower, leader, target: names of frames; the target is the leader or a child of it
+    own, led: poses of the two turtles in the world; carrot: pose of the target in the leader's frame
     gains: linear and angular, 1/s; limits: m/s and rad/s, inf for none
-    arrived: the distance below which the follower stands still, in metres
-    distance, linear, angular: what the follower saw, in metres, and its command, in m/s and rad/s
+    arrived: the distance below which the follower stops, in metres
+    distance, linear, angular: the follower's input, in metres, and its command, in m/s and rad/s
     """
 
     number: int
@@ -429,7 +429,7 @@ def derive_follow(plan: DerivationStyle, steps: Sequence[FollowStep]) -> Explana
 
 
 def _seen(sheet: Sheet, step: FollowStep) -> Values:
-    """Add where the target is in the follower's frame, as x and y."""
+    """Add the position of the target in the follower's frame, as x and y."""
     follower, leader, target = map(printable, (step.follower, step.leader, step.target))
     way = f"world_from_{leader}" + (f" @ {leader}_from_{target}" if step.carrot else "")
     words = {"follower": follower, "target": target, "way": way, "t": "t" if step.carrot else "1"}
@@ -443,7 +443,7 @@ def _seen(sheet: Sheet, step: FollowStep) -> Values:
 
 
 def _place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, *, turns: bool) -> None:
-    """Add where a frame was: as published, or between two samples."""
+    """Add the position of a frame: as published, or between two samples."""
     before, after, at = seen.before, seen.after, format_stamp(seen.at_ns)
     if after is None:
         values |= dict(zip((f"x{index}", f"y{index}", f"h{index}"), before[1 : 3 + turns], strict=False))
@@ -458,7 +458,7 @@ def _place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, 
 
 
 def _law(sheet: Sheet, step: FollowStep, values: Values) -> None:
-    """Add the command of a target at x, y, and compare it with the follower's."""
+    """Add the command for a target at x, y, and compare it with the follower's."""
     bearing = math.atan2(values["y"], values["x"])
     behind = bearing * step.angular * step.gains[1] < 0.0 and abs(abs(bearing) - math.pi) < 1e-9
     values |= {"behind": float(behind), "arrived": step.arrived}
@@ -470,13 +470,13 @@ def _law(sheet: Sheet, step: FollowStep, values: Values) -> None:
 
 
 def _text(value: float) -> str:
-    """Write a constant of a formula: short where that is exact."""
+    """Format a constant of a formula: short if that is exact."""
     return f"{value:g}" if float(f"{value:g}") == value else repr(value)
 
 
 def _compare(step: FollowStep, distance: float, linear: float, angular: float) -> None:
-    """Compare with what the follower did; raises DerivationWrong."""
-    near = CLOSE * (1.0 + step.distance + 1.0 / max(step.distance, step.arrived))  # a bearing is the worse, the nearer
+    """Compare with the follower's command; raises DerivationWrong."""
+    near = CLOSE * (1.0 + step.distance + 1.0 / max(step.distance, step.arrived))  # largest for a small distance
     for found, own, gain in zip(
         (distance, linear, angular), (step.distance, step.linear, step.angular), (1.0, *step.gains), strict=True
     ):

@@ -1,6 +1,6 @@
-"""A formula is one string in Python's arithmetic: from its syntax tree come the text, the LaTeX and the value.
+"""A formula is one string in Python's arithmetic: its syntax tree gives the text, the LaTeX and the value.
 
-So the three cannot disagree. The tree is walked; nothing is executed.
+So the three cannot disagree. The tree is interpreted; nothing is executed.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     Leaf = Callable[[str], str]
 
 NOISE = 2e-15  # of the largest term: what the rounding of a few terms leaves where they cancel
-FAR = 16.0  # radians: a larger angle is as it was written, no multiple of a rounded pi
-SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # how tightly an operator binds
+FAR = 16.0  # radians: a larger angle is as written, not a multiple of a rounded pi
+SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # precedence of operators
 BINDS = {ast.Add: SUM, ast.Sub: SUM, ast.Mult: PRODUCT, ast.Div: PRODUCT, ast.Pow: POWER}
 TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "^"}
-# The line is recomputed by readers with the library they have: the values are those of `math`, not of the kernels.
+# readers recompute a line with their own library: the values are those of `math`, not of the kernels
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt, "atan2": math.atan2, "abs": abs, "min": min, "max": max,
 }  # fmt: skip
@@ -35,14 +35,14 @@ EXPONENT = re.compile(r"e([+-]?)0*(\d+)$")
 
 
 class Value(NamedTuple):
-    """A number, and the size of the numbers whose rounding is in it."""
+    """A number, and the magnitude of the numbers whose rounding affects it."""
 
     number: float
     size: float
 
     @property
     def settled(self) -> float:
-        """Return the number, or 0 where it is what rounding left of terms that cancel."""
+        """Return the number, or 0 if it is only the rounding error of terms that cancel."""
         return 0.0 if abs(self.number) <= NOISE * self.size else self.number
 
 
@@ -70,7 +70,7 @@ def evaluated(node: ast.expr, values: Mapping[str, float]) -> Value:
 
 
 def holds(condition: str, values: Mapping[str, float]) -> bool:
-    """Return True if a comparison is true of the numbers as they are, or if a lone one is not 0."""
+    """Return True if a comparison holds, or if a single number is not 0."""
     node = parsed(condition)
     if not isinstance(node, ast.Compare):
         return evaluated(node, values).number != 0.0
@@ -79,7 +79,7 @@ def holds(condition: str, values: Mapping[str, float]) -> bool:
 
 
 def _joined(sign: ast.operator, left: Value, right: Value) -> Value:
-    """Apply an operator, and to first order what rounding does to its result."""
+    """Apply an operator, and to first order the effect of rounding on its result."""
     (a, size_a), (b, size_b) = left, right
     if isinstance(sign, (ast.Add, ast.Sub)):
         return Value(a + b if isinstance(sign, ast.Add) else a - b, max(size_a, size_b))
@@ -92,7 +92,7 @@ def _joined(sign: ast.operator, left: Value, right: Value) -> Value:
 
 
 def _called(name: str, arguments: list[Value]) -> Value:
-    """Call a function; the size follows from its derivative."""
+    """Call a function; the magnitude follows from its derivative."""
     number = float(FUNCTIONS[name](*(each.number for each in arguments)))
     x, size = arguments[0]
     if name in ("sin", "cos"):
@@ -110,9 +110,9 @@ def _called(name: str, arguments: list[Value]) -> Value:
 def as_text(
     node: ast.expr, leaf: Leaf, outer: int = 0, *, right: bool = False, latex: bool = False
 ) -> str:  # fmt: skip
-    """Write a tree as arithmetic, · for times and ^ for powers, or as LaTeX; `leaf` writes the names.
+    """Write a tree as arithmetic, with · for products and ^ for powers, or as LaTeX; `leaf` formats the names.
 
-    outer: how tightly what stands around it binds; right: it stands behind an operator
+    outer: the precedence of the enclosing operator; right: it is the right operand
     """
     write = partial(as_text, leaf=leaf, latex=latex)
     if isinstance(node, ast.Constant):
@@ -150,7 +150,7 @@ as_latex = partial(as_text, latex=True)
 
 
 def latex_number(text: str) -> str:
-    """Write a number's text as LaTeX: an exponent as a power of ten."""
+    """Format a number's text as LaTeX: an exponent as a power of ten."""
     found = EXPONENT.search(text)
     if not found:
         return text

@@ -1,6 +1,6 @@
-"""What is derived: each representation to the quaternion and back, what is done to poses, and poses as written.
+"""Derivations of representations to the quaternion and back, of operations on poses, and of poses as written.
 
-The lines are those of `sheets.txt`; here the numbers go in, and what follows from them comes out.
+The lines are those of `sheets.txt`; this module passes the numbers in and returns the results.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def block_of(notation: Notation) -> Block:
 
 
 def names_of(names: str, notation: Notation, *, degrees: bool) -> list[str]:
-    """Return the names of numbers, angles with their unit where it is the degree."""
+    """Return the names of numbers, angles in degrees with their unit."""
     return [
         f"{name}_deg" if degrees and at in notation.representation.angles else name
         for at, name in enumerate(names.split())
@@ -84,7 +84,7 @@ def sheet_of(notation: Notation) -> str:
 
 
 def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
-    """Add the way from the numbers of a notation to the quaternion."""
+    """Add the derivation of the quaternion from the numbers of a notation."""
     names, name = names_of(block_of(notation).written, notation, degrees=degrees), sheet_of(notation)
     values: Values = dict(zip(names, numbers, strict=True))
     words = UNITS[degrees].copy()
@@ -99,7 +99,7 @@ def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *,
 def from_quaternion(
     sheet: Sheet, q: Quaternion, notation: Notation, *, degrees: bool, keep_sign: bool
 ) -> Sequence[float]:
-    """Add the way from the quaternion to a notation; return its numbers."""
+    """Add the derivation of a notation from the quaternion; return its numbers."""
     names = names_of(block_of(notation).found, notation, degrees=degrees)
     x, y, z, w = q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
@@ -115,7 +115,7 @@ def from_quaternion(
 
 
 def _axes(axes: str, values: Values) -> dict[str, str]:
-    """Add what kind of axes a convention has; return their names for the sheets."""
+    """Add the kind of axes of a convention; return their names for the sheets."""
     i, j, k, parity, symmetric, fixed = euler.AXES[axes]
     values |= {"odd": float(parity < 0.0), "symmetric": float(symmetric), "fixed": float(fixed)}
     return {"axes": axes, "turns": ", then ".join(axes[1:]), "i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k]}
@@ -131,7 +131,7 @@ def _elementary(axes: str) -> dict[str, str]:
 
 
 def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, str]:
-    """Return the formulas of p times the quaternion (s along an axis, c): parts of p that are 0 are left out."""
+    """Return the formulas of p times the quaternion (s along an axis, c): parts of p that are 0 are omitted."""
     after, last = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}[axis]
     sine, cosine = f"s{number}", f"c{number}"
     terms = {
@@ -146,12 +146,12 @@ def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, st
 
 
 def named(prefix: str, numbers: Sequence[float]) -> Values:
-    """Name the numbers of a vector or a quaternion."""
+    """Return the numbers of a vector or a quaternion by name."""
     return {f"{prefix}{name}": number for name, number in zip("xyzw", numbers, strict=False)}
 
 
 def posed(letter: str, pose: Rigid) -> Values:
-    """Name the numbers of a pose: position t and the letter, rotation by the letter."""
+    """Return the numbers of a pose by name: position t and the letter, rotation by the letter."""
     return named(f"t{letter}", pose[:3]) | named(letter, pose[3:])
 
 
@@ -174,14 +174,14 @@ def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> R
 
 
 def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
-    """Turn target_from_source around."""
+    """Invert target_from_source."""
     sheet.matrices["R"] = sheet.matrix(pose[3:])
     values = sheet.play("inverse", named("t", pose[:3]) | named("", pose[3:]), target=target, source=source)
     return *vector_of(values, "t"), *quaternion_of(values)
 
 
 def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
-    """Compare two poses: `frames` are the one both are seen from, that of a and that of b."""
+    """Compare two poses: `frames` are the reference frame of both, and the two bodies."""
     words = dict(zip(("world", "first", "second"), frames, strict=True))
     values = sheet.play("relative", named("a", a[:3]) | named("b", b[:3]) | named("A", a[3:]), **words)
     turns = named("a", quaternion.conjugate(*a[3:])) | named("b", b[3:])
@@ -189,13 +189,13 @@ def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> 
 
 
 def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
-    """Measure a transform: distance, angle in radians and in degrees."""
+    """Derive the size of a transform: distance, angle in radians and in degrees."""
     values = sheet.play("extent", named("t", pose[:3]) | named("", pose[3:]), frame=frame)
     return values["d"], values["angle"], values["angle_deg"]
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
-    """Go a fraction of the way between two poses: straight line and slerp."""
+    """Interpolate two poses: linearly and by slerp."""
     sheet.stretch = max(sheet.stretch, abs(fraction))
     line = sheet.play("line", {"f": fraction} | named("a", a[:3]) | named("b", b[:3]))
     arc = sheet.play("slerp", {"f": fraction} | named("a", a[3:]) | named("b", b[3:]))
@@ -203,7 +203,7 @@ def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
 
 
 def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], frames: tuple[str, str]) -> list[float]:
-    """Move a point, a vector, a twist or a wrench from one frame to another: `frames` are target and source."""
+    """Transform a point, a vector, a twist or a wrench from one frame to another: `frames` are target and source."""
     values = named("t", pose[:3]) | named("q", pose[3:])
     for at, letter in enumerate(MOVERS[kind]):
         values |= named(letter, numbers[3 * at : 3 * at + 3])
@@ -212,7 +212,7 @@ def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], frames
 
 
 def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
-    """Turn each 3x3 block C into R C R^T."""
+    """Rotate each 3x3 block C: R C R^T."""
     sheet.play("pose covariance", {})
     sheet.matrices["R"] = sheet.matrix(pose[3:])
     found = [0.0] * 36
@@ -226,7 +226,7 @@ def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequ
 
 
 def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
-    """Turn the 6x6 covariance C into A C A^T."""
+    """Transform the 6x6 covariance C: A C A^T."""
     turn = sheet.matrix(pose[3:])
     tx, ty, tz = pose[:3]
     arm = sheet.product([[0.0, -tz, ty], [tz, 0.0, -tx], [-ty, tx, 0.0]], turn)
@@ -237,7 +237,7 @@ def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Seq
 
 
 class OtherAxes(NamedTuple):
-    """A change of axes: the names and rotations of its sides, None for one that stays, and whether it is a mirror."""
+    """A change of axes: the names and rotations of its sides, None if unchanged, and whether it is a reflection."""
 
     world: tuple[str, Quaternion] | None = None
     axes: tuple[str, Quaternion] | None = None
@@ -245,7 +245,7 @@ class OtherAxes(NamedTuple):
 
 
 def with_other_axes(sheet: Sheet, pose: Rigid, change: OtherAxes) -> Rigid:
-    """Add the steps from a pose to the same with other axes, on its left, then on its right."""
+    """Add the steps from a pose to the same with other axes, on its left side, then on its right."""
     values = named("t", pose[:3]) | named("q", pose[3:])
     if change.world and change.axes:
         sheet.play("both sides", values)
@@ -263,11 +263,11 @@ def with_other_axes(sheet: Sheet, pose: Rigid, change: OtherAxes) -> Rigid:
 class WrittenPose(NamedTuple):
     """A pose as it was written.
 
-    pose: what it is, read as every command reads it
-    notation: that of its rotation; None where none is written
+    pose: its value, as every command reads it
+    notation: that of its rotation; None if there is none
     numbers: of the rotation, in column order; degrees: whether its angles are degrees
     position: x, y, z in metres as written, before `inverse: true`
-    inverse: whether what is written is the inverse
+    inverse: whether the inverse was written
     """
 
     pose: Pose
@@ -278,14 +278,14 @@ class WrittenPose(NamedTuple):
     inverse: bool = False
 
     def quaternion(self, sheet: Sheet) -> Quaternion:
-        """Add the way from the numbers as written to the quaternion."""
+        """Add the derivation of the quaternion from the numbers as written."""
         if self.notation is None:
             sheet.play("no rotation", {})
             return IDENTITY[3:]
         return to_quaternion(sheet, self.numbers, self.notation, degrees=self.degrees)
 
     def components(self, sheet: Sheet, target: str, source: str) -> Rigid:
-        """Add the way from the numbers as written to target_from_source."""
+        """Add the derivation of target_from_source from the numbers as written."""
         name = self.notation.representation.name if self.notation else ""
         if not name or (name in PLAIN and abs(sum(x * x for x in self.numbers) - 1.0) <= 1e-12):
             qx, qy, qz, qw = self.numbers or IDENTITY[3:]
@@ -300,11 +300,11 @@ class WrittenPose(NamedTuple):
         return f"{source}_from_{target}" if self.inverse else f"{target}_from_{source}"
 
     def turned(self) -> WrittenPose:
-        """Return the inverse: what is written stays, the pose and its frames are turned around."""
+        """Return the inverse: the written numbers are unchanged, the pose and its frames are inverted."""
         return self._replace(pose=pose_algebra.inverse(self.pose), inverse=not self.inverse)
 
     def say(self, sheet: Sheet, target: str, source: str) -> None:
-        """List the pose of target_from_source as it is written."""
+        """List the pose of target_from_source as written."""
         sheet.reached(self.position)
         line = f"{self._named(target, source)}: xyz {sheet.numbers(self.position)} m"
         if self.notation is not None:
@@ -316,7 +316,7 @@ class WrittenPose(NamedTuple):
 
 
 def frames_of(poses: Sequence[Pose]) -> list[str]:
-    """Name the frames along a chain of poses, each as its neighbours call it, else by a letter."""
+    """Return the frames along a chain of poses, each by the name in its neighbours, else by a letter."""
     taken = {name for pose in poses for name in (pose.name, pose.parent) if name}
     letters = (each for each in (*ascii_lowercase, *(f"f{n}" for n in range(len(poses) + 2))) if each not in taken)
     sides = zip((None, *(pose.name for pose in poses)), (*(pose.parent for pose in poses), None), strict=True)
@@ -360,7 +360,7 @@ def _named(parent: str, child: str) -> str:
 
 
 def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
-    """Return an edge as it is at a time, with the steps to it if it moves."""
+    """Return an edge at a time, with its steps if it moves."""
     child = printable(track.child)
     if track.is_static:
         return printable(track.parent), child, track.components
@@ -389,12 +389,12 @@ def samples_around(track: MovingTrack, at_ns: int) -> tuple[Sample, Sample | Non
 
 
 def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
-    """Return how long a time is after the first of two samples, and how long the second is, in seconds."""
+    """Return the time after the first of two samples, and the interval between them, in seconds."""
     return {"past": (at_ns - begin_ns) / BILLION, "gap": (end_ns - begin_ns) / BILLION}
 
 
 def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge]) -> Rigid:
-    """Multiply both branches and join them; where the branch to the target is empty nothing is inverted."""
+    """Multiply both branches and join them; if the branch to the target is empty nothing is inverted."""
     products = [_product(sheet, edges) for edges in (to_target, to_source) if edges]
     top, target, pose = products[0]
     if not to_target:

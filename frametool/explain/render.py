@@ -1,6 +1,6 @@
-"""Derivations in their forms: text of 80 columns, Markdown with formulas.
+"""The output of derivations: text of 80 columns, Markdown with formulas.
 
-A line that begins with = + - or · goes on with the one before.
+A line that begins with = + - or · continues the previous one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 INDENT = "   "
-GLUE, CUT = "\u00a0", "\v"  # a blank where no line ends, and a place where one may
+GLUE, CUT = "\u00a0", "\v"  # a non-breaking blank, and a place for a line break
 INDENTS = {HEADING: ("", INDENT), SENTENCE: (INDENT, INDENT), CAVEAT: (f"{INDENT}! ", f"{INDENT}  ")}
 
 
@@ -57,14 +57,14 @@ def equals(
 ) -> list[str]:
     """Return what a step's name equals: its formula, the same with numbers, its value.
 
-    write, name, number: how a tree, a name and a number's text are written
+    write, name, number: format a tree, a name and a number's text
     """
     value = number(step.numbers[step.name])
     if not step.formula:
         return [value]
     formula, shown = parsed(step.formula), parsed(step.shown)
     plain = as_text(shown, lambda each: step.numbers.get(each, each))
-    is_said = plain in (as_text(formula, str), step.numbers[step.name])  # by the formula or by the value
+    is_said = plain in (as_text(formula, str), step.numbers[step.name])  # equal to the formula or to the value
     with_numbers = write(shown, lambda each: number(step.numbers[each]) if each in step.numbers else name(each))
     return [write(formula, name), *[with_numbers] * (not is_said), value]
 
@@ -87,7 +87,7 @@ def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
 
 
 def _broken(head: str, formula: str) -> list[str]:
-    """Write a formula; one that is too long goes on before its plus and minus signs, the outer ones first."""
+    """Write a formula; a long one is broken before its plus and minus signs, the outer ones first."""
     lines = [head + formula]
     for glued in (*(_glued(formula, deepest) for deepest in range(4)), formula.replace("·", f"{CUT}·")):
         if max(map(len, lines)) <= WIDTH:
@@ -97,7 +97,7 @@ def _broken(head: str, formula: str) -> list[str]:
 
 
 def _glued(formula: str, deepest: int) -> str:
-    """Glue together what stands between plus and minus signs at most so deep in parentheses."""
+    """Protect the terms between plus and minus signs at most this deep in parentheses from line breaks."""
     depth, letters = 0, []
     for letter, after in zip(formula, formula[1:] + " ", strict=True):
         depth += (letter == "(") - (letter == ")")
@@ -107,7 +107,7 @@ def _glued(formula: str, deepest: int) -> str:
 
 
 def _grid(grid: MatrixLine) -> list[str]:
-    """Write matrices side by side, as many as the width holds."""
+    """Write matrices side by side, as many as fit."""
     lines = [f"{INDENT}{grid.name} = {grid.text}"] if grid.text else []
     head = f"{INDENT}{' ' * len(grid.name) if grid.text else grid.name} = "
     groups: list[list[str]] = []
@@ -132,7 +132,7 @@ def _grid(grid: MatrixLine) -> list[str]:
 
 
 def _beside(left: str, block: Sequence[str], right: str = "") -> list[str]:
-    """Put words to the left and to the right of the middle row of a block."""
+    """Add words to the left and to the right of the middle row of a block."""
     before, behind, middle = " " * len(left), " " * len(right), len(block) // 2
     return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]
 
@@ -143,7 +143,7 @@ def _block(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def result_lines(rows: Sequence[Row]) -> list[str]:
-    """Write the result: a line a notation, or one a number where that is too long."""
+    """Write the result: one line per notation, or per number if that is too long."""
     width = max((len(row.label) for row in rows), default=0)
     lines = []
     for row in rows:
@@ -167,7 +167,7 @@ SYMBOLS = {
     "a1": r"\alpha_1", "a2": r"\alpha_2", "a3": r"\alpha_3",
 }  # fmt: skip
 INDEXED = re.compile(r"([a-zA-Z])([0-9]{1,2}|[a-zA-Z][0-9]?)")
-LONG = 90  # characters of LaTeX that a line of a formula holds, about
+LONG = 90  # approximate characters of LaTeX in a line of a formula
 SPECIAL = frozenset("\\`*_{}[]<>#|~$&")
 WORDS = {HEADING: "### %s", SENTENCE: "%s", CAVEAT: "> **Note.** %s"}
 FORMULAS = "$$\n\\begin{aligned}\n%s\n\\end{aligned}\n$$"
@@ -175,7 +175,7 @@ RESULT = "**Result**%s\n\n```text\n%s\n```"
 
 
 def symbol(name: str) -> str:
-    """Return a name as LaTeX: Greek where that is the custom, an index where there is one, else upright."""
+    """Return a name as LaTeX: Greek if customary, with an index if there is one, else upright."""
     if name in SYMBOLS:
         return SYMBOLS[name]
     if name.endswith("_deg"):
@@ -188,22 +188,22 @@ def symbol(name: str) -> str:
 
 
 class Explanation:
-    """A derivation: `str` of it is the text, `markdown()` its other form, as which Jupyter shows it.
+    """A derivation: `str` of it is the text, `markdown()` the Markdown that Jupyter shows.
 
     title: what is derived
     """
 
     def __init__(self, title: str, items: Sequence[Item]) -> None:
-        """Keep the parts in their order."""
+        """Store the parts in their order."""
         self.title = title
         self.items = tuple(items)
 
     def __str__(self) -> str:
-        """Return the text, of 80 columns where the numbers let it."""
+        """Return the text, of 80 columns if the numbers allow it."""
         return text_of(self.items)
 
     def __repr__(self) -> str:
-        """Return in brief what is derived."""
+        """Return a short description."""
         return f"<Explanation of {self.title}>"
 
     def markdown(self) -> str:
@@ -213,7 +213,7 @@ class Explanation:
     _repr_markdown_ = markdown
 
     def render(self, form: str = "text") -> str:
-        """Return the derivation as text or markdown; raises ValueInvalid for another form."""
+        """Return the derivation as text or markdown; raises ValueInvalid for another format."""
         if form not in FORMS:
             raise ValueInvalid(f"unknown format {shown(form)}{alternatives(form, FORMS, 'formats')}")
         return FORMS[form](self)
@@ -223,7 +223,7 @@ FORMS: dict[str, Callable[[Explanation], str]] = {"text": Explanation.__str__, "
 
 
 def _paragraphs(items: Sequence[Item]) -> Iterator[str]:
-    """Write the parts of a derivation in Markdown; successive formulas stand in one block."""
+    """Write the parts of a derivation in Markdown; successive formulas are one block."""
     for is_formula, group in groupby(items, lambda item: isinstance(item, (SheetStep, MatrixLine))):
         if is_formula:
             lines = [line for item in group if not isinstance(item, (Words, SheetResult)) for line in _aligned(item)]

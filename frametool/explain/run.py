@@ -1,4 +1,4 @@
-"""Sheets are played: `sheets.txt` holds what a reader sees of a derivation, a `Sheet` fills in the numbers of this run.
+"""Evaluate the sheets in `sheets.txt`, the text of derivations: a `Sheet` fills in the numbers of a run.
 
 Also the steps that several sheets share, of angles and lengths.
 """
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
 
 ENTRIES = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
 TINY, HUGE = 1e-140, 1e140  # beyond, squares leave the range of a double
-TWO_TURNS = 720.0  # degrees: the half angle inside has turned once
+TWO_TURNS = 720.0  # degrees: the half angle in the formula has turned once
 ROOTS = ("sqrt(0)/2", "sqrt(2)/2", "sqrt(4)/2", "sqrt(2)/2", "sqrt(0)/2", "-sqrt(2)/2", "-sqrt(4)/2", "-sqrt(2)/2")
 EXACT = "Multiples of 90 deg are exact: no rounded pi comes into their sines and cosines."
 HEADING, SENTENCE, CAVEAT = "#", ">", "!"
-DIGITS = 6  # significant ones, unless another count is asked for
+DIGITS = 6  # default of significant digits
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
-LAST_STEP = 1e-9  # the convergence is quadratic: what comes after such a step is rounding
+LAST_STEP = 1e-9  # the convergence is quadratic: after such a step there is only rounding
 MOST_STEPS = 60
 STEP = re.compile(r"(\S+) = (.*?)(?:  \[(.*)\])?")
 
 
 class Line(NamedTuple):
-    """A line of a sheet, and the lines below it that are indented."""
+    """A line of a sheet, and the indented lines below it."""
 
     text: str
     body: Sequence[Line]
@@ -56,7 +56,7 @@ def sheets() -> dict[str, Sequence[Line]]:
 
 
 def nested(lines: Sequence[str]) -> list[Line]:
-    """Put indented lines below the one before them."""
+    """Attach indented lines to the line before them."""
     found: list[tuple[str, list[str]]] = []
     for line in lines:
         if line.startswith("  "):
@@ -67,7 +67,7 @@ def nested(lines: Sequence[str]) -> list[Line]:
 
 
 class Words(NamedTuple):
-    """A line of words: a heading with its number, a sentence, or a caveat, which is what is easily got wrong."""
+    """A line of words: a heading with its number, a sentence, or a caveat about a common mistake."""
 
     kind: str
     text: str
@@ -76,8 +76,8 @@ class Words(NamedTuple):
 class SheetStep(NamedTuple):
     """A name and what it equals: formula, formula with numbers, value.
 
-    shown: the formula whose numbers are shown, "" for a value that is chosen
-    numbers: those of the names in it, as they are written, and its own
+    shown: the formula whose numbers are shown, "" for a chosen value
+    numbers: the texts of the numbers in it, and of its value
     """
 
     name: str
@@ -105,7 +105,7 @@ class Row(NamedTuple):
 
 
 class SheetResult(NamedTuple):
-    """The result as the command prints it, all digits."""
+    """The result of the command, with all digits."""
 
     text: str
     rows: Sequence[Row]
@@ -115,29 +115,29 @@ Item: TypeAlias = Words | SheetStep | MatrixLine | SheetResult
 
 
 class Filler(string.Formatter):
-    """Fills in words and values; a value without a format is written as the sheet writes numbers."""
+    """Fills in words and values; a value without a format is formatted like the numbers of the sheet."""
 
     def __init__(self, number: Callable[[float], str]) -> None:
-        """Take how numbers are written."""
+        """Store the formatting function of numbers."""
         self.number = number
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Write one field."""
+        """Format one field."""
         return self.number(value) if isinstance(value, float) and not format_spec else format(value, format_spec)
 
 
 class Sheet:
     """Collects a derivation.
 
-    digits: significant ones; None shows and continues with every bit
-    clean: what rounding leaves of terms that cancel becomes 0 and stays 0 in what follows
-    matrices: those that steps of matrices name
-    reach: the largest of the positions, in metres: rounding is measured by it
-    stretch: how many times rounding grows where poses are extrapolated
+    digits: significant digits; None shows and continues with every bit
+    clean: rounding errors of terms that cancel become 0 and stay 0 in later steps
+    matrices: those named in steps of matrices
+    reach: the largest of the positions, in metres, as the scale of rounding
+    stretch: the factor by which rounding grows if poses are extrapolated
     """
 
     def __init__(self, digits: int | None = DIGITS, *, clean: bool) -> None:
-        """Begin an empty sheet."""
+        """Create an empty sheet."""
         self.digits, self.clean = digits, clean
         self.items: list[Item] = []
         self.matrices: dict[str, Matrix] = {}
@@ -148,7 +148,7 @@ class Sheet:
         self._filler = Filler(self.number)
 
     def number(self, value: float) -> str:
-        """Write a number: short where that is exact, else with all its digits, so that 0.500000 is a rounded one."""
+        """Format a number: short if that is exact, else with all its digits, so that 0.500000 is a rounded one."""
         value += 0.0
         if self.digits is None:
             return repr(value)
@@ -159,13 +159,13 @@ class Sheet:
         return f"{value:.{self.digits - 1}e}" if rounded.endswith(".") else rounded
 
     def numbers(self, values: Sequence[float]) -> str:
-        """Write numbers with blanks between them."""
+        """Format numbers separated by blanks."""
         return " ".join(map(self.number, values))
 
     def settled(self, value: Value) -> float:
-        """Return a number as the steps after it take it.
+        """Return a number as used by the following steps.
 
-        Raises ValueInvalid for one that is not finite.
+        Raises ValueInvalid if it is not finite.
         """
         number = value.settled if self.clean else value.number
         if not abs(number) < float("inf"):
@@ -179,13 +179,13 @@ class Sheet:
 
     @contextmanager
     def about(self, what: str) -> Iterator[None]:
-        """Name in the headings of a block what they are about."""
+        """Name the subject of a block in its headings."""
         outer, self._about = self._about, f"{self._about}{what}: "
         yield
         self._about = outer
 
     def reached(self, position: Sequence[float]) -> None:
-        """Remember how large positions are."""
+        """Record the size of positions."""
         self.reach = max(self.reach, *map(abs, position))
 
     def say(self, text: str) -> None:
@@ -193,17 +193,17 @@ class Sheet:
         self.items.append(Words(SENTENCE, text))
 
     def caveat(self, text: str) -> None:
-        """Add a caveat, once a sheet."""
+        """Add a caveat, once per sheet."""
         if Words(CAVEAT, text) not in self.items:
             self.items.append(Words(CAVEAT, text))
 
     def play(self, name: str, values: Values, /, **words: Any) -> Values:
-        """Add a sheet, and return the values of its steps too: what it names, in `values`, which it adds to."""
+        """Add a sheet, and return the values of its steps too: `values` with the new names."""
         self._play(sheets()[name], values, words)
         return values
 
     def _play(self, lines: Sequence[Line], values: Values, words: dict[str, Any]) -> None:
-        """Add lines, those below a condition only where it holds."""
+        """Add lines; those below a condition only if it holds."""
         is_taken = False
         for text, body in lines:
             kind, _, rest = text.partition(" ")
@@ -242,9 +242,9 @@ class Sheet:
             self.step(values, name, formula, unit)
 
     def value(self, formula: str, values: Values) -> float:
-        """Return the value of a formula as the steps after it take it.
+        """Return the value of a formula as used by the following steps.
 
-        Raises ValueInvalid for one that is not finite.
+        Raises ValueInvalid if it is not finite.
         """
         try:
             return self.settled(evaluated(parsed(formula), values))
@@ -252,9 +252,9 @@ class Sheet:
             raise ValueInvalid(TOO_LARGE) from None
 
     def step(self, values: Values, name: str, formula: str, unit: str = "", *, exactly: str = "") -> float:
-        """Add a step and keep its value under its name.
+        """Add a step and store its value under its name.
 
-        exactly: constants that are the value exactly, where the formula with rounded numbers would only be near it
+        exactly: constants with the exact value, if the formula with rounded numbers is only close to it
         """
         value = values[name] = self.value(exactly or formula, values)
         numbers = {each: self.number(number) for each, number in values.items()}
@@ -290,7 +290,7 @@ class Sheet:
             values.update(zip((name.rstrip("'") + each for each in "xyz"), (row[0] for row in found), strict=True))
 
     def _operand(self, name: str, values: Values) -> Matrix:
-        """Return the matrix of a quaternion, R(q), a matrix, one transposed, or a vector as a column."""
+        """Return the matrix of a quaternion, R(q), a matrix, a transposed one, or a vector as a column."""
         if name.endswith("^T"):
             return transposed(self._operand(name[:-2], values))
         if name.startswith("R("):
@@ -317,7 +317,7 @@ class Sheet:
         ]
 
     def matrix(self, q: Quaternion) -> Matrix:
-        """Return the matrix of a quaternion as the steps after it take it."""
+        """Return the matrix of a quaternion as used by the following steps."""
         return rows([self.settled(Value(entry, 1.0)) for entry in to_matrix(*q)])
 
     def result(self, text: str, rows: Sequence[Row]) -> None:
@@ -330,7 +330,7 @@ class Sheet:
         self.items.append(SheetStep(name, "", "", {name: self.number(values[name])}, f"{unit} (chosen)"))
 
     def angle(self, values: Values, name: str) -> None:
-        """Take an angle as it is written; one in degrees becomes radians."""
+        """Read an angle as written; degrees are converted to radians."""
         written = values.get(f"{name}_deg")
         if written is None:
             return
@@ -340,7 +340,7 @@ class Sheet:
         self.step(values, name, f"{name}_deg*pi/180", "rad")
 
     def half(self, values: Values, name: str, sine: str, cosine: str) -> None:
-        """Add the cosine and the sine of half an angle; exact where degrees say so."""
+        """Add the cosine and the sine of half an angle; exact for suitable degrees."""
         turn = values.get(f"{name}_deg", 0.0) / 90.0  # the argument, in 45 degrees
         is_exact = turn != 0.0 and turn == int(turn)
         eighths = int(turn) if is_exact else 0
@@ -356,7 +356,7 @@ class Sheet:
             self.step(values, each, f"{part}/{by}")
 
     def length(self, values: Values, name: str, parts: str, unit: str = "") -> tuple[Sequence[str], str]:
-        """Add the length of a vector; one whose squares leave the range of a double is scaled first.
+        """Add the length of a vector; if squares leave the range of a double it is scaled first.
 
         Returns the names of numbers whose quotients are the direction.
         """
@@ -381,7 +381,7 @@ class Sheet:
         values.update(zip(ENTRIES, [entry for row in entries for entry in row], strict=True))
 
     def nearest(self, values: Values) -> None:
-        """Add the steps to the rotation nearest to a matrix; what is one already stays as it is."""
+        """Add the steps to the rotation nearest to a matrix; a rotation is unchanged."""
         here = rows([values[each] for each in ENTRIES])
         off = kernel.defect(*kernel.nine(entry for row in here for entry in row), floats)
         if off <= kernel.ORTHONORMAL:
@@ -410,7 +410,7 @@ HELPERS: dict[str, Callable[..., object]] = {
 
 
 def _for_each(line: str) -> Sequence[str]:
-    """Repeat a line for each name that % or $ stands for; helpers take names of vectors as they are."""
+    """Repeat a line for each name in place of % or $; helper functions take names of vectors unchanged."""
     if line[0] in WRITERS:
         return [line]
     text, _, letters = line.partition("  for ")
@@ -420,7 +420,7 @@ def _for_each(line: str) -> Sequence[str]:
 
 
 def _each(pattern: str) -> Sequence[str]:
-    """Write a pattern for x, y, z where it has %, for x, y, z, w where it has $."""
+    """Expand a pattern for x, y, z if it has %, for x, y, z, w if it has $."""
     for sign, letters in (("%", "xyz"), ("$", "xyzw")):
         if sign in pattern:
             return [pattern.replace(sign, letter) for letter in letters]

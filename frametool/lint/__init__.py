@@ -1,1 +1,1 @@
-"""What is wrong or odd in trees and recordings."""
+"""Find mistakes in trees and recordings, and differences between trees."""

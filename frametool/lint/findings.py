@@ -1,4 +1,4 @@
-"""What `check` finds: one finding, the rules there are, and how findings are written.
+"""The rules of `check`, and the output of findings.
 
 Example:
     robot.yaml:9:17: error: quaternion 0 0 0 0.9 has norm 0.9; .. [denormalized]
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from frametool.errors import Finding
 
-# rule -> (level, what it is about); an error fails, a warning fails under --strict, a note never
+# rule -> (level, description); an error fails, a warning fails under --strict, a note never
 RULES = {
     "syntax": ("error", "text that cannot be read, or lacks a part"),
     "empty": ("warning", "a file without any transform"),
@@ -62,7 +62,7 @@ def level(finding: Finding) -> str:
 
 
 def write_text(findings: Iterable[Finding]) -> str:
-    """Return one line a finding, as compilers do; what a file says in the same words stands there once."""
+    """Return one line per finding, as compilers do; findings of a file with equal words are combined."""
     alike: dict[tuple[str, str, str], list[Finding]] = {}
     for each in findings:
         alike.setdefault((each.source, each.rule, each.message), []).append(each)
@@ -74,7 +74,7 @@ def write_text(findings: Iterable[Finding]) -> str:
 
 
 def _further(more: Sequence[Finding]) -> str:
-    """Count the further places of a finding and name the first of them."""
+    """Return the number of further places of a finding, and the first of them."""
     if not more:
         return ""
     lines = list(dict.fromkeys(each.line for each in more if each.line))
@@ -83,7 +83,7 @@ def _further(more: Sequence[Finding]) -> str:
 
 
 def write_json(findings: Iterable[Finding]) -> str:
-    """Return one object a line."""
+    """Return one object per line."""
     lines = []
     for each in findings:
         place = {"file": each.source, "line": each.line or None, "column": each.column or None}
@@ -92,7 +92,7 @@ def write_json(findings: Iterable[Finding]) -> str:
 
 
 def write_github(findings: Iterable[Finding]) -> str:
-    """Return workflow commands, which GitHub shows beside the lines of a pull request."""
+    """Return workflow commands, which GitHub shows at the lines of a pull request."""
     lines = []
     for each in findings:
         kind, place = level(each).replace("note", "notice"), {"line": each.line, "col": each.column}
@@ -101,13 +101,13 @@ def write_github(findings: Iterable[Finding]) -> str:
 
 
 def github_command(kind: str, message: str, **place: str | int) -> str:
-    """Return one workflow command: `error`, `warning` or `notice`; what is empty or 0 of its place is left out."""
+    """Return one workflow command: `error`, `warning` or `notice`; unknown parts of the place are omitted."""
     properties = ",".join(f"{key}={_escaped(str(value), ',:')}" for key, value in place.items() if value)
     return f"::{kind} {properties}::{_escaped(message)}\n"
 
 
 def _escaped(text: str, more: str = "") -> str:
-    """Escape what would end a workflow command or one of its properties."""
+    """Escape characters that would end a workflow command or one of its properties."""
     for character in "%\r\n" + more:
         text = text.replace(character, f"%{ord(character):02X}")
     return text

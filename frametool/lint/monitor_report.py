@@ -1,4 +1,4 @@
-"""What `monitor` tells, as plain mappings with units in their keys: one an edge, and one for a chain of edges."""
+"""The report of `monitor`, as plain mappings with units in their keys: one per edge, and one for a chain of edges."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 def monitor(
     files: Sequence[FrameFile], *ends: str, normalize: bool = False, clashing: Report = stop
 ) -> list[dict[str, Any]]:
-    """Describe every edge of some files; or, of `ends` (target, source), those between the two and their chain.
+    """Describe every edge of some files; or, for `ends` (target, source), those between the two and their chain.
 
-    clashing: takes the errors about frames that come by the topics of two robots, whose samples then count as one
+    clashing: receives the errors about frames on the topics of two robots, whose samples then count as one
     Raises FormatError for files without transforms, UnknownFrame, NotConnected.
     """
 
@@ -49,7 +49,7 @@ def monitor(
 
 
 def edge_entry(log: EdgeLog) -> dict[str, Any]:
-    """Describe an edge; what is not known or does not apply is None."""
+    """Describe an edge; unknown or inapplicable values are None."""
     longest = max(log.steps, key=lambda step: step.pause_ns, default=None)
     delays = log.delays_ns
     metres = sum(step.metres for step in log.steps)
@@ -85,12 +85,12 @@ YEAR_S = 31_557_600
 
 
 def clocks_differ(entries: Sequence[dict[str, Any]]) -> bool:
-    """Return True if stamps and the recorder count from other years: of simulated time a delay says nothing."""
+    """Return True if stamps and the recorder count from different years: with simulated time a delay has no meaning."""
     return any(abs(entry["delay_max_s"] or 0.0) > YEAR_S for entry in entries)
 
 
 def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, Any]:
-    """Describe the edges between two frames together: their common interval, and their worst."""
+    """Describe the edges between two frames together: their common interval, and their worst values."""
     spans = [log.span for log in logs if log.moves]
     first = max((begin for begin, _ in spans), default=None)
     last = min((end for _, end in spans), default=None)

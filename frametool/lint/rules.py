@@ -1,4 +1,4 @@
-"""The rules of `check`: mistakes in one entry, which hide no others, then the shape of the tree and what moves."""
+"""The rules of `check`: mistakes in single entries, which do not hide others, then the shape of the tree and motion."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "tran
 
 
 class Statement(NamedTuple):
-    """An edge, or one sample of it, and where it stands.
+    """An edge, or one sample of it, and its place.
 
     looks_w_first: it was written x, y, z, w with x = 1
     """
@@ -49,16 +49,16 @@ class Statement(NamedTuple):
     looks_w_first: bool
 
     def finding(self, rule: str, message: str) -> Finding:
-        """Make a finding for this place."""
+        """Return a finding for this place."""
         return Finding(rule, message, self.source, self.line, self.column)
 
     def broken(self, error: BadTopology, places: str = "") -> Finding:
-        """Make the finding of edges that make no tree."""
+        """Return the finding for edges that are not a tree."""
         return self.finding(error.rule, error.message + places)
 
 
 def read_all(recording: FrameFile, find: Find, *, normalize: bool = False) -> Iterator[Statement]:
-    """Read everything that can be read of a file, and report what cannot."""
+    """Read everything that can be read from a file, and report errors."""
     if not recording.holds_samples:
         return _read_tree(recording.source, find, normalize=normalize)
     return _read_recording(recording, find, normalize=normalize)
@@ -77,12 +77,12 @@ def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Ite
                 yield _stated(edge, recording.name, edge.line, 1 if edge.line else 0)
     except Unanswered:
         raise
-    except FormatError as error:  # behind which nothing can be read
+    except FormatError as error:  # nothing after it can be read
         report(error)
     places = locate_many(recording.text, [edge.path for edge in in_documents]) if in_documents else []
     for edge, (line, column) in zip(in_documents, places, strict=True):
         if edge.parent is not None:
-            # here matrices and angles are written, and quaternions by names or always w first
+            # formats with matrices or angles, and with quaternions by name or always w first
             yield _stated(edge, recording.name, line, column)._replace(looks_w_first=False)
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
@@ -96,13 +96,13 @@ def _stated(edge: Edge, source: str, line: int, column: int) -> Statement:
 
 
 def looks_w_first(components: Rigid) -> bool:
-    """Return whether a rotation is what the identity becomes when w is written first and read last."""
+    """Return True if a rotation may be the identity written with w first and read with w last."""
     x, y, z, w = components[3:]
     return bool(abs(x) == 1.0 and y == z == w == 0.0)
 
 
 def _read_tree(source: Source, find: Find, *, normalize: bool) -> Iterator[Statement]:
-    """Read a tree; places are looked up once, for all that was found and read."""
+    """Read a tree; places are searched once, for everything that was found and read."""
     try:
         documents = parse_documents(source.text, source.name)
     except FormatError as error:
@@ -140,22 +140,22 @@ def _read_document(document: Document, reading: Reading, notes: dict[bool, list[
 
 
 def _written_xyzw(value: Any, edge: Edge) -> bool:
-    """Return whether an edge's rotation was written as a quaternion, not as angles."""
+    """Return True if an edge's rotation was written as a quaternion, not as angles."""
     for step in edge.path:
         value = value[step]
     return type(value) is dict and not WRITTEN_XYZW.isdisjoint(value) and not any(map(may_be_on_earth, value))
 
 
-FLICKER = 3  # so many changes of parent are no picking up and putting down
+FLICKER = 3  # this many changes of parent are not a pick-and-place
 
 
 def check(
     files: Sequence[FrameFile], *, normalize: bool = False, tree: FrameTree | None = None, others: bool = False
 ) -> list[Finding]:
-    """Return all that is wrong or odd in files, taken together as one tree, in the order of the files and lines.
+    """Return all findings in files, combined into one tree, in the order of the files and lines.
 
-    tree: takes what stands still
-    others: there may be files of something else; that one shows no sign of frames is all that is found in it
+    tree: receives the static edges
+    others: other files are allowed; a file without any sign of frames only gets the finding that it has none
     """
     findings: list[Finding] = []
     everything = _of_one_earth(_statements(files, findings, normalize=normalize, others=others), findings.append)
@@ -168,7 +168,7 @@ def check(
 
 
 def _of_one_earth(everything: Iterable[Statement], find: Find) -> Iterator[Statement]:
-    """Call the Earth's frame by the one of its names that comes first; report edges between the two."""
+    """Rename the Earth's frame to the first of its names; report edges between the two."""
     earth = ""
     for each in everything:
         names = [name for name in each[:2] if name in EARTH_FRAMES]
@@ -184,7 +184,7 @@ def _of_one_earth(everything: Iterable[Statement], find: Find) -> Iterator[State
 
 
 def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
-    """Put into a tree what stands still; what is wrong is left out, and found elsewhere."""
+    """Add the static edges to a tree; invalid ones are omitted, as other rules report them."""
     said: dict[str, list[Statement]] = {}
     for each in everything:
         said.setdefault(each.child, []).append(each)
@@ -197,7 +197,7 @@ def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
 def _statements(
     files: Sequence[FrameFile], findings: list[Finding], *, normalize: bool, others: bool
 ) -> Iterator[Statement]:
-    """Read all files; what cannot be read is found at once."""
+    """Read all files; unreadable parts become findings."""
     for file in files:
         before = len(findings)
         may_be_other = others and by_sign(file.head(), "tree") is None
@@ -212,13 +212,13 @@ def _statements(
 
 
 class Child:
-    """Everything that was seen of one child frame."""
+    """All data of one child frame."""
 
     def __init__(self, first: Statement, number: int) -> None:
         """Start from the first edge or sample; `number` counts all that were read."""
         self.first = first
         self.newest = first
-        self.since = (number, first)  # where the newest parent took over
+        self.since = (number, first)  # the first with the newest parent
         self.log = EdgeLog(first.child)
         self.stands: Statement | None = None
         self.changes: list[Statement] = []
@@ -230,7 +230,7 @@ class Child:
         self.backward: list[Statement] = []
 
     def add(self, seen: Statement, number: int) -> None:
-        """Take in one more."""
+        """Add one more."""
         if seen.stamp_ns is None:
             self.stands = self.stands or seen
         else:
@@ -288,7 +288,7 @@ def _child(child: Child) -> Iterator[Finding]:
 
 
 def _moving(child: Child, frame: str) -> Iterator[Finding]:
-    """Apply the rules about a frame over time: a changing parent, of one picked up or of two publishers, and stamps."""
+    """Apply the rules about a moving frame: changes of parent, by pick-and-place or by two publishers, and stamps."""
     if changes := child.changes:
         parents = " -> ".join(shown(each.parent) for each in (child.first, *changes[:3]))
         if len(changes) < FLICKER:

@@ -1,6 +1,6 @@
-"""What differs between two trees: frames only one has, other parents, and how far each common frame moved.
+"""Differences between two trees: missing frames, other parents, and the displacement of each common frame.
 
-Signs of quaternions and the order of names do not count.  Where a tree moves it is compared at one time.
+Signs of quaternions and the order of names do not count.  Moving trees are compared at one time.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from frametool.frames.track import MovingTrack
     from frametool.geometry.types import Rigid
 
-ROUNDING = 2.0**-46  # of the largest number on a way: what a product of some dozens of poses is off at most
+ROUNDING = 2.0**-46  # of the largest number on a path: the maximum error of a product of some dozens of poses
 
-# kind -> what it is, in the order in which differences are listed; each of them makes two trees different
+# kind -> description, in the order in which differences are listed; each of them makes two trees different
 KINDS = {
     "only-in-a": "a frame that B does not have",
     "only-in-b": "a frame that A does not have",
@@ -40,28 +40,28 @@ SAME = "same"
 
 
 class Tolerance(NamedTuple):
-    """How far frames may be apart and still count as the same: metres and radians."""
+    """The largest difference of equal poses: metres and radians."""
 
     metres: float = NEAR_BY
     radians: float = NEAR
 
     def covers(self, apart: Apart | None) -> bool:
-        """Return whether two poses are so near; what is not known does not count."""
+        """Return True if two poses are within the tolerance; unknown parts do not count."""
         if apart is None:
             return True
         return apart.metres <= self.metres + apart.rounding and apart.radians <= self.radians + apart.turn_rounding
 
     def times(self, apart: Apart | None) -> float:
-        """Return how many tolerances two poses are apart: what differences are sorted by; -1 where it is not known."""
+        """Return the distance of two poses in tolerances, for sorting; -1 if unknown."""
         if apart is None:
             return -1.0
         return max(apart.metres / (self.metres or NEAR_BY), apart.radians / (self.radians or NEAR))
 
 
 def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:  # noqa: B008 - it is frozen
-    """Read `1mm,0.1deg`, or one of them; bare numbers are metres and radians, in this order.
+    """Parse `1mm,0.1deg`, or one of them; bare numbers are metres and radians, in this order.
 
-    otherwise: what holds of the one that is not said
+    otherwise: defaults for a missing one
     Raises ValueInvalid.
     """
     parts: dict[str, str] = {}
@@ -84,7 +84,7 @@ def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:
 
 
 class Apart(NamedTuple):
-    """How far two poses are apart, in metres and radians, and how much of that may be rounding."""
+    """The distance of two poses, in metres and radians, and how much of it may be rounding."""
 
     metres: float
     radians: float
@@ -102,20 +102,20 @@ class Apart(NamedTuple):
         return degrees(self.radians)
 
     def __str__(self) -> str:
-        """Write it in mm and degrees, with four digits or all before the point."""
+        """Format it in mm and degrees, with four digits or all before the point."""
         far = self.millimetres
         return f"{far:{'.0f' if 1e3 <= far < 1e9 else '.4g'}} mm and {self.degrees:.4g} deg"
 
 
 class Difference(NamedTuple):
-    """What differs about one frame.
+    """The difference in one frame.
 
-    kind: one of KINDS, or `same` for a frame that did not move
-    parent_a, parent_b: None for a root and where the frame is not there
-    own: how far it moved in its own parent; None where the parents are not the same, and for roots
-    seen_from: a frame from which it is seen in both; None if there is none
-    seen: how far it moved as seen from there
-    note: what else there is to say, in words
+    kind: one of KINDS, or `same` for an unchanged frame
+    parent_a, parent_b: None for a root and for a missing frame
+    own: displacement in its own parent; None if the parents differ, and for roots
+    seen_from: a frame relative to which it is compared in both; None if there is none
+    seen: displacement relative to it
+    note: further information
     """
 
     kind: str
@@ -129,7 +129,7 @@ class Difference(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Say it in one line."""
+        """Return it as one line."""
         name, note = shown(self.frame), f": {self.note}" if self.note else ""
         parents = (self.parent_a, self.parent_b)
         at_a, at_b = ("a root" if parent is None else f"under {shown(parent)}" for parent in parents)
@@ -166,11 +166,11 @@ def entry(each: Difference) -> dict[str, Any]:
 
 
 class TreeComparison(NamedTuple):
-    """What differs between two trees.
+    """The differences between two trees.
 
-    differences: by kind, the farthest first
+    differences: by kind, the largest first
     unmoved: the common frames that are not among them
-    notes: sentences about how the two were compared
+    notes: messages about how the two were compared
     uncompared: frames that could not be compared: neither has data at that time
     """
 
@@ -187,7 +187,7 @@ def diff(
     """Compare two trees, or two recordings at one time: a frame moves from its pose in A to its pose in B.
 
     at_ns: the time; None is the latest of each.  seen_from: a frame of both; None is the root of each part of A, or
-    what is nearest to it and in both.  tolerance: metres and radians that do not count.
+    the nearest frame to it that is in both.  tolerance: metres and radians that do not count.
     Raises UnknownFrame for a `seen_from` that is not in both.
     """
     pair = _Pair(a, b, at_ns, Tolerance(*tolerance))
@@ -216,19 +216,19 @@ class _Pair:
     """Two trees at one time, side by side."""
 
     def __init__(self, a: Frames, b: Frames, at_ns: int | None, tolerance: Tolerance) -> None:
-        """Take both at that time."""
+        """Get both at that time."""
         self.a, self.b = Snapshot(a, at_ns), Snapshot(b, at_ns)
         self.tolerance = tolerance
         in_b = frozenset(b.frames)
         self.common = [frame for frame in a.frames if frame in in_b]
         self.notes = [] if self.common else ["no frame is in both A and B"]
-        self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> from where, how far it moved
-        self.start: str | None = None  # from where all frames are seen, if it was named
+        self.seen: dict[str, tuple[str, Apart]] = {}  # frame -> reference frame, displacement
+        self.start: str | None = None  # the reference frame of all frames, if it was named
 
-    # --- seen from one frame ---
+    # --- relative to one frame ---
 
     def see(self, start: str | None) -> None:
-        """Compare all frames as they are seen from `start`, or each part of the trees from a frame of its own."""
+        """Compare all frames relative to `start`, or each part of the trees relative to its own frame."""
         if start is not None:
             self.start = start
             self._see_from(start)
@@ -254,10 +254,10 @@ class _Pair:
                 apart = _apart(in_a[frame].components, in_b[frame].components)
                 self.seen[frame] = start, apart._replace(rounding=rounding, turn_rounding=ROUNDING)
 
-    # --- what there is to say ---
+    # --- differences ---
 
     def only(self) -> Iterator[Difference]:
-        """Yield the frames that only one has."""
+        """Yield the frames that are only in one tree."""
         in_a, in_b = frozenset(self.a.tree.frames), frozenset(self.b.tree.frames)
         gone = [frame for frame in self.a.tree.frames if frame not in in_b]
         new = [frame for frame in self.b.tree.frames if frame not in in_a]
@@ -270,7 +270,7 @@ class _Pair:
             yield Difference("only-in-b", frame, None, self.b.parent(frame), note=notes.get(frame, ""))
 
     def _renamed(self, gone: Sequence[str], new: Sequence[str]) -> dict[str, str]:
-        """Find the frames of A that stand under another name in B: the one pair with the same pose in one parent."""
+        """Find the frames of A that have another name in B: the only pair with the same pose in one parent."""
         by_parent: dict[str, tuple[list[str], list[str]]] = {}
         for side, frames, at in ((self.a, gone, 0), (self.b, new, 1)):
             for frame in frames:
@@ -291,7 +291,7 @@ class _Pair:
         return found
 
     def about(self, frame: str) -> Iterator[Difference]:
-        """Yield what differs about a frame that both have; `same` if nothing does."""
+        """Yield the differences of a common frame; `same` if there are none."""
         parent_a, parent_b = self.a.parent(frame), self.b.parent(frame)
         blind = " and ".join(name for name, side in (("A", self.a), ("B", self.b)) if frame in side.without_data)
         start, seen = self.seen.get(frame, (None, None))
@@ -348,7 +348,7 @@ def _covered(track: MovingTrack) -> str:
 
 
 def _covariances(a: Frames, b: Frames) -> Iterator[str]:
-    """Name the frames of both whose covariances differ, which is no difference of their poses."""
+    """Return the frames of both whose covariances differ, which does not make their poses different."""
     known = dict.fromkeys([*a.covariances, *b.covariances])
     both = [child for child in known if a.track(child) and b.track(child)]
     if others := [child for child in both if a.covariances.get(child) != b.covariances.get(child)]:
@@ -356,7 +356,7 @@ def _covariances(a: Frames, b: Frames) -> Iterator[str]:
 
 
 def _times(a: Frames, b: Frames, at_ns: int | None) -> Iterator[str]:
-    """Say at which times the two are compared, if anything moves and no time was asked for."""
+    """Return the times at which the two are compared, if anything moves and no time was set."""
     if at_ns is not None or not (a.moves or b.moves):
         return
     newest = [

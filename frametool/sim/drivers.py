@@ -1,7 +1,7 @@
-"""What drives turtles: leaders, which go their own way, and the follower's law with the targets it looks at.
+"""Drivers of turtles: leaders, which move independently, and the follower's control law with its targets.
 
-A leader is asked at `due_ns` with the pose of its turtle, returns a command or None, and sets the next `due_ns` (None:
-no more). The law goes from where the target is, seen by the turtle, to a velocity command.
+A leader is called at `due_ns` with the pose of its turtle, returns a command or None, and sets the next `due_ns` (None:
+no more). The law maps the position of the target, relative to the turtle, to a velocity command.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 # law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
 LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}
 SLOWEST, FASTEST = 1e-6, 1e6  # Hz; two steps must not fall on one nanosecond
-ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; a bearing between neighbours is rounding
+ARRIVED = 2e-6  # metres: positions near 11 m are float32, 1e-6 apart; the bearing of a neighbour is rounding
 
 
 class FollowController:
-    """Drive towards a target: linear = gain * distance, angular = gain * bearing; each limited if asked for.
+    """Drive towards a target: linear = gain * distance, angular = gain * bearing; with optional limits.
 
         FollowController().command(1.0, 1.0)         # Twist(linear_x=0.707.., angular_z=3.14159..)
 
-    law: "ros1" or "ros2", for whatever is None.  rate in Hz, gains in 1/s, limits in m/s and rad/s (None: no limit).
-    At distance zero (below ARRIVED) the command is zero: the bearing is rounding noise there and makes turtles spin.
+    law: "ros1" or "ros2", the defaults.  rate in Hz, gains in 1/s, limits in m/s and rad/s (None: no limit).
+    At distance zero (below ARRIVED) the command is zero: there the bearing is rounding noise and makes turtles spin.
     """
 
     def __init__(
         self, law: str = "ros1", *, rate: float | None = None, gain_linear: float | None = None,
         gain_angular: float | None = None, max_linear: float | None = None, max_angular: float | None = None,
     ) -> None:
-        """Take these numbers, and the law's own for those that are None.
+        """Store these numbers, with the law's own for those that are None.
 
         Raises:
             ValueInvalid: unknown law, impossible rate, negative limit, a gain that is not finite.
@@ -55,7 +55,7 @@ class FollowController:
         self.max_angular = math.inf if max_angular is None else _checked("max_angular", max_angular, 0.0)
 
     def command(self, x: float, y: float) -> Twist:
-        """Return the command for a target seen at x ahead, y to the left (metres).
+        """Return the command for a target at x ahead, y to the left (metres).
 
         Raises ValueInvalid when a gain makes the velocity infinite.
         """
@@ -73,17 +73,17 @@ class FollowController:
             raise ValueInvalid(unbounded(self.gain_linear, self.gain_angular, distance)) from None
 
     def due_ns(self, count: int) -> int:
-        """Return the time of the control step of that number, from 0; rounded once, so that no rate drifts."""
+        """Return the time of the n-th control step, from 0; rounded once, so that no rate drifts."""
         return round(count * BILLION / self.rate)
 
 
 def unbounded(gain_linear: float, gain_angular: float, distance: float) -> str:
-    """Say that gains are too great; metres."""
+    """Return the error that gains are too large; metres."""
     return f"gain_linear {gain_linear:g}, gain_angular {gain_angular:g} give no finite velocity at {distance:g} m"
 
 
 def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
-    """Return a number back if it is finite and within its bounds."""
+    """Return a number if it is finite and within its bounds."""
     if not math.isfinite(value):
         raise ValueInvalid(f"{name} must be finite, found {value}")
     if not least <= value <= most:
@@ -99,14 +99,14 @@ CARROT_CIRCLE = 10.0  # metres
 
 
 def frame_of(turtle: str, target: str) -> str:
-    """Name the frame that is looked up: the turtle, or its carrot (turtle1's is carrot1)."""
+    """Return the frame that is looked up: the turtle, or its carrot (turtle1's is carrot1)."""
     if target == "leader":
         return turtle
     return f"carrot{turtle[6:]}" if turtle[:6] == "turtle" and turtle[6:].isdigit() else f"{turtle}_carrot"
 
 
 def offset(target: str, now_ns: int) -> tuple[float, float]:
-    """Return where a target stands in its leader's frame, in metres."""
+    """Return the position of a target in its leader's frame, in metres."""
     if target == "leader":
         return 0.0, 0.0
     if target == "carrot":
@@ -120,7 +120,7 @@ def planar(x: float, y: float, theta: float) -> Transform:
     return Transform.of(x, y, 0.0, 0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))
 
 
-STILL = 1e-4  # m/s and rad/s: draw_square's own threshold of standing
+STILL = 1e-4  # m/s and rad/s: draw_square's own threshold for a stop
 CIRCLING = Twist(2.0, 1.8)  # the command of the turtlesim tutorial: to the left with a radius of 1.11 m
 KEYS = {"up": Twist(2.0, 0.0), "down": Twist(-2.0, 0.0), "left": Twist(0.0, 2.0), "right": Twist(0.0, -2.0)}
 
@@ -130,7 +130,7 @@ class EndOfRun(Exception):
 
 
 class Heading(NamedTuple):
-    """A command to turn to a heading (radians), as the ROS 2 teleop sends to rotate_absolute; None gives that up."""
+    """A command to rotate to a heading (radians), as the ROS 2 teleop sends to rotate_absolute; None cancels it."""
 
     theta: float | None
 
@@ -140,22 +140,22 @@ HEADINGS = {key: Heading(math.radians(45.0 * count)) for count, key in enumerate
 
 
 class Leader(Protocol):
-    """Whatever drives a turtle without following another."""
+    """A driver of a turtle that does not follow another."""
 
     due_ns: int | None
 
     def command(self, pose: TurtlePose) -> Twist | Heading | None:
-        """Return the command that is due, if any, and set when the next one is."""
+        """Return the command that is due, if any, and set the time of the next one."""
 
 
 class Script:
     """Commands at their times (nanoseconds), read one ahead; between them turtlesim keeps the last for a second."""
 
     def __init__(self, commands: Iterable[TimedTwist]) -> None:
-        """Take the commands in the order of their times.
+        """Store the commands in the order of their times.
 
         Raises:
-            ValueInvalid: now or later, when a time lies before the one in front of it.
+            ValueInvalid: now or later, when a time is before the previous one.
         """
         self._commands = iter(commands)
         self._next: Twist | None = None
@@ -176,9 +176,9 @@ class Script:
 
 
 class Mailbox:
-    """A leader for commands that come in while the turtles already walk; looked into at every tick, the last one wins.
+    """A leader for commands that arrive during the simulation; read at every tick, the last one wins.
 
-    What fails while it is filled is raised where the next command is asked for.
+    An error while it is filled is raised when the next command is read.
     """
 
     def __init__(self) -> None:
@@ -188,7 +188,7 @@ class Mailbox:
         self._failure: BaseException | None = None
 
     def post(self, command: Twist | Heading, t_ns: int = 0) -> None:
-        """Put a command in; it acts now, or at a later time."""
+        """Add a command; it acts now, or at a later time."""
         self._posted.append((t_ns, command))
 
     def close(self) -> None:
@@ -196,7 +196,7 @@ class Mailbox:
         self._failure = EndOfRun()
 
     def fill_from(self, commands: Iterable[TimedTwist]) -> None:
-        """Post commands from a thread of their own, as they come."""
+        """Post commands from a separate thread, as they arrive."""
         from threading import Thread
 
         Thread(target=self._fill, args=(commands,), daemon=True).start()
@@ -224,23 +224,23 @@ class Mailbox:
 
 
 class Periodic:
-    """A leader that is asked at a fixed period: drive(nanoseconds, pose) returns the command."""
+    """A leader that is called at a fixed period: drive(nanoseconds, pose) returns the command."""
 
     def __init__(self, period_ns: int, drive: Callable[[int, TurtlePose], Twist]) -> None:
-        """Keep what drives; the first command is due at time 0."""
+        """Store the driver; the first command is due at time 0."""
         self.due_ns: int | None = 0
         self._period_ns = period_ns
         self._drive = drive
 
     def command(self, pose: TurtlePose) -> Twist:
-        """Return this moment's command."""
+        """Return the current command."""
         now_ns = self.due_ns or 0
         self.due_ns = now_ns + self._period_ns
         return self._drive(now_ns, pose)
 
 
 def figure_eight(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001
-    """Go round to the left, then to the right, and so on."""
+    """Drive circles to the left and to the right in turn."""
     turns = int(now_ns / BILLION * CIRCLING.angular_z / (2.0 * math.pi))
     return Twist(CIRCLING.linear_x, -CIRCLING.angular_z if turns % 2 else CIRCLING.angular_z)
 
@@ -252,13 +252,13 @@ class Square:
     """
 
     def __init__(self) -> None:
-        """Create the driver in front of the first side."""
+        """Create the driver at the start of the first side."""
         self._moves = True
         self._stopping = True
         self._goal: TurtlePose | None = None
 
     def drive(self, now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG002
-        """Go or turn until the goal is reached, then stop, then take the next goal."""
+        """Drive or rotate until the goal is reached, then stop, then take the next goal."""
         if self._goal is None:
             self._goal, self._stopping = _ahead(pose), False
         elif self._stopping and pose.linear_velocity < STILL and abs(pose.angular_velocity) < STILL:
@@ -276,7 +276,7 @@ MARGIN = 1.0  # metres to the walls
 
 
 def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
-    """Return what drives to places drawn at random, one after another, at up to 2 m/s; one way for each seed."""
+    """Return a driver to random positions, one after another, at up to 2 m/s; reproducible for each seed."""
     from random import Random
 
     random = Random(seed)  # noqa: S311 - no secret
@@ -298,7 +298,7 @@ def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
     return drive
 
 
-# name -> what makes the leader of a seed
+# name -> a function from a seed to the leader
 LEADERS: dict[str, Callable[[int], Leader]] = {
     "still": lambda _: Script(()),
     "circle": lambda _: Periodic(BILLION // 2, lambda *_: CIRCLING),
@@ -309,7 +309,7 @@ LEADERS: dict[str, Callable[[int], Leader]] = {
 
 
 def built_in(name: str, seed: int = 0) -> MakeLeader:
-    """Return what makes a built-in leader anew for each run.
+    """Return a function that creates a built-in leader for each run.
 
     Raises ValueInvalid for a name that is not in LEADERS.
     """
@@ -319,21 +319,21 @@ def built_in(name: str, seed: int = 0) -> MakeLeader:
 
 
 def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
-    """Return what makes a leader of (nanoseconds, Twist) pairs; a list can be run again, an iterator once."""
+    """Return a function that creates a leader from (nanoseconds, Twist) pairs; lists can be run again, iterators once."""
     return lambda: Script(commands)
 
 
 def _ahead(pose: TurtlePose) -> TurtlePose:
-    """Return the place 2 m ahead."""
+    """Return the position 2 m ahead."""
     return pose._replace(x=math.cos(pose.theta) * 2.0 + pose.x, y=math.sin(pose.theta) * 2.0 + pose.y)
 
 
-# what terminals send for the arrow keys, in both of their modes
+# escape sequences of arrow keys, in both modes of terminals
 ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 
 
 def keys_in(data: bytes) -> Iterator[bytes]:
-    """Split what a terminal sent into keys: escape sequences of arrows, and single letters."""
+    """Split the input of a terminal into keys: escape sequences of arrows, and single letters."""
     at = 0
     while at < len(data):
         width = 3 if data[at : at + 2] in (b"\x1b[", b"\x1bO") else 1
@@ -342,7 +342,7 @@ def keys_in(data: bytes) -> Iterator[bytes]:
 
 
 def meaning_of(key: bytes, *, headings: bool) -> Twist | Heading | None:
-    """Return what a key commands; None for a key that means nothing."""
+    """Return the command of a key; None for any other key."""
     if len(key) == 3:
         return KEYS.get(ARROWS.get(key[2:], ""))
     return HEADINGS.get(key.decode("latin-1").lower()) if headings else None

@@ -1,4 +1,4 @@
-"""What happened in one control step of the followers of a run, for its derivation."""
+"""The data of one control step of the followers of a run, for its derivation."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
-    """Run a scene until its followers have taken a control step, counted from 0; return what each did in it.
+    """Run a scene until its followers have taken a control step, counted from 0; return the step of each.
 
         frametool.explain("follow", frametool.follow_steps(frametool.tutorial(), 3))
 
-    Raises ValueInvalid where there is no such step, or no command in it.
+    Raises ValueInvalid if there is no such step, or no command in it.
     """
     followers = scene.followers
     if not followers:
@@ -49,7 +49,7 @@ def follow_steps(scene: Scene, number: int) -> list[FollowStep]:
 
 
 class _Seen:
-    """What tf has seen of each frame lately: turtles in the world, carrots next to their leader."""
+    """The recent transforms of each frame: turtles in the world, carrots relative to their leader."""
 
     def __init__(self, keep_ns: int) -> None:
         self.keep_ns = keep_ns
@@ -57,7 +57,7 @@ class _Seen:
         self.reason = ""
 
     def watch(self, step: SimulationStep) -> None:
-        """Keep what a step broadcast; forget what is older than a lookup goes back."""
+        """Store the broadcasts of a step; drop those older than a lookup needs."""
         for sent in step.broadcasts:
             x, y, theta, *_ = step.poses.get(sent.child) or (*sent.transform.components[:2], 0.0)
             sample = PlanarSample(sent.stamp_ns, x, y, theta)
@@ -68,7 +68,7 @@ class _Seen:
         self.reason = next((line for line in step.log if line.startswith("Could not transform")), self.reason)
 
     def step(self, command: IssuedCommand, follow: Follow, number: int) -> FollowStep:
-        """Return what a follower saw and did just now."""
+        """Return the input and the command of a follower."""
         target = frame_of(follow.leader, follow.target)
         newest = {name: self.samples[name][-1].stamp_ns for name in (command.turtle, follow.leader, target)}
         own_ns = newest[command.turtle] if follow.delay_ns else min(newest.values())

@@ -3,9 +3,9 @@
     t,linear,angular                                     CSV: columns by name, also linear_y and those of sim's own CSV
     - {t: 0.5, linear: 2.0, angular: 0.0}                YAML or JSON: mappings, in a list or as documents
     {linear: {x: 2.0}, angular: {z: 1.8}}                Twist messages
-    up                                                   a word a line: the arrow keys of turtle_teleop_key
+    up                                                   one word per line: the arrow keys of turtle_teleop_key
 
-Metres and radians a second, times in seconds. What has no time comes one period after what is in front of it.
+Metres and radians per second, times in seconds. A command without a time comes one period after the previous one.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ if TYPE_CHECKING:
     Value = TypeVar("Value")
 
 LONGEST_INTEGER = 30  # digits
-FLAGS = {"true": "1", "false": "0"}  # as turtlesim's services have them
+FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
 def guarded(call: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
-    """Call what refuses values; what it refuses can then be placed."""
+    """Call a function that refuses values, so that its error can be placed."""
     try:
         return call(*arguments, **options)
     except ValueInvalid as error:
@@ -52,7 +52,7 @@ def guarded(call: Callable[..., Value], *arguments: Any, **options: Any) -> Valu
 
 
 def text_reader(parse: Callable[[str], Value], what: str) -> Callable[[Any], Value]:
-    """Return the reader of values for a parser of text; `what` says in errors what is expected."""
+    """Return the reader of values for a parser of text; `what` is the expected value in errors."""
 
     def read(value: Any) -> Value:
         if type(value) is not str:
@@ -74,7 +74,7 @@ def one_of(names: Collection[str]) -> Callable[[Any], str]:
 
 
 def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
-    """Take a value for a mapping with some of these keys."""
+    """Return a value that must be a mapping with some of these keys."""
     mapping = as_mapping(value, what)
     if unknown := [key for key in mapping if key not in keys]:
         known = alternatives(unknown[0], keys, "keys")
@@ -129,7 +129,7 @@ read_integer = text_reader(_integer, "a whole number")
 
 
 def parse_spawn(text: str) -> Place:
-    """Read X,Y or X,Y,THETA: metres, radians; the angle may carry a unit.
+    """Parse X,Y or X,Y,THETA: metres, radians; the angle may have a unit.
 
     Raises ValueInvalid.
     """
@@ -141,9 +141,9 @@ def parse_spawn(text: str) -> Place:
 
 
 def parse_seconds(text: str) -> float:
-    """Read a span of time in seconds.
+    """Parse a duration in seconds.
 
-    Raises ValueInvalid for what is negative or longer than stamps reach.
+    Raises ValueInvalid if it is negative or longer than stamps allow.
     """
     seconds = parse_number(text)
     if not 0.0 <= seconds <= LONGEST:
@@ -153,7 +153,7 @@ def parse_seconds(text: str) -> float:
 
 NEEDED = ("t", "linear", "angular")
 COLUMNS = {name: name for name in (*NEEDED, "linear_y")} | {"linear_x": "linear", "angular_z": "angular"}
-RECORDED = ("turtle", "distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # not looked at
+RECORDED = ("turtle", "distance", "leader_x", "leader_y", "leader_theta", "x", "y", "theta")  # ignored columns
 ENTRY_KEYS = ("t", "turtle", "linear", "angular", "linear_y")
 AXES = ("x", "y", "z")
 COMMAND = f"{{t: 0.5, linear: 2.0, angular: 0.0}}, a Twist message, or a key: {', '.join(KEYS)}"
@@ -164,7 +164,7 @@ _WORD = re.compile(r"[A-Za-z_]+\s*").fullmatch
 class CommandText(NamedTuple):
     """A piece of the input that is read at once, and the number of its first line: a document, a word, a row of CSV.
 
-    columns: the names of the cells of a row of CSV, "" for those that are not looked at
+    columns: the names of the cells of a row of CSV, "" for ignored ones
     """
 
     source: Source
@@ -172,7 +172,7 @@ class CommandText(NamedTuple):
     columns: Sequence[str] | None = None
 
     def values(self) -> list[tuple[Path, Any]]:
-        """Return the values in it, each with its path; a row of CSV is a mapping."""
+        """Return its values, each with its path; a row of CSV is a mapping."""
         text = self.source.text
         if self.columns is not None:
             cells = split_line(text)
@@ -184,7 +184,7 @@ class CommandText(NamedTuple):
         return [((document.index,), document.value) for document in parse_documents(text, self.source.name)]
 
     def error(self, message: str, path: Path = (), *, key: bool = False) -> FormatError:
-        """Build the error for a place in it: a path in a document, or the name or number of a column."""
+        """Return the error for a place in it: a path in a document, or the name or number of a column."""
         if self.columns is None:
             error = format_error(self.source, path, message, key=key)
         else:
@@ -207,7 +207,7 @@ def read_script(source: Source) -> list[TimedTwist]:
 
 
 def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) -> Iterator[TimedTwist]:
-    """Read commands from lines as they come, one document in memory at a time; otherwise as `read_script`."""
+    """Read commands from lines as they arrive, one document in memory at a time; otherwise as `read_script`."""
     last_ns: int | None = None
     for piece in _pieces(lines, name):
         try:
@@ -225,7 +225,7 @@ def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) 
 def timed_commands(
     value: Any, path: Path = (), last_ns: int | None = None, period_ns: int = BILLION
 ) -> Iterator[TimedTwist]:
-    """Read the commands of a value, each with its time, which may not lie before that of the last one.
+    """Read the commands of a value, each with its time, which must not be before the previous one.
 
     Raises Misfit.
     """
@@ -241,7 +241,7 @@ def timed_commands(
 
 
 def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
-    """Cut lines into pieces that can be read one by one; the first line that says something tells CSV from the rest."""
+    """Split lines into pieces that can be read one by one; the first line with data distinguishes CSV from the rest."""
     numbered = enumerate((_without_noise(line.rstrip("\r\n")) for line in lines), 1)
     for number, text in numbered:
         if not _says_something(text):
@@ -253,7 +253,7 @@ def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
 
 
 def _rows(numbered: NumberedLines, name: str, columns: Sequence[str]) -> Iterator[CommandText]:
-    """Yield the rows of CSV; a line end may stand in a quoted cell."""
+    """Yield the rows of CSV; a quoted cell may contain a line end."""
     for number, text in numbered:
         lines, quotes = [text], text.count('"')
         while quotes % 2 and (more := next(numbered, None)):
@@ -264,7 +264,7 @@ def _rows(numbered: NumberedLines, name: str, columns: Sequence[str]) -> Iterato
 
 
 def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
-    """Yield documents, each when the line that ends it has come, and lines that need none of the following."""
+    """Yield documents, each when the line that ends it has arrived, and single-line documents at once."""
     pending: list[str] = []
     number = 0
     for number, text in numbered:
@@ -282,17 +282,17 @@ def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
 
 
 def _says_something(line: str) -> bool:
-    """Tell data from blank lines and comments."""
+    """Return True for data, False for blank lines and comments."""
     return bool(line.strip()) and not line.startswith("#")
 
 
 def _without_noise(text: str) -> str:
-    """Blank a line that the shell or the tools wrote between the messages; one of theirs ends a document."""
+    """Blank a line that the shell or the tools wrote between the messages; one kind of them ends a document."""
     return text if NOISE(text) is None else "---" if text.endswith("---") else ""
 
 
 def _columns(header: CommandText) -> list[str]:
-    """Name the columns of CSV by what they hold; "" for those that are not looked at."""
+    """Return the columns of CSV by their content; "" for ignored ones."""
     names = [cell.text for cell in split_line(header.source.text)]
     columns = [COLUMNS.get(name, "") for name in names]
     if missing := [name for name in NEEDED if name not in columns]:
@@ -306,7 +306,7 @@ def _columns(header: CommandText) -> list[str]:
 
 
 def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]:
-    """Read one command, or a list of them: nanoseconds or None, the command, and where its time stands."""
+    """Read one command, or a list of them: nanoseconds or None, the command, and the place of its time."""
     if type(value) is list and not (value and all(type(item) is str for item in value)):
         for index, item in enumerate(value):
             yield from _entries(item, (*path, index))
@@ -339,7 +339,7 @@ def _entry(value: Any) -> tuple[int | None, Twist]:
 
 
 def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
-    """Read one number, or two axes of a vector; the others mean nothing to a turtle."""
+    """Read one number, or two axes of a vector; the others have no meaning for a turtle."""
     if type(value) is str:
         return read_number(value), 0.0
     numbers = read_numbers(value, AXES, partial=True)
@@ -347,7 +347,7 @@ def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
 
 
 def lines_as_they_come(stream: Any, name: str) -> Iterator[str]:
-    """Yield the lines of a stream as they arrive; raises FormatError for bytes that are no text."""
+    """Yield the lines of a stream as they arrive; raises FormatError for bytes that are not text."""
     for number, data in enumerate(_lines(stream.raw)):
         try:
             yield decode(data, name)

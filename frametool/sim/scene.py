@@ -1,4 +1,4 @@
-"""What a simulation starts from: turtles with their drivers, service calls at times, the duration."""
+"""The initial state of a simulation: turtles with their drivers, service calls at times, the duration."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Place = tuple[float, float, float]
 
 TUTORIAL_SPAWN: Place = (4.0, 2.0, 0.0)
-LONGEST_NS = FURTHEST_NS  # of any time in a scene: stamps of the buffer reach so far
+LONGEST_NS = FURTHEST_NS  # of any time in a scene: the range of the buffer's stamps
 LONGEST = LONGEST_NS // BILLION  # seconds
 
 
@@ -26,7 +26,7 @@ class Follow(NamedTuple):
     """A driver that follows another turtle through tf.
 
     target: the leader itself, a carrot 2 m to its left (+y of its frame), or one that circles it at 10 m.
-    delay_ns: follow where it was that long ago (the time travel of the tutorial).
+    delay_ns: follow its pose that long ago (the time travel of the tutorial).
     """
 
     leader: str
@@ -36,7 +36,7 @@ class Follow(NamedTuple):
 
 
 class SceneTurtle(NamedTuple):
-    """A turtle of a scene: name, where it is spawned (metres, radians), and who drives it."""
+    """A turtle of a scene: name, spawn pose (metres, radians), and driver."""
 
     name: str
     spawn: Place
@@ -44,7 +44,7 @@ class SceneTurtle(NamedTuple):
 
 
 class ServiceCall(NamedTuple):
-    """A service call at a time; `place` says in messages where it was read."""
+    """A service call at a time; `place` is where it was read, for messages."""
 
     t_ns: int
     service: str
@@ -53,7 +53,7 @@ class ServiceCall(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """All that a simulation needs; duration_ns None runs for ever."""
+    """The input of a simulation; duration_ns None runs for ever."""
 
     turtles: Sequence[SceneTurtle]
     calls: Sequence[ServiceCall] = ()
@@ -67,7 +67,7 @@ class Scene(NamedTuple):
         return {turtle.name: turtle.driver for turtle in self.turtles if isinstance(turtle.driver, Follow)}
 
     def late_calls(self) -> list[ServiceCall]:
-        """Return the calls that the end comes before: a call acts at the first tick after its time."""
+        """Return the calls at or after the end: a call acts at the first tick after its time."""
         if self.duration_ns is None:
             return []
         last_ns = self.duration_ns // TICK_NS * TICK_NS
@@ -81,7 +81,7 @@ def tutorial(
 ) -> Scene:
     """Return the tutorial's scene: turtle1 in the centre, turtle2 at `spawn` follows it, turtle3 follows turtle2, ...
 
-    leader: a name of LEADERS or what `built_in`, `scripted` return.  law: "ros1", "ros2" or a controller.
+    leader: a name of LEADERS or the result of `built_in`, `scripted`.  law: "ros1", "ros2" or a controller.
     spawn: x, y (m), theta (rad) of turtle2; each further follower begins 1 m further left, wrapped into the world.
     delay, duration: seconds; duration None runs for ever.
     Raises ValueInvalid.
@@ -96,7 +96,7 @@ def tutorial(
     for count in range(followers):
         follow = Follow(turtles[-1].name, controller, target, nanoseconds("delay", delay))
         x, y, theta = spawn
-        place = (x - count) % (2.0 * CENTRE) if count else x  # the first stands at `spawn`, wherever that is
+        place = (x - count) % (2.0 * CENTRE) if count else x  # the first at `spawn`, even outside of the world
         turtles.append(SceneTurtle(f"turtle{count + 2}", (place, y, theta), follow))
     return Scene(turtles, (), duration_ns(duration), turtlesim, holonomic)
 
@@ -110,9 +110,9 @@ def duration_ns(seconds: float | None) -> int | None:
 
 
 def nanoseconds(name: str, seconds: float) -> int:
-    """Return a span of time in nanoseconds.
+    """Return a duration in nanoseconds.
 
-    Raises ValueInvalid, which names the span, for what is negative or longer than stamps reach.
+    Raises ValueInvalid with its name if it is negative or longer than stamps allow.
     """
     if not 0.0 <= seconds <= LONGEST:
         raise ValueInvalid(f"{name} must be 0 .. {LONGEST} s, found {seconds:g}")

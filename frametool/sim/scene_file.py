@@ -1,11 +1,11 @@
-"""Scenes of turtles in YAML or JSON: who is where, who drives whom, what happens when.
+"""Scenes of turtles in YAML or JSON: spawn poses, drivers, events.
 
     duration: 20                                                  # seconds, or inf; also turtlesim: ros2, seed: 1
     turtles: {turtle1: {leader: square},                          # still, circle, square, figure8, random, or a file
               turtle2: {spawn: [4, 2, 0], follow: turtle1}}       # metres, radians (or 90deg); law: ros1, gains, ..
     events: [{t: 5, teleport_absolute: {turtle: turtle1, x: 2, y: 2, theta: 0}}]
 
-Leader files are looked for next to the scene.
+Leader files are relative to the scene.
 """
 
 from __future__ import annotations
@@ -81,9 +81,9 @@ def _field(mapping: Mapping[str, Any], key: str, default: Any = None) -> Any:
 
 
 def read_scene(source: Source, *, seed: int | None = None) -> Scene:
-    """Read the one scene of a text; files that it names are looked for next to it.
+    """Read the only scene of a text; files that it names are relative to it.
 
-    seed: instead of the scene's own.
+    seed: overrides the scene's own.
     Raises FormatError with file, line and column.
     """
     documents = parse_documents(source.text, source.name)
@@ -96,13 +96,13 @@ def read_scene(source: Source, *, seed: int | None = None) -> Scene:
 
 
 class _SceneReader:
-    """What holds while one scene is read: its source, its seed, the names in it."""
+    """The state while one scene is read: its source, its seed, the names in it."""
 
     def __init__(self, source: Source, seed: int | None) -> None:
         self.source = source
         self.seed = seed
-        self.names: dict[str, None] = {}  # of all turtles that are or will be there
-        self.nameless = False  # whether turtles come that the world will name
+        self.names: dict[str, None] = {}  # of all turtles, including later ones
+        self.nameless = False  # whether there are turtles that the world will name
 
     def scene(self, value: Any) -> Scene:
         """Read a scene."""
@@ -141,7 +141,7 @@ class _SceneReader:
         return SceneTurtle(name, spawn, leader)
 
     def _check_leader(self, name: str, value: Any) -> None:
-        """Refuse to follow oneself, or who never comes."""
+        """Refuse a turtle that follows itself, or one that never exists."""
         leader = _name(value)
         if leader == name:
             raise Misfit(f"{name} cannot follow itself")
@@ -149,7 +149,7 @@ class _SceneReader:
             raise Misfit(f"no turtle {shown(leader)} to follow{alternatives(leader, self.names, 'turtles')}")
 
     def _leader(self, value: Any) -> MakeLeader:
-        """Read a leader: a built-in name, a file next to the scene, or the commands themselves."""
+        """Read a leader: a built-in name, a file relative to the scene, or the commands themselves."""
         if type(value) is list:
             return scripted(list(readers.timed_commands(value)))
         if type(value) is not str:
@@ -186,7 +186,7 @@ def _entries(value: Any) -> Iterator[tuple[str | int, str, Any]]:
 
 
 def _follow(entry: Mapping[str, Any]) -> Follow:
-    """Read whom a turtle follows, and how."""
+    """Read the follower settings of a turtle."""
     law = _field(entry, "law", "ros1")
     numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
     for key, number in numbers.items():
@@ -196,7 +196,7 @@ def _follow(entry: Mapping[str, Any]) -> Follow:
 
 
 def _call(value: Any) -> ServiceCall:
-    """Read {t: .., SERVICE: {..}}; kill also takes the bare name."""
+    """Read {t: .., SERVICE: {..}}; kill also takes only the name."""
     entry = known_keys(value, ("t", *SERVICES), "an event {t: .., SERVICE: {..}}")
     named = [key for key in entry if key != "t"]
     if "t" not in entry or len(named) != 1:

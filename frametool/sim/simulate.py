@@ -1,7 +1,8 @@
-"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; and sum the run up.
+"""Run a scene in simulated time: ticks, broadcasts, leaders and followers, each when it is due; and summarise the run.
 
-All is seen through tf. At equal times: tick, then carrots, service calls, leaders, controllers. Commands and calls act
-at the first tick strictly later. Poses enter the buffer as float32, the stamp is the tick's time, nothing is late.
+Followers see everything through tf. At equal times: tick, then carrots, service calls, leaders, controllers. Commands
+and calls act at the first tick strictly later. Poses enter the buffer as float32, the stamp is the tick's time, without
+delay.
 """
 
 from __future__ import annotations
@@ -26,22 +27,22 @@ if TYPE_CHECKING:
     from frametool.sim.scene import Scene, ServiceCall
     from frametool.sim.turtle import Pen, Twist, WallHit
 
-    Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has nothing more to do
+    Process = Iterator[int]  # yields the nanoseconds at which it is to be resumed; ends when it has finished
 
 WORLD = "world"
 CACHE_NS = 10 * BILLION  # tf's own default
-TICKS, CARROTS, CALLS, LEADERS, CONTROLLERS = range(5)  # the order of processes that are due at one time
+TICKS, CARROTS, CALLS, LEADERS, CONTROLLERS = range(5)  # the order of processes that are due at the same time
 
 
 class IssuedCommand(NamedTuple):
-    """What a follower or a leader commanded, and what a follower saw.
+    """A command of a follower or a leader, and the follower's input.
 
-    t_ns: when, in nanoseconds.
-    turtle: the name of the turtle that is to move.
+    t_ns: the time, in nanoseconds.
+    turtle: the name of the commanded turtle.
     twist: the command.
     distance: metres to the target; None for leaders.
-    leader: where the followed turtle is; None for leaders.
-    state: where the turtle itself is.
+    leader: the pose of the followed turtle; None for leaders.
+    state: the pose of the turtle itself.
     """
 
     t_ns: int
@@ -53,7 +54,7 @@ class IssuedCommand(NamedTuple):
 
 
 class Broadcast(NamedTuple):
-    """A transform as it was published: the pose of `child` in `parent` at a time."""
+    """A transform as published: the pose of `child` in `parent` at a time."""
 
     stamp_ns: int
     parent: str
@@ -62,23 +63,23 @@ class Broadcast(NamedTuple):
 
 
 class SimulationStep:
-    """One instant at which something happened; what did not is empty.
+    """One instant with events; fields without events are empty.
 
-    t_ns: when, in nanoseconds.
+    t_ns: the time, in nanoseconds.
     is_tick: whether turtlesim's timer fired.
-    poses: of every turtle by name, if this is a tick; at time 0 where they were spawned.
+    poses: of every turtle by name, if this is a tick; at time 0 the spawn poses.
     states: the same before rounding to float32.
-    pens: what each turtle draws with.
+    pens: of each turtle.
     commands: those of followers.
     led: those of leaders.
-    walls: turtles that were put back to the wall.
+    walls: turtles that were moved back to the wall.
     broadcasts: transforms that were published.
-    log: what turtlesim and the followers logged.
+    log: messages of turtlesim and the followers.
     clears: how often the drawing has been cleared so far.
     """
 
     def __init__(self, t_ns: int) -> None:
-        """Create an instant at which nothing has happened yet."""
+        """Create an instant without events."""
         self.t_ns = t_ns
         self.is_tick = False
         self.poses: dict[str, TurtlePose] = {}
@@ -93,7 +94,7 @@ class SimulationStep:
 
 
 class Simulation:
-    """What the processes share: the world, tf's buffer, the instant in progress, where turtles were last seen."""
+    """The common state of the processes: the world, tf's buffer, the current instant, the last poses of turtles."""
 
     def __init__(self, scene: Scene) -> None:
         """Spawn the turtles of a scene."""
@@ -107,7 +108,7 @@ class Simulation:
             self.world.spawn(*turtle.spawn, turtle.name)
 
     def broadcast(self, parent: str, child: str, transform: Transform) -> None:
-        """Publish a transform: into the buffer, and into the step for whoever watches."""
+        """Publish a transform: to the buffer, and to the step for observers."""
         self.buffer.insert(parent, child, transform, self.step.t_ns)
         self.step.broadcasts.append(Broadcast(self.step.t_ns, parent, child, transform))
 
@@ -134,14 +135,14 @@ class Simulation:
 
 
 def simulate(scene: Scene) -> Iterator[SimulationStep]:
-    """Run a scene: yield every instant at which something happens, in order, the last one included.
+    """Run a scene: yield every instant with events, in order, the last one included.
 
         for step in simulate(tutorial(spawn=(1.0, 1.0, 0.0))):
             for command in step.commands:
                 print(command.t_ns, command.twist)
 
     Pure and deterministic: simulated time, no sleep, the same scene gives the same steps. Memory does not grow.
-    Raises ValueInvalid when a scene is impossible.
+    Raises ValueInvalid for an impossible scene.
     """
     simulation = Simulation(scene)
     begun = ((next(process, None), rank, process) for rank, process in _processes(simulation, scene))
@@ -163,7 +164,7 @@ def simulate(scene: Scene) -> Iterator[SimulationStep]:
 
 
 def _processes(simulation: Simulation, scene: Scene) -> Iterator[tuple[int, Process]]:
-    """Yield all that acts in a scene, each with its rank."""
+    """Yield all processes of a scene, each with its rank."""
     yield TICKS, _ticks(simulation)
     carrots = {(follow.leader, follow.target) for follow in scene.followers.values() if follow.target != "leader"}
     yield from ((CARROTS, _carrot(simulation, leader, target)) for leader, target in sorted(carrots))
@@ -185,7 +186,7 @@ def _ticks(simulation: Simulation) -> Process:
 
 
 def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
-    """Broadcast a carrot frame next to a turtle, fixed or moving, ten times a second."""
+    """Broadcast a carrot frame relative to a turtle, fixed or moving, ten times per second."""
     for now_ns in count(0, CARROT_NS):
         yield now_ns
         x, y = offset(target, now_ns)
@@ -193,13 +194,13 @@ def _carrot(simulation: Simulation, turtle: str, target: str) -> Process:
 
 
 def _service_call(simulation: Simulation, call: ServiceCall) -> Process:
-    """Send one service call; the world answers at its next tick."""
+    """Send one service call; the world processes it at its next tick."""
     yield call.t_ns
     simulation.calls.append(call)
 
 
 def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
-    """Send a leader's commands to its turtle; when the turtle is gone they reach nobody."""
+    """Send a leader's commands to its turtle; without the turtle they are dropped."""
     pose = TurtlePose(0.0, 0.0, 0.0, 0.0, 0.0)
     while leader.due_ns is not None:
         yield leader.due_ns
@@ -217,9 +218,9 @@ def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
 
 
 def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
-    """Be the tutorial's listener: look the target up in tf at the rate of the law, and drive there.
+    """Run the tutorial's listener: look up the target in tf at the rate of the law, and drive there.
 
-    Without an answer it skips the cycle and logs once why, until there is one again.
+    If the lookup fails it skips the cycle and logs the reason once, until the next success.
     """
     frame, failing = frame_of(follow.leader, follow.target), ""
     for number in count():
@@ -245,9 +246,9 @@ def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:
 
 
 def _look(buffer: TransformBuffer, turtle: str, frame: str, now_ns: int, delay_ns: int) -> tuple[float, float]:
-    """Return a frame as the turtle sees it: at the latest common time, or where it was `delay_ns` before now.
+    """Return a frame relative to the turtle: at the latest common time, or at `delay_ns` before now.
 
-    Looking back, the turtle itself counts as standing where tf saw it last (tf2's lookup across time).
+    With a delay, the turtle itself is assumed static at its last pose in tf (tf2's lookup across time).
     """
     if not delay_ns:
         return buffer.lookup(turtle, frame).components[:2]
@@ -255,9 +256,9 @@ def _look(buffer: TransformBuffer, turtle: str, frame: str, now_ns: int, delay_n
 
 
 class RunSummary:
-    """Watch the steps of a scene and sum them up; memory does not grow.
+    """Summarise the steps of a scene; memory does not grow.
 
-    reach: metres within which a follower counts as having come to its target.
+    reach: the distance in metres at which a follower has reached its target.
     """
 
     def __init__(self, scene: Scene, reach: float = 0.5) -> None:
@@ -267,11 +268,11 @@ class RunSummary:
         self.walls: dict[str, int] = {}
         self.distances: dict[str, float] = {}
         self.reached_ns: dict[str, int] = {}
-        self.gone: dict[str, tuple[str, int]] = {}  # follower -> who of the two left the world, and when
+        self.gone: dict[str, tuple[str, int]] = {}  # follower -> which of the two left the world, and when
         self._follows = scene.followers
 
     def watch(self, step: SimulationStep) -> None:
-        """Count a step in."""
+        """Add a step."""
         self.t_ns = step.t_ns
         for hit in step.walls:
             self.walls[hit.turtle] = self.walls.get(hit.turtle, 0) + 1
@@ -286,7 +287,7 @@ class RunSummary:
                 self.gone[name] = (follow.leader if name in step.states else name, step.t_ns)
 
     def lines(self) -> Iterator[str]:
-        """Yield the summary: one line a follower, then the walls; names as a terminal may show them."""
+        """Yield the summary: one line per follower, then the walls; names are escaped for a terminal."""
         if self.t_ns is None:
             yield "ended before the first step"
             return
@@ -308,7 +309,7 @@ class RunSummary:
 
 
 def goal(leader: TurtleState, follow: Follow, now_ns: int) -> TurtleState:
-    """Return where a follower's target is, in the world."""
+    """Return the position of a follower's target in the world."""
     x, y = offset(follow.target, now_ns)
     cosine, sine = math.cos(leader.theta), math.sin(leader.theta)
     return TurtleState(leader.x + cosine * x - sine * y, leader.y + sine * x + cosine * y, leader.theta)

@@ -1,7 +1,7 @@
-"""What the turtles do, as text: velocity commands, poses, transforms; one table of them, each in every form.
+"""The steps of turtles as text: velocity commands, poses, transforms, in every format.
 
     linear: {x: ..}, angular: {..}                                  YAML: messages as `ros2 topic echo` prints them
-    {"t": 0.1, "turtle": "turtle2", "linear": {"x": ..}, "angular": {"z": ..}}             JSON: one object a line
+    {"t": 0.1, "turtle": "turtle2", "linear": {"x": ..}, "angular": {"z": ..}}             JSON: one object per line
     t,turtle,linear_x,angular_z,distance,leader_x,leader_y,leader_theta,x,y,theta          CSV; of transforms, ROS 2's
 
 Metres, radians, seconds; quaternions x, y, z, w; a transform is the pose of the child in its parent.
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FORMS = ("text", "yaml", "json", "csv")
 EMITS = ("commands", "poses", "tf")
-# of steps in text, where a line must fit a terminal: millimetres and milliradians, under short names
+# of steps in text, whose lines must fit a terminal: millimetres and milliradians, with short names
 STEP_DECIMALS = 3
 SHORT = {
     "linear_x": "linear", "angular_z": "turning", "distance": "away",
@@ -38,11 +38,11 @@ SHORT = {
 
 
 class Emission(NamedTuple):
-    """One thing that happened in a step, in every shape that a form needs.
+    """One event of a step, in every shape that a format needs.
 
     cells: by column name, for text and CSV.
     message: the ROS message, for YAML and JSON.
-    labels: when and which turtle, for what the message does not say itself.
+    labels: time and turtle, if the message does not have them.
     ros2_row: CSV as `ros2 topic echo --csv` prints it, without a header.
     """
 
@@ -53,20 +53,21 @@ class Emission(NamedTuple):
 
 
 class StepWriter:
-    """Write what a step holds: emit is one of EMITS, style.form one of FORMS.
+    """Writes the contents of steps: emit is one of EMITS, style.form one of FORMS.
 
-    leaders: the commands of leaders too, not only of followers.  labelled: say in a comment whose a message of YAML is.
+    leaders: the commands of leaders too, not only of followers.  labelled: name the turtle in a comment of a YAML
+    message.
     """
 
     def __init__(self, emit: str, style: Style, *, leaders: bool = False, labelled: bool = False) -> None:
-        """Choose what is written and how."""
+        """Store what is written and how."""
         self._emissions = _EMISSIONS["all commands" if leaders and emit == "commands" else emit]
         self._style = style
         self._labelled = labelled
         self._headed = False
 
     def write(self, step: SimulationStep) -> Iterator[str]:
-        """Yield each record of a step, the first one below the header if the form has one."""
+        """Yield each record of a step, the first one below the header if the format has one."""
         for emission in self._emissions(step):
             if not self._headed:
                 self._headed = True
@@ -95,12 +96,12 @@ class StepWriter:
 
 
 def _step_width(name: str) -> int:
-    """Return how wide a column of steps is in text."""
+    """Return the width of a column of steps in text."""
     return 7 if name in ("turtle", "parent", "child") else max(6, len(SHORT.get(name, name)))
 
 
 def _text_cell(cell: Any, style: Style) -> str:
-    """Round for reading; zero has no sign there."""
+    """Round for display; zero has no sign."""
     if not isinstance(cell, float):
         return "-" if cell is None else printable(str(cell))
     digits = STEP_DECIMALS if style.precision is None else style.precision
@@ -108,7 +109,7 @@ def _text_cell(cell: Any, style: Style) -> str:
 
 
 def _aligned(cells: Sequence[str], widths: Iterable[int]) -> str:
-    """Write a line, each cell to the right in its column."""
+    """Format a line, each cell right-aligned in its column."""
     return " ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True)) + "\n"
 
 
@@ -124,7 +125,7 @@ def _commands(commands: Iterable[IssuedCommand]) -> Iterator[Emission]:
 
 
 def _poses(step: SimulationStep) -> Iterator[Emission]:
-    """Yield the poses of a tick, as turtlesim/Pose; what is there at time 0 has not moved yet."""
+    """Yield the poses of a tick, as turtlesim/Pose; turtles at time 0 have not moved yet."""
     for name, pose in step.poses.items() if step.t_ns else ():
         if not all(map(math.isfinite, pose)):
             when = f"{name} at {step.t_ns / BILLION:g} s"

@@ -1,6 +1,6 @@
 """Thousands of followers of one leader at once, on arrays; the same rules as `simulate`, without the buffer.
 
-The leader does not see its followers, so it is run once; each follower is then a row of every array.
+The leader does not depend on its followers, so it is run once; each follower is a row of every array.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ NUMBERS = ("gain_linear", "gain_angular", "max_linear", "max_angular")
 
 
 class SweepResult(NamedTuple):
-    """What became of the followers; every field has their common shape.
+    """The results of the followers; every field has their common shape.
 
-    x, y (m), theta (rad): where they ended.  distance (m): to the leader, at the end.
-    time_to_reach (s): when they first were within reach; nan where never.
-    overshoot (m): how much further off than their nearest they were again after that; nan where never within reach.
+    x, y (m), theta (rad): final poses.  distance (m): to the leader, at the end.
+    time_to_reach (s): of the first time within reach; nan for never.
+    overshoot (m): the largest increase of the distance after its minimum from then on; nan if never within reach.
     wall_hits: ticks at a wall.
     """
 
@@ -56,10 +56,10 @@ def simulate_many(
     max_linear: ArrayLike | None = None, max_angular: ArrayLike | None = None,
     duration: float = 20.0, reach: float = 0.5, seed: int = 0,
 ) -> SweepResult:  # fmt: skip
-    """Let many followers chase one leader, each on its own.
+    """Simulate many followers of one leader, each independently.
 
     spawn: (..., 3) of x, y (m), theta (rad); gains and limits: arrays that broadcast with its leading shape.
-    law gives what is None; rate (Hz) is one for all.
+    law sets the defaults; rate (Hz) is one for all.
 
         starts = np.stack([xs, ys, np.zeros_like(xs)], axis=-1)
         simulate_many("circle", spawn=starts).time_to_reach
@@ -83,7 +83,7 @@ def simulate_many(
 
 
 def _checked(name: str, value: ArrayLike) -> Floats:
-    """Let the controller judge the least and the greatest of some numbers; no limit is infinite."""
+    """Let the controller check the least and the greatest of some numbers; no limit is infinite."""
     numbers = np.asarray(value, dtype=float)
     if np.isnan(numbers).any():
         raise ValueInvalid(f"{name} must not be nan")
@@ -94,7 +94,7 @@ def _checked(name: str, value: ArrayLike) -> Floats:
 
 
 def _places(spawn: ArrayLike) -> Floats:
-    """Check the start poses, and round them to float32 as the spawn service does."""
+    """Check the start poses, and round them to float32 like the spawn service."""
     places = np.asarray(spawn, dtype=float)
     if places.shape[-1:] != (3,):
         raise ValueInvalid(f"spawn must have the shape (..., 3) of x, y, theta, found {places.shape}")
@@ -128,7 +128,7 @@ def _follow(columns: list[Floats], track: LeaderTrack, law: FollowController, re
 
 
 class _FollowerBlock:
-    """The followers of one block: the turtle's arithmetic and the law's, on arrays."""
+    """The followers of one block: the arithmetic of turtle and law, on arrays."""
 
     def __init__(self, columns: list[Floats], reach: float) -> None:
         self.x, y, self.theta = (column.copy() for column in columns[:3])  # changed in place
@@ -154,7 +154,7 @@ class _FollowerBlock:
         self.x, self.down = np.clip(self.x, 0.0, SIZE), np.clip(self.down, 0.0, SIZE)
 
     def measure(self, leader: TurtleState, t: float) -> None:
-        """Compare the distances with the reach, and with the nearest since that was reached."""
+        """Compare the distances with the reach, and with the minimum since it was reached."""
         distance = self._distance(leader)
         if self.unreached:
             new = np.isnan(self.reached) & (distance <= self.reach)
@@ -170,13 +170,13 @@ class _FollowerBlock:
         return np.sqrt(across * across + down * down)
 
     def steer(self, leader: TurtlePose) -> None:
-        """Follow the published pose: what `lookup` and `FollowController.command` give, from float32 poses."""
+        """Follow the published pose: `lookup` and `FollowController.command`, from float32 poses."""
         sine, cosine = half_sincos(2.0 * _single(self.theta), arrays)
         across, up = leader.x - _single(self.x), leader.y - _single(SIZE - self.down)
         ahead, left = cosine * across + sine * up, cosine * up - sine * across
         distance = np.sqrt(ahead * ahead + left * left)
         moving = distance >= ARRIVED
-        with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is refused below, or stands still
+        with np.errstate(over="ignore", invalid="ignore"):  # overflows are refused below, or stop the turtle
             self.speed = np.clip(self.gain_linear * distance * moving, -self.max_linear, self.max_linear)
             turn = self.gain_angular * np.where(moving, bearing(left, ahead, distance, arrays), 0.0)
         self.turn = np.clip(turn, -self.max_angular, self.max_angular)

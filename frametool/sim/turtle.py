@@ -1,6 +1,6 @@
-"""Turtlesim's world and its turtles: motion, constants and rounding of the node, its services with their refusals.
+"""Turtlesim's world and its turtles: motion, constants and rounding of the node, its services and their errors.
 
-Lengths in metres, angles in radians, x to the right, y up; inside, y runs down from the top as in turtlesim's window.
+Lengths in metres, angles in radians, x to the right, y up; internally y points down from the top as in turtlesim.
 Source: turtlesim's turtle.cpp, for ROS 1 and ROS 2.
 """
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from typing import Self
 
 TICK_NS = 16_000_000
-DT = 0.016  # seconds; the node takes this constant, not the time that passed
+DT = 0.016  # seconds; the node uses this constant, not the elapsed time
 TIMEOUT_NS = 1_000_000_000
 PI = 3.14159265  # the node's own macro
-SIZE = 11.088889122009277  # metres: float32 of 499 pixels / 45 pixels a metre
+SIZE = 11.088889122009277  # metres: float32 of 499 pixels / 45 pixels per metre
 CENTRE = SIZE / 2.0
-TURN_SPEED = 1.0  # radians a second, of rotate_absolute
+TURN_SPEED = 1.0  # radians per second, of rotate_absolute
 TURN_NEAR = 0.02  # radians, where rotate_absolute ends
-FASTEST_TURN = 1e15  # radians a second; beyond, what is left of an angle after wrapping is rounding
+FASTEST_TURN = 1e15  # radians per second; beyond, an angle after wrapping is only rounding
 
 
 class _Components(NamedTuple):
@@ -33,17 +33,18 @@ class _Components(NamedTuple):
 
 
 class Twist(_Components):
-    """A velocity command: metres and radians a second, in the turtle's own frame; x ahead, y to its left.
+    """A velocity command: metres and radians per second, in the turtle's own frame; x ahead, y to its left.
 
     Raises:
-        ValueInvalid: a component is nan or infinite, or a turn so fast that no heading is left; turtlesim would take it
-            and lose the turtle for good.
+        ValueInvalid: a component is nan or infinite, or a rotation so fast that no heading is left; turtlesim would
+        accept
+            it and lose the turtle for good.
     """
 
     __slots__ = ()
 
     def __new__(cls, linear_x: float, angular_z: float, linear_y: float = 0.0) -> Self:
-        """Check that every component can be used."""
+        """Check every component."""
         if not (math.isfinite(linear_x) and abs(angular_z) <= FASTEST_TURN and math.isfinite(linear_y)):
             limits = f"must be finite, and turns at most {FASTEST_TURN:g} rad/s"
             raise ValueInvalid(f"a velocity {limits}, found linear {linear_x} {linear_y}, angular {angular_z}")
@@ -51,19 +52,19 @@ class Twist(_Components):
 
 
 class TurtleState(NamedTuple):
-    """Where a turtle is, in double precision: metres, radians."""
+    """The pose of a turtle, in double precision: metres, radians."""
 
     x: float
     y: float
     theta: float
 
     def distance(self, other: TurtleState) -> float:
-        """Return the metres to another turtle."""
+        """Return the distance in metres to another turtle."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
 
 class TurtlePose(NamedTuple):
-    """What turtlesim publishes at every tick: turtlesim/Pose, rounded to float32; the speed has no sign."""
+    """The message that turtlesim publishes at every tick: turtlesim/Pose, rounded to float32; the speed has no sign."""
 
     x: float
     y: float
@@ -73,7 +74,7 @@ class TurtlePose(NamedTuple):
 
 
 class Pen(NamedTuple):
-    """What a turtle draws with: colour 0 to 255, width in pixels."""
+    """The pen of a turtle: colour 0 to 255, width in pixels."""
 
     r: int = 179
     g: int = 184
@@ -98,12 +99,12 @@ def check_single(**numbers: float) -> None:
 
 
 def wrapped(theta: Any, xp: Any = math) -> Any:
-    """Bring an angle into [-PI, PI) by turtlesim's formula."""
+    """Wrap an angle to [-PI, PI) by turtlesim's formula."""
     return theta - 2.0 * PI * xp.floor((theta + PI) / (2.0 * PI))
 
 
 class Turtle:
-    """A turtle that keeps its last command for a second, walks, and stops at the walls.
+    """A turtle that keeps its last command for a second, moves, and stops at the walls.
 
         turtle = Turtle()
         turtle.command(Twist(2.0, 0.0))
@@ -111,16 +112,16 @@ class Turtle:
             turtle.update(tick * TICK_NS)
         turtle.pose.x                       # 7.560444, after 63 ticks of motion
 
-    holonomic: linear_y counts; ROS 1 always, ROS 2 only with its parameter of that name.
+    holonomic: linear_y is used; ROS 1 always, ROS 2 only with its parameter of that name.
     """
 
     def __init__(
         self, x: float = CENTRE, y: float = CENTRE, theta: float = 0.0, *,
         name: str = "turtle1", holonomic: bool = True,
     ) -> None:  # fmt: skip
-        """Put a turtle into the world; x, y, theta are float32, as in the spawn service.
+        """Create a turtle; x, y, theta are float32, as in the spawn service.
 
-        Raises ValueInvalid for what is no finite float32.
+        Raises ValueInvalid for values that are not finite float32.
         """
         check_single(x=x, y=y, theta=theta)
         self.name = name
@@ -135,34 +136,34 @@ class Turtle:
 
     @property
     def state(self) -> TurtleState:
-        """Return where the turtle is, in double precision, y up."""
+        """Return the pose in double precision, y up."""
         return TurtleState(self._x, SIZE - self._down, self._theta)
 
     @property
     def pose(self) -> TurtlePose:
-        """Return what turtlesim would publish now, float32."""
+        """Return the message that turtlesim would publish now, float32."""
         ahead, turning, aside = self._velocity
         speed = math.sqrt(ahead * ahead + aside * aside)
         return TurtlePose(*array("f", (self._x, SIZE - self._down, self._theta, speed, turning)))
 
     def command(self, twist: Twist) -> None:
-        """Take a velocity command; it acts from the next tick on, the last one of several wins."""
+        """Set a velocity command; it acts from the next tick on, the last one of several wins."""
         self._inbox = twist
 
     def teleport_absolute(self, x: float, y: float, theta: float) -> None:
-        """Jump to a place at the next tick; float32, as the service takes it."""
+        """Jump to a pose at the next tick; float32, as in the service."""
         self._teleports.append((False, single(x), single(y), single(theta)))
 
     def teleport_relative(self, linear: float, angular: float) -> None:
-        """Turn, then jump ahead, at the next tick."""
+        """Rotate, then jump ahead, at the next tick."""
         self._teleports.append((True, single(linear), 0.0, single(angular)))
 
     def set_pen(self, r: float, g: float, b: float, width: float, off: float) -> None:
-        """Draw with another pen from the next tick on; the service's numbers, `off` is 0 or 1."""
+        """Change the pen from the next tick on; the service's numbers, `off` is 0 or 1."""
         self.pen = Pen(int(r), int(g), int(b), int(width), bool(off))
 
     def rotate_absolute(self, theta: float | None) -> None:
-        """Turn to a heading at 1 rad/s (ROS 2); a velocity command aborts it, None gives it up."""
+        """Rotate to a heading at 1 rad/s (ROS 2); a velocity command aborts it, None cancels it."""
         if theta is None and self._heading is not None:
             self._velocity = Twist(0.0, 0.0)
         self._heading = None if theta is None else single(theta)
@@ -170,7 +171,7 @@ class Turtle:
     def update(self, now_ns: int) -> TurtleState | None:
         """Advance one tick.
 
-        Returns where the turtle would have been outside the world before it was put back to the wall, else None.
+        Returns the pose outside the world from which the turtle was moved back to the wall, else None.
         """
         self._take_command(now_ns)
         for teleport in self._teleports:
@@ -203,7 +204,7 @@ class Turtle:
             self._x, self._down, self._theta = x, max(0.0, SIZE - y), theta
 
     def _turn_to_heading(self, now_ns: int) -> None:
-        """Turn towards the goal of rotate_absolute, if there is one."""
+        """Rotate towards the goal of rotate_absolute, if there is one."""
         if self._heading is None:
             return
         remaining = wrapped(self._heading - self._theta)
@@ -224,8 +225,8 @@ class Turtle:
 
 
 VARIANTS = ("ros1", "ros2")
-FAR = 1e9  # metres, from where on a place is written with an exponent
-# service -> its arguments and what they are when left out (None: needed)
+FAR = 1e9  # metres; beyond, a position is written with an exponent
+# service -> its arguments and their defaults (None: required)
 SERVICES: dict[str, dict[str, float | str | None]] = {
     "spawn": {"x": None, "y": None, "theta": 0.0, "name": ""},
     "kill": {"name": None},
@@ -239,18 +240,18 @@ SERVICES: dict[str, dict[str, float | str | None]] = {
 
 
 class ServiceRefused(ValueInvalid):
-    """Report a service call that turtlesim refuses, in its own words."""
+    """A service call that turtlesim refuses, in its own words."""
 
 
 class WallHit(NamedTuple):
-    """A tick at which a turtle was put back to the wall; `place` is where it would have been, y up."""
+    """A tick at which a turtle was moved back to the wall; `place` is where it would have been, y up."""
 
     t_ns: int
     turtle: str
     place: TurtleState
 
     def __str__(self) -> str:
-        """Warn as turtlesim does, with y up."""
+        """Format turtlesim's warning, with y up."""
         x, y = (f"{each:f}" if abs(each) < FAR else f"{each:g}" for each in self.place[:2])
         return f"{printable(self.turtle)}: Oh no! I hit the wall! (Clamping from [x={x}, y={y}])"
 
@@ -266,7 +267,7 @@ class World:
     """
 
     def __init__(self, variant: str = "ros1", *, holonomic: bool = False) -> None:
-        """Create an empty world; `reset` gives it turtle1, as the node does when it starts."""
+        """Create an empty world; `reset` adds turtle1, as the node does when it starts."""
         if variant not in VARIANTS:
             raise ValueInvalid(f"no turtlesim {shown(variant)}; there are {', '.join(VARIANTS)}")
         self.variant = variant
@@ -329,9 +330,9 @@ class World:
         return self._turtles[name]
 
     def call(self, service: str, **arguments: float | str) -> str:
-        """Call a service of the table SERVICES by name; what is left out takes the table's value.
+        """Call a service of the table SERVICES by name; missing arguments have the table's default.
 
-        Returns what turtlesim logs of it, or "".
+        Returns the message that turtlesim logs, or "".
         Raises ServiceRefused; ValueInvalid for an unknown service or a wrong argument.
         """
         values = complete(service, arguments)
@@ -353,7 +354,7 @@ class World:
 def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float | str]:
     """Return a service's arguments with the defaults of the table.
 
-    Raises ValueInvalid for a service or argument that does not exist, or one that is missing or no finite float32.
+    Raises ValueInvalid for an unknown service or argument, or one that is missing or not a finite float32.
     """
     if service not in SERVICES:
         raise ValueInvalid(f"no service {shown(service)}; services: {', '.join(SERVICES)}")

@@ -142,10 +142,10 @@ frametool: lidar<-imu_link * tool<-base_link: 'imu_link' and 'tool' do not touch
 frametool: mean() needs two poses of the same frames, found map<-base_link and map<-tool
   mean(map<-base_link, map<-tool)
   ^
-frametool: dist() compares two poses seen from one frame, found map<-tool and tool<-base_link
+frametool: dist() compares two poses in one frame, found map<-tool and tool<-base_link
   dist(map<-tool, tool<-base_link)
   ^
-frametool: dist() compares two poses seen from one frame, found map<-tool and base_link<-lidar
+frametool: dist() compares two poses in one frame, found map<-tool and base_link<-lidar
   dist(map<-tool, base_link<-lidar)
   ^
 frametool: map<-lidar takes points in 'lidar', found one in 'camera_optical'
@@ -154,7 +154,7 @@ frametool: map<-lidar takes points in 'lidar', found one in 'camera_optical'
 frametool: map<-lidar takes points in 'lidar', found one in 'map'
   (map<-lidar) * trans(map<-tool)
                ^
-frametool: the pose stands on the left: map<-lidar * point
+frametool: the pose must be on the left: map<-lidar * point
   [1, 2, 3] * (map<-lidar)
             ^
 frametool: poses are composed with *, not -; the difference of two is inv(a) * b
@@ -169,7 +169,7 @@ frametool: a pose has no negative; inv(..) is its inverse
 frametool: unknown name 'map'; a frame is asked for as TARGET<-SOURCE
   map
   ^
-frametool: a list of 4 numbers; a point has 3, a twist 6; rotations say what they are: {rpy_deg: [..]}
+frametool: a list of 4 numbers; a point has 3, a twist 6; rotations need a name: {rpy_deg: [..]}
   [0, 0, 0, 1]
   ^
 frametool: cannot add a number in m and a number in rad
@@ -223,7 +223,7 @@ frametool: quaternion 0 0 0 0 has no direction; give a non-zero one
 frametool: unknown unit 'foo'; units: m mm cm km rad deg s ms us ns
   12foo
   ^
-frametool: 'pi' is no unit; write 2 * pi
+frametool: 'pi' is not a unit; write 2 * pi
   2pi
   ^
 frametool: something is missing here

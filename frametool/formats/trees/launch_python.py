@@ -240,7 +240,7 @@ def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Act
     except NotLiteral as error:
         return Action.not_read(f"{shown(_written(error.node))} is not a literal")
     if not isinstance(value, list):
-        return Action.not_read(f"{name} is no list")
+        return Action.not_read(f"{name} is not a list")
     return Action([str(word) for word in value], conditions=conditions)
 
 
