@@ -319,7 +319,7 @@ def built_in(name: str, seed: int = 0) -> MakeLeader:
 
 
 def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
-    """Return a function that creates a leader from (nanoseconds, Twist) pairs; lists can be run again, iterators once."""
+    """Return a function that creates a leader from (nanoseconds, Twist) pairs; lists can be run again."""
     return lambda: Script(commands)
 
 
