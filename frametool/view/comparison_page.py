@@ -44,7 +44,9 @@ STRETCHES, FEWEST = 200, 20  # of all paths together, and of one at least, each 
 LEVELS, BINS = 12, 30  # of error: colours along a path, columns of a histogram
 ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # seen on white paper and on dark
 SERIES_NAMES = list(SERIES)
+REFERENCE = "reference"
 LEAST_LENGTHS = 3
+STILL = 1e-6  # metres: below, a path is a point
 FAR = 1e3  # times its size is a path away from 0 where the numbers along its axes are shortened
 
 
@@ -69,15 +71,13 @@ def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
     unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
     map_chart, seen = _map(curves)
     charts = _over_time(curves, "pair" if unit == "pair" else "time (s)")
-    columns = (
-        {"path": _path(curves, map_chart, seen), "distribution": _distribution(curves)},
-        {"errors": _stacked(charts), **_by_length(curves, numbers)},
-    )
+    figures = [{"distribution": _distribution(curves)}, _by_length(curves, numbers)][:: 1 if len(curves) == 1 else -1]
+    columns = ({"path": _path(curves, map_chart, seen), **figures[0]}, {"errors": _stacked(charts), **figures[1]})
     what = curves[0].name if len(curves) == 1 else f"{len(curves)} estimates"
     title = f"{what} against {printable(found[0].names[0])}"
     if form == "svg":
         return _side_by_side(f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m", columns)
-    figures = "".join(
+    drawn = "".join(
         f"<div>{''.join(f'<figure id={name}>{svg_element(each)}</figure>' for name, each in column.items())}</div>\n"
         for column in columns
     )
@@ -88,7 +88,7 @@ def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
         f"<pre><code>$ {escape(printable(command))}</code></pre>\n"
         f"{''.join(f'<p class=hint>{escape(hint)}</p>' for hint in hints)}</header>\n"
         f"{_tiles(numbers[0]) if len(found) == 1 else _table(numbers, curves)}"
-        f'<div id="figures">\n{figures}</div>\n{"".join(map(partial(_measured, one=len(found) == 1), numbers))}'
+        f'<div id="figures">\n{drawn}</div>\n{"".join(map(partial(_measured, one=len(found) == 1), numbers))}'
         '</main>\n<output id="tip" hidden></output>\n'
     )
     samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0][0]) for each in curves]}
@@ -125,7 +125,8 @@ def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
     every = np.concatenate([xyz for each in curves for xyz in (each.found.pairs.ref.xyz, each.found.moved.xyz)])
     low, high = every.min(0), every.max(0)
     axes = np.sort(np.argsort(high - low, kind="stable")[1:])
-    span = max(float((high - low).max()), 1e-9)
+    span = float((high - low).max())
+    span = span if span > STILL else 1.0
     base = np.where(np.abs(low) > FAR * span, np.round(low), 0.0)[axes]
     low, high = low[axes] - base, high[axes] - base
     names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
@@ -138,7 +139,7 @@ def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
 def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     """Draw the paths; a single estimate is coloured by its error."""
     first = curves[0]
-    lines = [ChartLine("reference", "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
+    lines = [ChartLine(REFERENCE, "soft", seen(first.found.pairs.ref.xyz[first.chosen]), 2.0, (5.0, 4.0))]
     shapes: list[Shape] = []
     if len(curves) == 1:
         lines.append(ChartLine("estimate, by error", shade_of(0.5, ERROR_STOPS), []))
@@ -170,10 +171,10 @@ def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart)
 
 
 def _named(lines: list[ChartLine]) -> list[ChartLine]:
-    """Drop names from a legend too long for one line; the table of estimates shows the colours."""
+    """Drop the names of estimates from a legend too long for one line; their table shows the colours."""
     if sum(text_width(line.name, 12.0) + 33.0 for line in lines) < WIDE - 60.0:
         return lines
-    return [line._replace(name="" if at else line.name) for at, line in enumerate(lines)]
+    return [line._replace(name=line.name * (line.name == REFERENCE)) for line in lines]
 
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[ChartLine]]]:
@@ -206,9 +207,9 @@ def _stacked(charts: Sequence[tuple[Chart, list[ChartLine]]]) -> Picture:
 def _distribution(curves: Sequence[Curve]) -> Picture:
     """Draw the distribution of the error: a histogram of one estimate, a box plot of several."""
     errors = [each.found.ate.m for each in curves]
-    ends = (0.0, max(float(each.max()) for each in errors))
+    ends = (0.0, max(float(each.max()) for each in errors) or 1.0)
     if len(curves) == 1:
-        counts, edges = np.histogram(errors[0], BINS)
+        counts, edges = np.histogram(errors[0], BINS, ends)
         steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
         names = ("error in position (m)", "poses")
         chart = Chart(Area(LEFT, TOP, WIDE, HIGH), ends, (0.0, float(counts.max())), names)
@@ -274,12 +275,15 @@ def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
 def _tiles(found: dict[str, Any]) -> str:
     """Return the tiles: absolute error, relative error, poses paired."""
     ate, poses = found["ate"]["m"], found["poses"]
-    said = f"rmse; at most {ate['max']:.4g} m, aligned by {found['settings']['align']}"
+    align = found["settings"]["align"]
+    said = f"rmse; at most {ate['max']:.4g} m, {'not aligned' if align == 'none' else f'aligned by {align}'}"
     tiles = [("ATE", f"{ate['rmse']:.4g}", "m", said)]
     if steps := [row for row in found["rpe"] if row["percent"] is not None]:
         *others, last = (f"{row['percent']:.3g} % over {row['delta']}" for row in steps)
         value, _, said = last.partition(" % ")
         tiles.append(("RPE", value, "%", "; ".join([said, *others])))
+    else:
+        tiles.append(("RPE", "-", "", "needs rotations" if found["rpe"] else "no motion over the distances asked for"))
     share = f"of {poses['possible']}, {100 * poses['paired'] / max(poses['possible'], 1):.3g} %"
     tiles.append(("Poses paired", str(poses["paired"]), "", share))
     cells = (f"<div><h2>{name}</h2><p><strong>{value}</strong> {unit}</p><p>{said}</p></div>"

@@ -248,6 +248,17 @@ def test_errors_by_length_are_drawn_of_three_lengths_or_more(run: Run, tmp_path:
     assert drawn == [False, True]
 
 
+@pytest.mark.parametrize("names", [DRONE, (DRONE[0], DRONE[0]), ("prism-ref.csv", "prism-est.tum"), ("gaps-ref.csv", "gaps-est.tum")])
+def test_nothing_is_drawn_beside_its_chart(run: Run, tmp_path: Path, names: tuple[str, str]) -> None:
+    """Of the same path twice all errors are 0."""
+    text = report(run, tmp_path, *names, *(["--align", "none"] if len(set(names)) == 1 else []))
+    for figure in re.findall("<figure.*?</figure>", text, re.DOTALL):
+        wide, high = map(float, re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', figure)[0])
+        places = [(float(x), float(y)) for x, y in re.findall(r"[ML]([-\d.]+) ([-\d.]+)", figure)]
+        assert all(0 <= x <= wide and 0 <= y <= high for x, y in places)
+    assert text.count("<h2>") == 3
+
+
 def test_a_report_of_several_has_a_row_and_a_box_each(run: Run, tmp_path: Path) -> None:
     text = report(run, tmp_path, "drone-ref.tum", "drone-est.tum", "drone-ref.tum")
     rows = re.findall(r"<tr><th><svg.*?</svg>([^<]*)</th>(.*?)</tr>", text)
