@@ -146,6 +146,8 @@ class Result:
         for each in style.notations if pose.rotation is not None else ():
             key, value = rotation_entry(pose, each, style)
             _add(entry, key, value)
+            if each.euler_axes and is_locked(pose, each):
+                extras = {"gimbal_lock": True} | extras
         return entry | extras
 
     def said(self, style: Style) -> dict[str, Any]:

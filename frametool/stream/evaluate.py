@@ -126,7 +126,7 @@ class Run:
         with np.errstate(all="ignore"):
             moved = self._compute(self.columns, movers, state)
             self._doubt_turns(moved)
-            self.results = self._results(moved)
+            self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)
         weighs = self.request.gathered and self.request.extra_column
         weights = weights_of(self.block, self.request, self._blame) if weighs else None
@@ -401,14 +401,17 @@ class Run:
         for row in wrong:
             self._blame(row, names[first], wrong_tail(tail, [number[row] for number in numbers[first:]]))
 
-    def _results(self, moved: list[Components]) -> Floats:
-        """Return the results as rows of numbers; what is not finite is bad."""
+    def _results(self, moved: list[Components]) -> tuple[Floats, Ints]:
+        """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
         numbers: list[Floats] = []
+        locked = np.zeros(self.count, np.int64)
         for target, parts in zip(self.plan.targets, moved, strict=True):
             numbers += target.written(parts, arrays)
             for name, number in target.left_out(parts, arrays):
                 for row in np.flatnonzero(abs(number) > FLAT).tolist():
                     self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
+            if target.notations and (flags := target.locked(parts)) is not None:
+                locked |= flags
         results = np.empty((self.count, len(numbers)))
         for column, number in enumerate(numbers):
             results[:, column] = number
@@ -417,7 +420,7 @@ class Run:
             for row in np.flatnonzero(self._is_wrong(results)).tolist():
                 if row not in self.reasons:
                     self._blame(row, *self._why_not_finite(row, moved))
-        return results
+        return results, locked
 
     def _is_wrong(self, results: Floats) -> Any:
         """Return which rows have numbers that are none; nan may be one of a formula's."""
@@ -445,7 +448,7 @@ class Run:
         return "", "the result is not finite: the numbers are too large"
 
     def _keep(self, kept: Flags) -> None:
-        self.rows, self.results = self.rows[kept], self.results[kept]
+        self.rows, self.results, self.locked = self.rows[kept], self.results[kept], self.locked[kept]
 
     def refuse(self, rows: Sequence[int], reason: str) -> None:
         """Take results back: these rows are bad."""
@@ -478,7 +481,7 @@ class Run:
             after = separators(plan.pieces, self.results.shape[1])
             values = write(self.results, self.request.precision, after, yaml=plan.yaml)
         parts = self.block.parts if len(rows) == self.count else [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(plan.pieces, parts, len(rows), values, self.results))]
+        return [(self.block.places[rows], assemble(plan.pieces, parts, values, self.locked, self.results))]
 
     def _null_rows(self) -> list[tuple[Ints, list[Spans]]]:
         plan = self.plan
@@ -487,7 +490,7 @@ class Run:
         rows = np.array(sorted(self.reasons), np.int64)
         pieces = [_without_result(piece, plan.null) for piece in plan.pieces]
         parts = [chosen(part, rows) for part in self.block.parts]
-        return [(self.block.places[rows], assemble(pieces, parts, len(rows)))]
+        return [(self.block.places[rows], assemble(pieces, parts, None, np.zeros(len(rows), np.int64)))]
 
     def faults(self) -> list[Fault]:
         """Return what is wrong, line by line."""

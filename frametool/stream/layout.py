@@ -71,7 +71,13 @@ class Const(NamedTuple):
     text: bytes
 
 
-Piece: TypeAlias = In | Out | Const | Instead | Word | Renamed
+class IfLocked(NamedTuple):
+    """Text that stands only in rows whose angles are not unique."""
+
+    text: bytes
+
+
+Piece: TypeAlias = In | Out | Const | IfLocked | Instead | Word | Renamed
 
 
 Stretch: TypeAlias = tuple[int, int, str, str]

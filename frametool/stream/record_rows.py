@@ -158,7 +158,7 @@ class RecordRows:
         tells = template.notes or template.own_notes or any(map(self._carries, template.shapes))
         left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not told[DEGREES])}
         left |= {*run.mended[:1]} if not told[ROUNDED] else set()
-        left |= {*run.reasons}
+        left |= {*run.reasons, *run.rows[run.locked != 0].tolist()}
         stamps = []
         for at, each in enumerate(marked):
             times, late = _stamps(cut, at, each, data)

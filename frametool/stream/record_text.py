@@ -13,7 +13,7 @@ from frametool.documents.source import Source, check_text, decode
 from frametool.errors import FormatError, FrametoolError
 from frametool.stream.answers import answer, number_writer, read_entries, written
 from frametool.stream.faults import ZONES, Fault, RowNote
-from frametool.stream.layout import Const, In, Out, Renamed, Word
+from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word
 from frametool.stream.record import value_at
 from frametool.stream.splice import Splicer, null_edits
 
@@ -90,7 +90,9 @@ class RecordText:
             first += request.result_size(entry.record.shape, entry.target)
         return list(dict.fromkeys(edits))
 
-    def with_numbers(self, edits: Sequence[Edit], texts: Sequence[str], numbers: Sequence[float]) -> str:
+    def with_numbers(
+        self, edits: Sequence[Edit], texts: Sequence[str], numbers: Sequence[float], *, locked: bool = False
+    ) -> str:
         """Return the text with the texts of numbers of results in their places, some of them as words."""
         stretches, pieces = cut(len(self.text), (), edits)
         shown = []
@@ -101,7 +103,7 @@ class RecordText:
                 shown.append(texts[piece.first])
             elif isinstance(piece, Word):
                 shown.append(piece.text(numbers[piece.number]).decode())
-            elif isinstance(piece, (Const, Renamed)):
+            elif isinstance(piece, (Const, Renamed)) or (locked and isinstance(piece, IfLocked)):
                 shown.append(piece.text.decode())
         return "".join(shown)
 
@@ -116,7 +118,8 @@ class RecordText:
         except FrametoolError as error:
             return Fault.of(line + self.line, getattr(error, "column_name", ""), error)
         write = number_writer(self.request.precision, yaml=not self.json)
-        text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers)
+        locked = any(each.entry.target.locked(each.parts) for each in answers)
+        text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers, locked=locked)
         notes = self._notes_at(line, column)
         if (place := answers[0].entry.target.place if answers else None) is not None:
             from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES

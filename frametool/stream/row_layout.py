@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from frametool.errors import ValueInvalid, overheard
-from frametool.geometry import floats, quaternion, rigid
+from frametool.geometry import euler, floats, quaternion, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -291,6 +291,14 @@ class Target(NamedTuple):
             for place, period in found
             if place not in self.absent
         ]
+
+    def locked(self, parts: Components) -> Any:
+        """Return where Euler angles among the notations are not unique; None if there are none."""
+        for notation, _ in self.notations:
+            if notation.euler_axes and len(parts) >= 7:
+                x, y, z, w = parts[3:7]
+                return euler.locked(x, y, z, w, notation.euler_axes)
+        return None
 
 
 def place_of(unit: Unit | None) -> Place | None:

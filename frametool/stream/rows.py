@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.stream.layout import Const, In, Instead, Out, Word
+from frametool.stream.layout import Const, IfLocked, In, Instead, Out, Word
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, shortest_spans
 
@@ -115,13 +115,15 @@ def separators(pieces: Iterable[Piece], count: int) -> bytes:
 
 
 def assemble(
-    pieces: Sequence[Piece], parts: Sequence[Spans], size: int, values: Spans | None = None,
-    results: Floats | None = None,
+    pieces: Sequence[Piece], parts: Sequence[Spans], values: Spans | None, locked: Ints, results: Floats | None = None
 ) -> list[Spans]:
-    """Return the spans, in order, that make up so many rows; values: the texts of the results."""
+    """Return the spans, in order, that make up the rows.
+
+    values: the texts of the results; locked: (n,) 1 where angles are not unique
+    """
     return [
         worded(results[:, piece.number], piece) if isinstance(piece, Word) and results is not None
-        else _spans(piece, parts, values, size)
+        else _spans(piece, parts, values, locked)
         for piece in pieces
     ]  # fmt: skip
 
@@ -148,14 +150,15 @@ def constant(text: bytes, size: int) -> Spans:
     return Spans(framed(text), starts, starts + len(text))
 
 
-def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, size: int) -> Spans:
+def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:
     if isinstance(piece, (In, Instead)):
         return parts[piece.part if isinstance(piece, In) else piece.new]
     if isinstance(piece, Out) and values is not None:
         ends = values.ends[:, piece.first : piece.last].copy()
         ends[:, -1] -= 1
         return Spans(values.data, values.starts[:, piece.first : piece.last], ends)
-    return constant(piece.text if isinstance(piece, Const) else b"", size)
+    text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", len(locked))
+    return text._replace(ends=text.starts + locked * len(piece.text)) if isinstance(piece, IfLocked) else text
 
 
 def chosen(spans: Spans, rows: Ints) -> Spans:

@@ -17,7 +17,7 @@ from frametool.grammar.names import EARTH_FRAMES, PLACE_KEYS
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import Result, Style, with_entries
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
-from frametool.stream.layout import Const, Item, Out, Renamed, Word
+from frametool.stream.layout import Const, IfLocked, Item, Out, Renamed, Word
 from frametool.stream.record import POINT_KEYS, QUATERNION, STALE, XYZ
 from frametool.stream.row_layout import POINT, POSE, SIX, TURNED, VECTOR, count_of
 
@@ -210,16 +210,19 @@ class Splicer:
             self._insert_after(after, member)
 
     def _members(self, first: int) -> list[tuple[Piece, ...]]:
-        """Return one member for each key of a notation."""
+        """Return one member for each key of a notation, and the flag of a lock."""
         notations = self.target.notations
         degrees = any(degrees for form, degrees in notations if form.degrees is None)  # what bare angles are
         style = Style("json", tuple(form for form, _ in notations), degrees=degrees)
         position = SAMPLE[:3] if self.target.whole else None
         members = []
         for key, value in Result(Pose(position, SAMPLE)).mapping(style).items():
-            if key != "xyz":
+            if key not in ("gimbal_lock", "xyz"):
                 members.append(self._member({key: value}, first))
                 first += sum(isinstance(piece, Out) for piece in members[-1])
+        if any(form.euler_axes for form, _ in notations):
+            flag = self._member({"gimbal_lock": True}, 0)
+            members.append(tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const)))
         return members
 
     def _extras(self, first: int) -> list[tuple[Piece, ...]]:
@@ -340,7 +343,7 @@ class Splicer:
         if self.json:
             from frametool.documents.json import dump
 
-            return dump(value, number)
+            return dump(value, number) if value is not True else "true"
         if type(value) is str:
             return quoted(value)
         from frametool.documents.yaml_writer import dump as dump_yaml
@@ -350,7 +353,9 @@ class Splicer:
     def _member(self, entry: dict[str, Any], first: int) -> tuple[Piece, ...]:
         """Write members in the record's style, each number a piece."""
         if self.json:
-            text = ", ".join(f"{self._text(key)}: {self._dumped(value)}" for key, value in entry.items())
+            text = ", ".join(
+                f"{self._text(key)}: {'true' if value is True else self._dumped(value)}" for key, value in entry.items()
+            )
         elif self.node.flow:
             text = ", ".join(f"{self._text(key)}: {_flow(value, self._text)}" for key, value in entry.items())
         else:
@@ -374,14 +379,19 @@ class Splicer:
         self.edits.append(Edit(key.start, key.start, (*pieces, Const(self._between().encode()))))
 
     def _insert_after(self, value: Node, pieces: tuple[Piece, ...]) -> None:
-        self.edits.append(Edit(value.end, value.end, (Const(self._between().encode()), *pieces)))
+        conditional = any(isinstance(piece, IfLocked) for piece in pieces)
+        between: Piece = IfLocked(self._between().encode()) if conditional else Const(self._between().encode())
+        self.edits.append(Edit(value.end, value.end, (between, *pieces)))
 
     def _replace(self, member: tuple[Node, Node], pieces: tuple[Piece, ...]) -> None:
         self.edits.append(Edit(member[0].start, member[1].end, pieces))
 
     def _rewritten(self) -> list[Edit]:
         """Write a bare list, a matrix or a point, as a mapping."""
-        pieces = [piece for member in self._all_members() for piece in (Const(b", "), *member)]
+        pieces: list[Piece] = []
+        for member in self._all_members():
+            conditional = any(isinstance(piece, IfLocked) for piece in member)
+            pieces += [IfLocked(b", ") if conditional else Const(b", "), *member]
         self.edits.append(Edit(self.node.start, self.node.end, (Const(b"{"), *pieces[1:], Const(b"}"))))
         return self.edits
 

@@ -242,7 +242,7 @@ class TextWriter:
     # --- forms whose rows depend on what is written ---
 
     def _free(self, block: RowPoses, *, is_null: bool) -> bytes:
-        """Write a block as the form was seen to write poses; one by one where it was not."""
+        """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
         if is_null:
             return self._one_by_one(block)
         if not self.looked:
@@ -250,7 +250,11 @@ class TextWriter:
             self._learn(block)
             if self.rows is not None and self._filled(self.rows, first_of(block)) != self._one_by_one(first_of(block)):
                 self.rows = None
-        return self._one_by_one(block) if self.rows is None else self._filled(self.rows, block)
+        columns = self._own(tuple(block.numbers.T))
+        locked = self.target.locked(columns[:7])
+        if self.rows is None or (locked is not None and bool(np.any(locked))):
+            return self._one_by_one(block)
+        return self._filled(self.rows, block)
 
     def _own(self, columns: Components) -> Components:
         """Return seven components and what comes beside them; a pose without a position is at 0."""

@@ -178,9 +178,9 @@ def test_the_text_for_a_person_says_which_frame_in_which_and_every_notation(run:
 # --- numbers in and out --------------------------------------------------------------------------------------------
 
 
-def test_gimbal_lock_is_one_note(run: Run) -> None:
+def test_gimbal_lock_is_data_and_one_note(run: Run) -> None:
     outcome = run("convert", "{rpy_deg: [10, 90, 0]}", "--to", "rpy_deg", "--format", "json")
-    assert json.loads(outcome.out) == {"rpy_deg": {"roll": 10.0, "pitch": 90.0, "yaw": 0.0}}
+    assert json.loads(outcome.out) == {"rpy_deg": {"roll": 10.0, "pitch": 90.0, "yaw": 0.0}, "gimbal_lock": True}
     assert outcome.err == "frametool: note: gimbal lock: the angles are not unique; the third was set to 0\n"
 
 

@@ -48,12 +48,12 @@ class Cost(NamedTuple):
 
 
 MOST = {
-    "one CSV point": Cost(functions=579, files=58, lines=3764),  # the aim: 320 functions, 30 files
-    "40 JSON records": Cost(functions=561, files=52, lines=3544),  # 340, 32
+    "one CSV point": Cost(functions=579, files=58, lines=3766),  # the aim: 320 functions, 30 files
+    "40 JSON records": Cost(functions=563, files=52, lines=3548),  # 340, 32
     "40 JSON records to CSV": Cost(functions=545, files=55, lines=3418),  # 340, 32
-    "TUM to KITTI": Cost(functions=484, files=48, lines=2957),  # 320, 30
-    "YAML lookup": Cost(functions=354, files=40, lines=2071),  # 220, 28
-    "convert of numbers": Cost(functions=162, files=24, lines=885),  # 120, 20
+    "TUM to KITTI": Cost(functions=486, files=48, lines=2967),  # 320, 30
+    "YAML lookup": Cost(functions=355, files=40, lines=2076),  # 220, 28
+    "convert of numbers": Cost(functions=162, files=24, lines=888),  # 120, 20
 }
 
 

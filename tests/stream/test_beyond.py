@@ -68,7 +68,7 @@ def run(code: str, folder: Path) -> None:
 
 
 def test_every_engine_has_its_example() -> None:
-    assert set(EXAMPLES) == {*PACKAGES, "A frame that moves"}
+    assert set(EXAMPLES) == {*PACKAGES, "A moving frame"}
 
 
 @pytest.mark.parametrize("engine", PACKAGES)
@@ -84,7 +84,7 @@ def test_an_engine_moves_points_as_transform_apply_does(engine: str, folder: Pat
 
 
 def test_rows_are_moved_each_at_its_own_time(folder: Path) -> None:
-    run(EXAMPLES["A frame that moves"], folder)
+    run(EXAMPLES["A moving frame"], folder)
     given, moved = rows(folder / "points.parquet"), rows(folder / "moved.parquet")
     drive = frametool.load(folder / "drive.yaml")
     wanted = drive.lookup_many("map", "lidar", given["stamp_ns"].to_numpy()).apply(numbers(given))
