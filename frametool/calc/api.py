@@ -237,6 +237,8 @@ def machine_text(term: Term, style: Style) -> str:
         from frametool.stream.writers import write_poses
 
         return write_poses([result], style)
+    if "arrays" in FORMATS[style.form].writes:
+        raise ValueInvalid(f"{style.form} holds columns of numbers: calc writes rows of -i in it, and no single value")
     module = import_module(FORMATS[style.form].writer)
     if isinstance(result, Result):
         return str(module.write_poses([result], style))

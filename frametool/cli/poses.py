@@ -188,8 +188,10 @@ def pose_source(argument: str | Source, request: Request) -> Source:
         argument = Source(INLINE, bare) if is_pasted(bare, request.given) else bare
     source = source_of(argument)
     if request.offset_ns:
+        from frametool.documents.document import parse_documents
         from frametool.stream.stamp_source import at_other_times
 
+        parse_documents(source.text, source.name)  # raises where it is broken
         text, count = at_other_times(source.text, request.offset_ns)
         if not count:
             raise FormatError("--time-offset changes nothing: no stamps in it", source=source.name)

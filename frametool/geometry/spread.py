@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from frametool.geometry.transform import Transform
     from frametool.geometry.types import Numbers
 
+FARTHEST = 1e150  # metres: squares stay finite
 LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
 
 
@@ -36,6 +37,8 @@ def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[T
     metres, radians = mean.distance(poses)
     counts = mass > 0.0
     whole = validation.total(mass.copy())
+    if not metres[counts].max() < FARTHEST:
+        raise ValueInvalid(f"poses lie {metres[counts].max():.3g} m from their mean; at most {FARTHEST:.0e} m")
     return mean, Spread(
         (validation.total(mass * metres * metres) / whole) ** 0.5,
         float(metres[counts].max()),

@@ -220,6 +220,8 @@ class FormatConverter:
         request = self.request
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
+        if request.poses > 1:
+            raise FormatError(f"{self.form} lists one pose after the other; two a row are wanted", source=self.source)
         self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
         plan = _plan(request)
         state = State()

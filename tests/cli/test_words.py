@@ -173,3 +173,17 @@ def test_publisher_arguments_in_quotes_are_read(run: Run) -> None:
     assert done.err == "frametool: warning: argument: taken for arguments of static_transform_publisher: x y z yaw pitch roll PARENT CHILD\n"
     quoted = run("static", "1 2 3 0 0 0 base cam", "-f", "json").out
     assert quoted == run("static", "1", "2", "3", "0", "0", "0", "base", "cam", "-f", "json").out
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("calc", "-e", P, "-f", "ply"), "ply holds columns of numbers"),
+        (("relative", "-i", "images.txt"), "colmap lists one pose after the other; two a row are wanted"),
+        (("invert", "list.txt", "--time-offset", "first"), "list.txt:1:1: a key must be one text"),
+    ],
+)  # fmt: skip
+def test_what_found_no_other_place_is_refused_in_one_sentence(command: tuple[str, ...], said: str, run: Run) -> None:
+    files = {"images.txt": "# Image list with two lines\n1 1 0 0 0 0 0 0 1 a.png\n\n", "list.txt": "[ INFO] [17]: Spinning\n"}
+    done = run(*command, files=files)
+    assert (done.status, said in done.err) == (1, True)
