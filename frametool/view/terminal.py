@@ -94,6 +94,7 @@ AXES = ("red", "green", "blue")
 ARROWS = "→↗↑↖←↙↓↘"
 LEAST_LINES, LEAST_COLUMNS = 4, 20
 SAME = 3.0  # dots within which frames share a name
+MOST_SHARED = 8  # names that stand side by side
 MOST_OUTSIDE = 12  # frames that are pointed to
 
 
@@ -108,8 +109,8 @@ class TerminalPicture:
         self._names: dict[Spot, Run] = {}  # letter by letter
         self._draw()
         outside = self._flat.outside()
-        pointed = sum(map(self._point_to, outside[:MOST_OUTSIDE]))
-        groups = [(place, [name for name in names if name not in outside]) for place, names in self._flat.groups(SAME)]
+        pointed, apart = sum(map(self._point_to, outside[:MOST_OUTSIDE])), {*outside}
+        groups = [(place, [name for name in names if name not in apart]) for place, names in self._flat.groups(SAME)]
         hidden = len(outside) - pointed + sum(bool(names) and not self._place(place, names) for place, names in groups)
         self._scale = self._scale_line(eye, hidden)
 
@@ -158,7 +159,7 @@ class TerminalPicture:
 
     def _place(self, place: Flat, names: list[str]) -> bool:
         """Write a name where it covers no other and, if possible, no axis; return False if there is no room."""
-        for most in range(len(names), 0, -1):
+        for most in range(min(len(names), MOST_SHARED), 0, -1):
             letters = list(_cells(words_of(names, most)))
             around = _around(math.floor(place.y) // 4, math.floor(place.x) // 2, len(letters))
             spots = ([(line, column + offset) for offset in range(-1, len(letters) + 1)] for line, column in around)
