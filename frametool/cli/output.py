@@ -82,7 +82,7 @@ class Output:
             form, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
             full=digits is not None, keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
-        self.style.screen = form == "text" and self.path is None and sys.stdout.isatty()
+        self.style.screen = self.told in (None, "text") and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)
         if table.is_recording(form):
             from frametool.cli.recording import recorded

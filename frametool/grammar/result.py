@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 INFINITE = float("inf")
 ROUNDED_TO_ZERO = 1e-12  # below it, on a screen
+SEEN = ("text", "yaml")  # what a screen shows where no format is asked for
 
 
 class Recorded(NamedTuple):
@@ -46,7 +47,7 @@ class Style:
 
     precision: decimals; None for the shortest text that reads back
     full: that text for people too, who otherwise see a rounded overview, or 9 digits on a screen
-    screen: whether a terminal shows the text
+    screen: whether a terminal shows the result, in no format that was asked for
     axes: of the camera whose poses are written, `optical` or `opengl`; "" if unknown
     in_camera: whether the reference frame is the same camera at another time
     place: how positions on the Earth are written, None for x, y, z
@@ -106,7 +107,7 @@ class Style:
         """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        bits = value + 0.0 if self.full or not self.screen or self.form != "text" else _nine_digits(value)
+        bits = _nine_digits(value) if self.screen and self.form in SEEN and not self.full else value + 0.0
         return repr(bits) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
