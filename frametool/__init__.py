@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from frametool.earth import lla_from_utm as lla_from_utm
     from frametool.earth import utm_from_lla as utm_from_lla
     from frametool.errors import FrametoolError as FrametoolError
-    from frametool.fit.api import align as align
-    from frametool.fit.api import compare as compare
-    from frametool.fit.api import resample as resample
-    from frametool.fit.api import solve as solve
-    from frametool.fit.api import solve_hand_eye as solve_hand_eye
-    from frametool.fit.api import solve_mean as solve_mean
-    from frametool.fit.api import solve_points as solve_points
+    from frametool.fit.python_api import align as align
+    from frametool.fit.python_api import compare as compare
+    from frametool.fit.python_api import resample as resample
+    from frametool.fit.python_api import solve as solve
+    from frametool.fit.python_api import solve_hand_eye as solve_hand_eye
+    from frametool.fit.python_api import solve_mean as solve_mean
+    from frametool.fit.python_api import solve_points as solve_points
     from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
@@ -71,9 +71,9 @@ _HOMES = {
     "TransformBuffer": "frametool.frames.buffer",
     "Turtle": "frametool.sim.turtle",
     "Twist": "frametool.sim.turtle",
-    "align": "frametool.fit.api",
+    "align": "frametool.fit.python_api",
     "apply_arrow": "frametool.stream.engines",
-    "compare": "frametool.fit.api",
+    "compare": "frametool.fit.python_api",
     "covariance": "frametool.covariance",
     "diff": "frametool.lint.tree_diff",
     "earth_pose": "frametool.earth",
@@ -86,14 +86,14 @@ _HOMES = {
     "load_camera": "frametool.formats.cameras",
     "load_robot": "frametool.formats.robots.urdf",
     "load_trajectory": "frametool.stream.trajectories",
-    "resample": "frametool.fit.api",
+    "resample": "frametool.fit.python_api",
     "run": "frametool.cli.embedded",
     "simulate": "frametool.sim.simulate",
     "simulate_many": "frametool.sim.sweep",
-    "solve": "frametool.fit.api",
-    "solve_hand_eye": "frametool.fit.api",
-    "solve_mean": "frametool.fit.api",
-    "solve_points": "frametool.fit.api",
+    "solve": "frametool.fit.python_api",
+    "solve_hand_eye": "frametool.fit.python_api",
+    "solve_mean": "frametool.fit.python_api",
+    "solve_points": "frametool.fit.python_api",
     "tutorial": "frametool.sim.scene",
     "utm_from_lla": "frametool.earth",
 }

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Sample = tuple[int, str, Rigid]
     Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
 
-class Block(NamedTuple):
+class SheetNames(NamedTuple):
     """The names of a representation's numbers in its two sheets."""
 
     written: str
@@ -41,18 +41,18 @@ class Block(NamedTuple):
 
 ANGLES, ROLL_PITCH_YAW, ROTATION = "a1 a2 a3", "roll pitch yaw", " ".join(ENTRIES)
 BLOCKS = {
-    "quaternion": Block("x y z w", "x y z w"),
-    "xyzw": Block("x y z w", "x y z w"),
-    "wxyz": Block("w x y z", "w x y z"),
-    "rpy": Block(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
-    "euler": Block(ANGLES, ANGLES),
-    "axis_angle": Block("ax ay az angle", "vx vy vz angle"),
-    "rotvec": Block("rx ry rz", "rx ry rz"),
-    "matrix": Block(ROTATION, ROTATION),
-    "mrp": Block("px py pz", "px py pz"),
-    "six_d": Block("ax ay az bx by bz", "r11 r21 r31 r12 r22 r32"),
-    "rpy_unreal": Block(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
-    "euler_unity": Block("a2 a3 a1", "a2 a3 a1"),
+    "quaternion": SheetNames("x y z w", "x y z w"),
+    "xyzw": SheetNames("x y z w", "x y z w"),
+    "wxyz": SheetNames("w x y z", "w x y z"),
+    "rpy": SheetNames(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler": SheetNames(ANGLES, ANGLES),
+    "axis_angle": SheetNames("ax ay az angle", "vx vy vz angle"),
+    "rotvec": SheetNames("rx ry rz", "rx ry rz"),
+    "matrix": SheetNames(ROTATION, ROTATION),
+    "mrp": SheetNames("px py pz", "px py pz"),
+    "six_d": SheetNames("ax ay az bx by bz", "r11 r21 r31 r12 r22 r32"),
+    "rpy_unreal": SheetNames(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler_unity": SheetNames("a2 a3 a1", "a2 a3 a1"),
 }
 AXES_OF = {"rpy": "sxyz", "rpy_unreal": "sxyz", "euler_unity": "szxy"}  # Euler angles under another name
 ORDERS = {"wxyz": "w, x, y, z: the scalar w stands first.", "": "x, y, z, w: the scalar w stands last."}
@@ -62,7 +62,7 @@ MOVERS = {"point": "p", "vector": "v", "twist": "vw", "wrench": "fm"}  # letters
 PARTS = {0: "position", 3: "rotation"}
 
 
-def block_of(notation: Notation) -> Block:
+def block_of(notation: Notation) -> SheetNames:
     """Return the names of a notation's numbers; raises ValueInvalid for a representation without sheets."""
     name = notation.representation.name
     if name not in BLOCKS:

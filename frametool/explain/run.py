@@ -40,22 +40,22 @@ MOST_STEPS = 60
 STEP = re.compile(r"(\S+) = (.*?)(?:  \[(.*)\])?")
 
 
-class Line(NamedTuple):
+class SheetLine(NamedTuple):
     """A line of a sheet, and the indented lines below it."""
 
     text: str
-    body: Sequence[Line]
+    body: Sequence[SheetLine]
 
 
 @cache
-def sheets() -> dict[str, Sequence[Line]]:
+def sheets() -> dict[str, Sequence[SheetLine]]:
     """Return the sheets by name."""
     _, *found = Path(__file__).with_name("sheets.txt").read_text(encoding="utf-8").split("\n== ")
     named = (each.rstrip("\n").split("\n") for each in found)
     return {name: nested(lines) for name, *lines in named}
 
 
-def nested(lines: Sequence[str]) -> list[Line]:
+def nested(lines: Sequence[str]) -> list[SheetLine]:
     """Attach indented lines to the line before them."""
     found: list[tuple[str, list[str]]] = []
     for line in lines:
@@ -63,7 +63,7 @@ def nested(lines: Sequence[str]) -> list[Line]:
             found[-1][1].append(line[2:])
         else:
             found.append((line, []))
-    return [Line(text, nested(body)) for text, body in found]
+    return [SheetLine(text, nested(body)) for text, body in found]
 
 
 class Words(NamedTuple):
@@ -202,7 +202,7 @@ class Sheet:
         self._play(sheets()[name], values, words)
         return values
 
-    def _play(self, lines: Sequence[Line], values: Values, words: dict[str, Any]) -> None:
+    def _play(self, lines: Sequence[SheetLine], values: Values, words: dict[str, Any]) -> None:
         """Add lines; those below a condition only if it holds."""
         is_taken = False
         for text, body in lines:

@@ -32,7 +32,7 @@ class Varies(Exception):
     """Raised for a part of a message that has no fixed position."""
 
 
-class MessageLayout(NamedTuple):
+class BinaryLayout(NamedTuple):
     """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between."""
 
     numbers: np.dtype[Any]
@@ -107,7 +107,7 @@ class _Reader:
         return dumps(self.data[begin + 4 : self.at].rstrip(b"\0").decode(), ensure_ascii=False)
 
 
-def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> MessageLayout | None:
+def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> BinaryLayout | None:
     """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
     reader = _Reader(types, data)
     if reader.aligned and data[:2] != CDR_LE:
@@ -121,5 +121,5 @@ def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> Messa
     places, codes = zip(*reader.places, strict=True)
     names = [f"f{at}" for at in range(len(codes))]
     numbers: Any = {"names": names, "formats": codes, "offsets": places, "itemsize": len(data)}
-    made = MessageLayout(np.dtype(numbers), [(part, data[part]) for part in reader.shared], texts)
+    made = BinaryLayout(np.dtype(numbers), [(part, data[part]) for part in reader.shared], texts)
     return made if made.lines([data]) == line else None

@@ -19,7 +19,7 @@ from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Names, Tally, Topics
 from frametool.recordings.made import KINDS, serialised, typestore
 from frametool.recordings.messages import POSE_ARRAY, posed_messages
-from frametool.recordings.read import ITSELF, SERIALIZED, Message, broken, read_metadata
+from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
 from frametool.recordings.write import RecordingFile, new_channel
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
 from frametool.ros.plain_messages import unit_components
@@ -338,7 +338,7 @@ class RecordCopy:
                 self.outside += not self._is_inside(log_ns)
             see(channel, data)
 
-    def _messages(self, advance: Advance) -> Iterator[Message]:
+    def _messages(self, advance: Advance) -> Iterator[Recorded]:
         """Yield all messages."""
         size = 0
         with broken(self.reader.path):
@@ -352,7 +352,7 @@ class RecordCopy:
     def _is_inside(self, log_ns: int) -> bool:
         return self.window is None or self.window[0] <= log_ns <= self.window[1]
 
-    def _keeps(self, message: Message) -> bool:
+    def _keeps(self, message: Recorded) -> bool:
         return self._is_inside(message.log_ns) or message.channel.is_static
 
     def pieces(
@@ -372,7 +372,7 @@ class RecordCopy:
             file.begin([channel])
             frames = [(edge.parent, edge.child) for edge in edges]
             data = serialised(TF_STATIC, form, frames, [stamp_ns] * len(edges), [edge.numbers for edge in edges])
-            file.add(Message(channel, self.first_ns or 0, data, self.first_ns or 0))
+            file.add(Recorded(channel, self.first_ns or 0, data, self.first_ns or 0))
         file.begin(self.reader.all)
         for message in self._messages(advance):
             if not self._keeps(message):

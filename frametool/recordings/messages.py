@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Options, Tally
-    from frametool.recordings.alike import MessageLayout
+    from frametool.recordings.alike import BinaryLayout
     from frametool.recordings.made import MessageTypes
-    from frametool.recordings.read import Channel, Message, RecordingReader
+    from frametool.recordings.read import Channel, Recorded, RecordingReader
 
 
 CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -253,7 +253,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     """Yield the messages, or the poses of lists, as lines, many together; an error follows the lines before it."""
     held: list[bytes] = []
     number = 1
-    layouts: dict[Any, MessageLayout | None] = {}
+    layouts: dict[Any, BinaryLayout | None] = {}
     try:
         for stretch in _stretches(reader.blocks(channels)):
             for (channel, _), run in groupby(stretch, lambda each: (each.channel, len(each.data))):
@@ -271,9 +271,9 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
     yield b"".join(held)
 
 
-def _stretches(blocks: Iterator[Iterable[Message]]) -> Iterator[list[Message]]:
+def _stretches(blocks: Iterator[Iterable[Recorded]]) -> Iterator[list[Recorded]]:
     """Yield messages in groups; those before an error too."""
-    held: list[Message] = []
+    held: list[Recorded] = []
     try:
         for block in blocks:
             held += block
@@ -287,7 +287,7 @@ def _stretches(blocks: Iterator[Iterable[Message]]) -> Iterator[list[Message]]:
 
 
 def _lines(
-    types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, MessageLayout | None]
+    types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, BinaryLayout | None]
 ) -> Iterator[tuple[bytes, int]]:
     """Yield the lines of messages of equal length, and their number: all at once if their layout is equal.
 

@@ -72,7 +72,7 @@ class Channel:
         return self.topic.rpartition("/")[2] == "tf_static"
 
 
-class Message(NamedTuple):
+class Recorded(NamedTuple):
     """A message as recorded; times are nanoseconds."""
 
     channel: Channel
@@ -126,7 +126,7 @@ class McapFile:
         counts = self.said.channel_message_counts
         return sum(counts.get(number, 0) for number, each in self.channels.items() if each in wanted)
 
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages on some channels, or on all."""
         return _in_order(self._found(wanted))
 
@@ -157,18 +157,18 @@ class McapFile:
                 self.stream.seek(each.chunk_start_offset + RECORD_HEAD)
                 yield Chunk.read(ReadDataStream(self.stream))
 
-    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages of each chunk, and those outside of chunks, many together; register what else is there."""
         from mcap import records
 
-        found: list[Message] = []
+        found: list[Recorded] = []
         for each in self._records(wanted):
             if isinstance(each, records.Chunk):
                 self._take(_unpacked_chunk(each), wanted, found)
             elif isinstance(each, records.Message):
                 channel = self.channels[each.channel_id]
                 if wanted is None or channel in wanted:
-                    found.append(Message(channel, each.log_time, each.data, each.publish_time, each.sequence))
+                    found.append(Recorded(channel, each.log_time, each.data, each.publish_time, each.sequence))
             elif isinstance(each, records.Schema | records.Channel):
                 self._register(each)
             if found and (isinstance(each, records.Chunk) or len(found) > BLOCK):
@@ -177,7 +177,7 @@ class McapFile:
         if found:
             yield found
 
-    def _take(self, data: bytes, wanted: Collection[Channel] | None, found: list[Message]) -> None:
+    def _take(self, data: bytes, wanted: Collection[Channel] | None, found: list[Recorded]) -> None:
         """Add the messages on some channels that are in a chunk; register what else is there."""
         from mcap import records
         from mcap.data_stream import ReadDataStream
@@ -193,7 +193,7 @@ class McapFile:
                 number, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, begin)
                 channel = self.channels[number]
                 if wanted is None or channel in wanted:
-                    found.append(Message(channel, log_ns, data[begin + MESSAGE.size : end], publish_ns, sequence))
+                    found.append(Recorded(channel, log_ns, data[begin + MESSAGE.size : end], publish_ns, sequence))
             elif code in (Opcode.SCHEMA, Opcode.CHANNEL):
                 kind = records.Schema if code == Opcode.SCHEMA else records.Channel
                 self._register(kind.read(ReadDataStream(BytesIO(data[begin:end]))))
@@ -227,9 +227,9 @@ def _unpacked_chunk(chunk: Any) -> bytes:
     return bytes(stream.read(length))
 
 
-def _in_order(chunks: Iterable[list[Message]]) -> Iterator[list[Message]]:
+def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
     """Yield the messages of chunks in the order of their times: chunks that overlap are merged; none is empty."""
-    time, held = itemgetter(1), list[Message]()
+    time, held = itemgetter(1), list[Recorded]()
     try:
         for found in chunks:
             found.sort(key=time)
@@ -276,13 +276,13 @@ class DatabaseFile:
     def expected(self, _wanted: Collection[Channel] | None) -> None:
         """Return None: only the metadata of the folder state the number of messages."""
 
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages on some channels, or on all."""
         numbers = ",".join(str(number) for number, each in self.channels.items() if wanted is None or each in wanted)
         some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY timestamp, id"  # noqa: S608 - numbers
         rows = self.database.execute(some)
         while block := rows.fetchmany(BLOCK):
-            yield [Message(self.channels[number], log_ns, data, log_ns) for number, log_ns, data in block]
+            yield [Recorded(self.channels[number], log_ns, data, log_ns) for number, log_ns, data in block]
 
 
 class Bag1File:
@@ -318,24 +318,24 @@ class Bag1File:
         counts = (chunk.connection_counts for chunk in self.reader.chunk_infos)
         return sum(count for each in counts for number, count in each.items() if number not in others)
 
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages on some channels, or on all."""
         return _in_order(filter(None, self._found(wanted)))
 
-    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Message]]:
+    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages of each chunk."""
         numbers = {number for number, each in self.channels.items() if wanted is None or each in wanted}
         for each in sorted(self.reader.chunk_infos, key=attrgetter("start_time")):
             if not numbers.isdisjoint(each.connection_counts):
                 about = self.reader.chunks[each.pos]
                 self.reader.bio.seek(about.datapos)
-                found: list[Message] = []
+                found: list[Recorded] = []
                 try:
                     self._take(about.decompressor(self.reader.bio.read(about.datasize)), numbers, found)
                 finally:
                     yield found
 
-    def _take(self, chunk: bytes, numbers: set[int], found: list[Message]) -> None:
+    def _take(self, chunk: bytes, numbers: set[int], found: list[Recorded]) -> None:
         """Add the messages of some connections in a chunk: the library makes an object of each header."""
         end, size = 0, LENGTH.size
         while end < len(chunk):
@@ -349,7 +349,7 @@ class Bag1File:
                 if number in numbers:
                     second, part = TIME.unpack_from(header, header.index(OF_TIME) + len(OF_TIME))
                     log_ns = second * BILLION + part
-                    found.append(Message(self.channels[number], log_ns, chunk[begin:end], log_ns))
+                    found.append(Recorded(self.channels[number], log_ns, chunk[begin:end], log_ns))
             elif OF_CONNECTION not in header:
                 raise ValueError("neither a message nor a connection")
 
@@ -393,11 +393,11 @@ class RecordingReader:
         for each in self.metadata.get("topics_with_message_count") or ():
             yield {**each["topic_metadata"], "count": each["message_count"]}
 
-    def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Message]:
+    def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Recorded]:
         """Yield the messages on some channels, or on all; raises FormatError if any are missing."""
         return chain.from_iterable(self.blocks(wanted))
 
-    def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Iterable[Message]]:
+    def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Iterable[Recorded]]:
         """Yield them in lists of any length."""
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
@@ -433,7 +433,7 @@ class RecordingReader:
                 raise FormatError(what, source=self.path)
 
 
-def _unpacked(message: Message) -> Message:
+def _unpacked(message: Recorded) -> Recorded:
     """Unpack a message that is packed by itself."""
     import zstandard
 

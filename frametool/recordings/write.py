@@ -22,7 +22,7 @@ from frametool.documents.yaml_writer import dump
 from frametool.errors import FileProblem, FrametoolError, ValueInvalid, printable
 from frametool.geometry import floats, quaternion
 from frametool.recordings.made import KINDS, check_stamps, serialised, typestore
-from frametool.recordings.read import BAG1, BAG2, CDR, INFORMATION, ITSELF, METADATA, QOS, SERIALIZED, Channel, Message
+from frametool.recordings.read import BAG1, BAG2, CDR, INFORMATION, ITSELF, METADATA, QOS, SERIALIZED, Channel, Recorded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -124,9 +124,9 @@ class RecordingFile:
     def write(self, channel: Channel, stamp_ns: int, data: bytes | memoryview) -> None:
         """Write one message; a late one is logged with the previous one."""
         self.log_ns = max(self.log_ns, stamp_ns)
-        self.add(Message(channel, self.log_ns, bytes(data), self.log_ns))
+        self.add(Recorded(channel, self.log_ns, bytes(data), self.log_ns))
 
-    def add(self, message: Message) -> None:
+    def add(self, message: Recorded) -> None:
         """Write one message as it was recorded."""
         channel, log_ns, data, publish_ns, sequence = message
         number = self._numbers[channel]

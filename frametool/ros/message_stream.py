@@ -123,7 +123,7 @@ _SEPARATOR = re.compile(r"^.*---[ \t]*$\n?", re.MULTILINE)
 _ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^\ufeff])", re.MULTILINE)  # no key that ROS prints begins like this
 
 
-class Message(NamedTuple):
+class TextMessage(NamedTuple):
     """The plain values of one message, with its text and the number of its first line."""
 
     value: Any
@@ -143,7 +143,7 @@ class Message(NamedTuple):
         return error
 
 
-def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
+def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of a recording; an unreadable one is replaced by its error."""
     if form in {"echo", "jsonl"}:
         for piece in (documents if form == "echo" else lines)(stream, name):
@@ -152,7 +152,7 @@ def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Itera
         yield from _csv(stream, name, form, tally)
 
 
-def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
+def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of documents that end in `---`, or of lines."""
     if form == "jsonl":
         for number, text in enumerate(piece.text.split("\n"), piece.line):
@@ -180,7 +180,7 @@ def without_noise(text: str, line: int, tally: Tally) -> str:
     return "\n".join(kept)
 
 
-def _parsed(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
+def _parsed(text: str, line: int, name: str) -> Iterator[TextMessage | FormatError]:
     """Read the documents of a text whose first line has this number."""
     try:
         with counted_from(line):
@@ -189,10 +189,10 @@ def _parsed(text: str, line: int, name: str) -> Iterator[Message | FormatError]:
         yield error
         return
     for document in found:
-        yield Message(document.value, Source(name, text), line, document.index)
+        yield TextMessage(document.value, Source(name, text), line, document.index)
 
 
-def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[Message | FormatError]:
+def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Yield the messages on a line that must be JSON, unless it is blank or noise."""
     if not _is_data(text, line, tally):
         return
@@ -205,7 +205,7 @@ def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[Mes
         yield error
         return
     for index, value in enumerate(values):
-        yield Message(value, source, line, index)
+        yield TextMessage(value, source, line, index)
 
 
 def line_texts(stream: BinaryIO, name: str, tally: Tally) -> Iterator[tuple[int, str]]:
@@ -224,7 +224,7 @@ def _is_data(line: str, number: int, tally: Tally) -> bool:
     return bool(line.strip())
 
 
-def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Message | FormatError]:
+def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Read rows; a line that begins with `%time` is the header of those below it."""
     header: list[str] = []
     for number, line in line_texts(stream, name, tally):
@@ -238,7 +238,7 @@ def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[Messa
             yield FormatError(str(misfit), source=name, line=number)
             continue
         received = int(cells[0]) if form == "csv1" and cells[0].isdecimal() else None
-        yield Message(value, Source(name, line), number, cells=True, received_ns=received)
+        yield TextMessage(value, Source(name, line), number, cells=True, received_ns=received)
 
 
 _HEADER = re.compile(r"\bheader\b")
@@ -287,7 +287,7 @@ def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterato
             yield from _message_edges(message, options)
 
 
-def _message_edges(message: Message | FormatError, options: Options) -> Iterator[Edge]:
+def _message_edges(message: TextMessage | FormatError, options: Options) -> Iterator[Edge]:
     """Yield the edges of one message; an error in one of them does not affect the others."""
     if isinstance(message, FormatError):
         options.report(message)
@@ -359,7 +359,7 @@ def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict
         raise Misfit(f"expected a message with transforms, found the keys {keys}", path)
 
 
-def _header_lines(message: Message, count: int) -> list[int]:
+def _header_lines(message: TextMessage, count: int) -> list[int]:
     """Return the lines on which the transforms of a message begin."""
     if message.source.text.count("\n") > 1:
         text = message.source.text

@@ -30,7 +30,7 @@ from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
 from frametool.ros import messages
-from frametool.ros.message_stream import Message, line_texts, read_messages
+from frametool.ros.message_stream import TextMessage, line_texts, read_messages
 from frametool.stream.faults import Fault
 from frametool.stream.record_text import without_noise
 from frametool.stream.row_layout import POSE
@@ -233,10 +233,10 @@ def joint_poses(stream: BinaryIO, rows: JointRows, bad: BadRows, *, numbered: bo
     bad.finish(count)
 
 
-def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[Message | FormatError]:
+def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[TextMessage | FormatError]:
     if numbered:
         return read_messages(stream, name, "csv1", Tally())
-    return (Message(text, Source(name, text), line, cells=True) for line, text in line_texts(stream, name, Tally()))
+    return (TextMessage(text, Source(name, text), line, cells=True) for line, text in line_texts(stream, name, Tally()))
 
 
 def _pose(state: dict[str, Any], rows: JointRows) -> Any:

@@ -18,7 +18,7 @@ from frametool.explain.run import sheets
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from frametool.explain.run import Line
+    from frametool.explain.run import SheetLine
 
 AXIS_ANGLE = """\
 1. Axis and angle to quaternion
@@ -230,7 +230,7 @@ def test_a_step_that_is_not_there_is_an_error(scene: dict[str, Any], number: int
         frametool.follow_steps(frametool.tutorial(**scene), number)
 
 
-def lines_of(body: Sequence[Line]) -> Iterator[str]:
+def lines_of(body: Sequence[SheetLine]) -> Iterator[str]:
     """List the lines of a sheet, the indented ones too."""
     for line in body:
         yield line.text

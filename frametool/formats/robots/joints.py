@@ -40,7 +40,7 @@ from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Edge, Options, Tally
 from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import messages
-from frametool.ros.message_stream import Message, line_texts, read_messages
+from frametool.ros.message_stream import TextMessage, line_texts, read_messages
 from frametool.text.csv_line import split_line
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
 
@@ -403,7 +403,7 @@ class JointFile:
             yield from self._messages(read_messages(self.file.stream, name, "echo", self.tally))
 
     def _messages(
-        self, messages: Iterable[Message | FormatError], state_of: Callable[[Any], Any] | None = None
+        self, messages: Iterable[TextMessage | FormatError], state_of: Callable[[Any], Any] | None = None
     ) -> Iterator[JointSample]:
         """Yield the values in documents or rows; `state_of` makes a JointState of a row."""
         for message in messages:
@@ -414,7 +414,7 @@ class JointFile:
             except Misfit as misfit:
                 raise message.error(misfit) from None
 
-    def _values(self, value: Any, path: Path, message: Message) -> Iterator[JointSample]:
+    def _values(self, value: Any, path: Path, message: TextMessage) -> Iterator[JointSample]:
         """Yield the values in a plain value: a JointState, a map, or a list of either."""
         if type(value) is list:
             for index, each in enumerate(value):
@@ -434,7 +434,7 @@ class JointFile:
             except Misfit as misfit:
                 raise misfit.below(*path) from None
 
-    def _map(self, mapping: dict[str, Any], path: Path, message: Message) -> Iterator[JointSample]:
+    def _map(self, mapping: dict[str, Any], path: Path, message: TextMessage) -> Iterator[JointSample]:
         """Yield the values of a map, or of the only map in it, as under `joints:`."""
         from frametool.grammar.names import STAMP_KEYS
 
@@ -456,7 +456,7 @@ class JointFile:
             yield from self._messages(rows, messages.of_numbered)
         elif messages.looks_like_row(first):
             texts = line_texts(self.file.stream, name, self.tally)
-            rows = (Message(text, Source(name, text), line, cells=True) for line, text in texts)
+            rows = (TextMessage(text, Source(name, text), line, cells=True) for line, text in texts)
             yield from self._messages(rows, lambda row: messages.of_row(messages.unquoted(row)))
         else:
             yield from self._columns(form)
@@ -518,7 +518,7 @@ def _finite(value: Any, path: Path) -> JointValue:
         raise Misfit(str(error), path, rule=error.rule) from None
 
 
-def _refused(message: Message, path: Path, problem: str, below: Path) -> FormatError:
+def _refused(message: TextMessage, path: Path, problem: str, below: Path) -> FormatError:
     return message.error(Misfit(problem, (*path, *below)))
 
 
