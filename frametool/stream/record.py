@@ -460,7 +460,7 @@ def _bare_list(value: list[Any], path: Path, reading: Reading, request: Request)
     if len(value) != 3 or not request.operation.moves:
         raise _bare_numbers(value)
     numbers = tuple((*path, *each) for each in INDICES[:3])
-    return Record(path, Shape(request.kind or POINT), numbers, read_position(value, 1.0))
+    return Record(path, Shape(_kind("", (), request)), numbers, read_position(value, 1.0))
 
 
 def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Request) -> Record:

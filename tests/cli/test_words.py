@@ -180,6 +180,7 @@ def test_publisher_arguments_in_quotes_are_read(run: Run) -> None:
     [
         (("calc", "-e", P, "-f", "ply"), "ply holds columns of numbers"),
         (("relative", "-i", "images.txt"), "colmap lists one pose after the other; two a row are wanted"),
+        (("apply", "--transform", "{rpy: [0, 0, 1]}", "[1, 2, 3]", "--as", "twist"), "a twist has linear and angular, two vectors"),
         (("invert", "list.txt", "--time-offset", "first"), "list.txt:1:1: a key must be one text"),
     ],
 )  # fmt: skip
