@@ -18,7 +18,7 @@ from frametool.documents.document import format_error, locate_many, parse_docume
 from frametool.documents.xml import XmlFile
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
+from frametool.formats.trees.launch_python import COMPOSABLE, COMPOSED, PACKAGES, Action, actions, runs_publisher
 from frametool.grammar.readers import Misfit, kind
 from frametool.ros import publisher
 
@@ -72,9 +72,7 @@ def _actions(file: InputFile) -> Iterator[Action]:
     if begin.xml:
         return _of_xml(file)
     if file.path.endswith(".py") or _PYTHON.search(begin.text):
-        from frametool.formats.trees import launch_python
-
-        return launch_python.actions(file.source)
+        return actions(file.source)
     return _of_yaml(file.source)
 
 
