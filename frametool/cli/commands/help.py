@@ -28,6 +28,7 @@ MADE = {  # topics that are no file of their own
     "common": "The options that many commands share, each with its meaning",
     "cookbook": "Questions with commands and what they print: help cookbook [WORD..]",
     "skill": "The whole tool in brief, for an assistant or a program",
+    "schema": "The JSON Schema of trees in YAML and JSON, for editors",
 }
 
 
@@ -222,6 +223,11 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
         text += _wrapped(f"Commands: {', '.join(COMMANDS)}")
     elif words[0] == "cookbook":
         text = cookbook(words[1:])
+    elif name == "schema":
+        from frametool.documents.json import dump
+        from frametool.formats.trees.schema import schema
+
+        text = f"{dump(schema())}\n"
     elif name in MADE:
         text = common(ctx) if name == "common" else example("SKILL.md").decode()
     else:
