@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import make_calculator
 from console import ROOT
+from make_picture import PICTURE
 from site_pages import commands, example_files, forms, python_names, questions, texts, topics
 from site_pages.markup import Page, Section, bullets, inline, slug
 
@@ -117,6 +118,7 @@ def write(folder: Path, address: str = "", *, calculator: bool = False) -> None:
         path.write_text(f"{text.rstrip()}\n", "utf-8")
     for picture in (ROOT / "examples").glob("*.[sp][vn]g"):
         shutil.copy(picture, folder / "examples")
+    shutil.copy(PICTURE, folder / "static")
     if calculator:
         make_calculator.write(folder / "extra" / "calculator")
 

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 import console
+import make_picture
 import pytest
 from in_process import printed, run_line, understands
 
@@ -82,6 +83,12 @@ def test_the_readme_is_short_and_the_cookbook_is_not() -> None:
     assert README.count("\n") <= 140
     assert SKILL.count("\n") <= 80
     assert COOKBOOK.count("\n### ") >= 90
+
+
+def test_the_picture_shows_what_the_commands_print() -> None:
+    words, numbers = console.split(make_picture.picture())
+    assert words == console.split(make_picture.PICTURE.read_text())[0]
+    assert numbers == pytest.approx(console.split(make_picture.PICTURE.read_text())[1], abs=0.11)  # the drawing, to a tenth
 
 
 def test_links_lead_to_files() -> None:

@@ -52,6 +52,8 @@ def page_of(file: str, link: str) -> str:
     target = posixpath.normpath(posixpath.join(posixpath.dirname(file), link))
     folder, _, name = target.rpartition("/")
     pages = {name: row[0] for name, row in TEXTS.items()} | {"README.md": "index.md", "examples/COOKBOOK.md": "cookbook/index.md"}
+    if link.endswith(".svg") and folder == ".github":
+        return f"/static/{name}"
     if target in pages:
         return f"/{pages[target]}"
     if folder == "examples" and (ROOT / target).is_file():
