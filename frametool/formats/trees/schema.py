@@ -30,7 +30,7 @@ NUMBER: Schema = {"type": ["number", "string"]}
 NAME: Schema = {"type": ["string", "number", "boolean"], "description": "the name of a frame"}
 UNIT = {True: ", degrees", False: ", radians", None: ", radians unless angles: deg"}
 KEYS = WORDS | EARTH_KEYS | STAMP_KEYS | {"samples", "camera"}
-MEANINGS = {
+MEANINGS: dict[str, Schema] = {
     "inverse": {"enum": [True, False], "description": "true: the numbers are those of the parent in the frame"},
     "angles": {"enum": ["deg", "rad"], "description": "the unit of bare angles"},
     AXES_KEY: {"type": "string", "description": "a constant rotation by name: optical, ned_from_enu (help axes)"},
