@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, NamedTuple
 
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import Finding, FrametoolError, ValueInvalid
 from frametool.geometry import floats
 from frametool.grammar.names import STAMP_KEYS, in_nanoseconds
 from frametool.grammar.readers import Misfit, Reading, within
@@ -23,12 +23,13 @@ if TYPE_CHECKING:
 
     from frametool.documents.document import Document
     from frametool.documents.source import Source
-    from frametool.errors import Finding
     from frametool.geometry.types import Components, Rigid
     from frametool.grammar.readers import Path
     from frametool.stream.record import Record
-    from frametool.stream.request import Memory, Request
+    from frametool.stream.request import Memory, Operation, Request
     from frametool.stream.row_layout import Target
+
+SIX_BY_SIX = 36  # entries of the covariance of a pose
 
 
 class Outside(FrametoolError):
@@ -169,6 +170,17 @@ def answer(
     )  # fmt: skip
     has_gaps = operation.shown is not None
     return None if operation.velocity and seconds is None else Answer(entry, parts, bool(warned), has_gaps)
+
+
+def wide_turn(made: Answer, operation: Operation) -> Finding | None:
+    """Return a warning of a turn that is too uncertain for the first order; of what moves others it comes elsewhere."""
+    record = made.entry.record
+    if operation.uncertain or len(operation.carried(record.shape)) < SIX_BY_SIX:
+        return None
+    from frametool.geometry.uncertainty import WIDE_RULE, doubt
+
+    told = doubt(made.parts[-SIX_BY_SIX:])
+    return Finding(WIDE_RULE, told, path=record.path) if told else None
 
 
 def _stamp_ns(entry: Entry, texts: Sequence[str]) -> int:

@@ -25,8 +25,8 @@ from frametool.stream.evaluate import Plan, Run, State
 from frametool.stream.faults import NULL, STOP, Fault, Outcome, RowNote, notes_of
 from frametool.stream.header import listed
 from frametool.stream.row_layout import POINT, POSE, Shape, Target
-from frametool.stream.row_poses import RowPoses, kept, spans_of
-from frametool.stream.rows import Block
+from frametool.stream.row_poses import RowPoses, kept
+from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
 from frametool.stream.table_stream import TablePoses, begin_table
 from frametool.stream.writers import LEARNED
@@ -145,7 +145,8 @@ class FormatConverter:
         rows = TablePoses(begun.table, request, self.source)
         self._settle(rows.shape, rows.plan, rows.columns, line=1)
         count = 0
-        yield Step(_none(), Outcome(b"", lines=begun.lines, size=begun.taken))
+        none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
+        yield Step(none, Outcome(b"", lines=begun.lines, size=begun.taken))
         for block, _, outcome in rows.blocks(begun):
             poses = self._with_place(block, lambda size: [*rows.given[:size]])
             if self.looks_up_places:
@@ -248,10 +249,6 @@ class FormatConverter:
 def _numbers_of(batch: Batch, places: Sequence[int], rows: Ints, count: int) -> list[Floats]:
     """Return the first columns of some in some rows of a batch."""
     return [batch.numbers(place).values[rows] for place in places[:count]]
-
-
-def _none() -> RowPoses:
-    return RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
 
 
 def _plan(request: Request) -> Plan:

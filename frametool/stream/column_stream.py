@@ -28,8 +28,8 @@ from frametool.stream.array_writer import ColumnsWriter
 from frametool.stream.faults import NULL, SKIP, STOP, Outcome
 from frametool.stream.layout import NAME, PARENT, Fixed, Kept, Named, New, Worded, quoted
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_poses import RowPoses, objects, spans_of, texts_of
-from frametool.stream.rows import Block
+from frametool.stream.row_poses import RowPoses, objects, texts_of
+from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import Table, unnamed
 from frametool.stream.table_plan import own_count, with_vectors
 from frametool.stream.table_stream import PlannedRows

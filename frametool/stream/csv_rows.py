@@ -8,8 +8,7 @@ import numpy as np
 
 from frametool.formats.rows.csv import cell
 from frametool.stream.record_rows import LEAF, NAME, PARENT, STAMP_NS, Filling, plain_texts
-from frametool.stream.row_poses import spans_of
-from frametool.stream.rows import constant, number_spans, texts_as_rows, written
+from frametool.stream.rows import constant, number_spans, spans_of, texts_as_rows, written
 from frametool.text.csv_line import quoted
 from frametool.text.spans import Spans
 

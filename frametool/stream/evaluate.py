@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -118,7 +118,8 @@ class Run:
         self.off = 0.0  # how far the worst rotation was from one, of those that are none too far
         self.count = len(block.places)
         numbers = self._read()
-        self._check_covariances(numbers)
+        if any(shape.covariance for shape in plan.shapes):
+            self._check_covariances(numbers)
         self.outside = self._outside() if self.request.window and self.count else set[int]()
         movers = self._movers()
         self.lone: int | None = None
@@ -163,7 +164,8 @@ class Run:
             text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
                 if column not in words:
-                    numbers[row, column] = self._read_odd(text, column)
+                    read = self.plan.marked.get(column)
+                    numbers[row, column] = read(text) if read else self._with_unit(text, column)
                     continue
                 if (column, text) not in known:
                     known[column, text] = words[column](text)
@@ -171,12 +173,6 @@ class Run:
             except ValueInvalid as error:
                 self._blame(row, self.plan.names[column], str(error))
         return numbers
-
-    def _read_odd(self, text: str, column: int) -> float:
-        """Read what is no plain number: an angle with its unit, or one with marks where it may have them."""
-        if column in self.plan.marked:
-            return self.plan.marked[column](text)
-        return self._with_unit(text, column)
 
     def _check_covariances(self, numbers: Floats) -> None:
         """Refuse rows whose covariance is none; sigmas cannot be negative."""
@@ -211,10 +207,14 @@ class Run:
         for shape, parts in zip(self.plan.shapes or (Shape(POSE),), moved, strict=False):
             if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
                 continue
-            entries = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
-            for row in np.flatnonzero(entries[21] + entries[28] + entries[35] > uncertainty.WIDE**2)[:1].tolist():
-                if told := uncertainty.doubt([float(entry[row]) for entry in entries]):
-                    self.rounded.append(RowNote(self.block.line_of(row), uncertainty.WIDE_RULE, told))
+            columns = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
+            rows = np.flatnonzero(columns[21] + columns[28] + columns[35] > uncertainty.WIDE**2)
+            entries = np.stack([column[rows] for column in columns], axis=-1)
+            widest = np.linalg.eigvalsh(entries.reshape(-1, 6, 6)[:, 3:, 3:])[:, 2]
+            for at in np.flatnonzero(widest > (0.999 * uncertainty.WIDE) ** 2).tolist():
+                if told := uncertainty.doubt(entries[at].tolist()):
+                    self.rounded.append(RowNote(self.block.line_of(int(rows[at])), uncertainty.WIDE_RULE, told))
+                    break
 
     def _with_unit(self, text: str, column: int) -> float:
         """Read an angle, or a length where metres are wanted, which may say its own unit."""
@@ -417,15 +417,11 @@ class Run:
             results[:, column] = number
         results += 0.0  # none is -0.0
         if not np.isfinite(results.sum()):
-            for row in np.flatnonzero(self._is_wrong(results)).tolist():
+            wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)  # nan may be a formula's
+            for row in np.flatnonzero(wrong.any(axis=1)).tolist():
                 if row not in self.reasons:
                     self._blame(row, *self._why_not_finite(row, moved))
         return results, locked
-
-    def _is_wrong(self, results: Floats) -> Any:
-        """Return which rows have numbers that are none; nan may be one of a formula's."""
-        wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)
-        return wrong.any(axis=1)
 
     def _why_not_finite(self, row: int, moved: Sequence[Components]) -> tuple[str, str | FrametoolError]:
         """Return the column and the reason why a row has no finite result."""

@@ -65,14 +65,6 @@ class RowNote(NamedTuple):
         """Tell that a frame is not named any more."""
         return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
 
-    @classmethod
-    def of_latest(cls, line: int, column: str) -> RowNote:
-        """Tell that a column of stamps is not looked at."""
-        from shlex import quote
-
-        remedy = f"give --time-column {quote(column)}, or --at TIME"
-        return cls(line, "latest", f"column {column!r} is not looked at, rows move at the latest time; {remedy}")
-
 
 class BadRow(FormatError):
     """Report a bad row; if it ended the run, the rows before it are out.

@@ -170,61 +170,37 @@ def lay_out(
     between = delimiter or b" "
     pieces: list[Piece] = []
     stretches: list[Stretch] = []
-    groups = _grouped(columns)
-    for at, group in enumerate(groups):
-        last = at == len(groups) - 1
-        if isinstance(group[0], Kept):
-            begin, end = group[0].place, group[-1].place  # type: ignore[union-attr]
-            follows = not last and not isinstance(groups[at + 1][0], Kept)
-            ending = "line" if last and end == width - 1 else "gap" if follows and end < width - 1 else "cell"
-            stretches.append(
-                (begin, end, "line" if not at and not begin else "gap" if at and begin else "cell", ending)
-            )
-            pieces.append(In(len(stretches) - 1))
-            if follows and end == width - 1:
-                pieces.append(Const(between))
-        else:
-            pieces += _written(group, between, stretches)
-            if not last and not isinstance(groups[at + 1][0], Kept):
-                pieces.append(Const(between))
-    if not stretches or stretches[-1][3] != "line":
-        stretches.append((width - 1, width - 1, "end", "line"))
-        pieces.append(In(len(stretches) - 1))
-    return Layout(
-        tuple(columns),
-        tuple(places),
-        tuple(frames),
-        tuple(pieces),
-        tuple(stretches),
-        delimiter,
-        b"" if delimiter else b"nan",
-    )
-
-
-def _written(group: Sequence[Column], between: bytes, stretches: list[Stretch]) -> list[Piece]:
-    if isinstance(group[0], Named):
-        place, role = group[0]
-        stretches += [(place, place, "cell", "cell"), (role, role, NAMED, NAMED)]
-        return [Instead(len(stretches) - 2, len(stretches) - 1)]
-    if isinstance(group[0], (Worded, Fixed)):
-        column = group[0]
-        return [Const(column.word.encode()) if isinstance(column, Fixed) else Word(column.number, column.words)]
-    first, last = group[0].number, group[-1].number  # type: ignore[union-attr]
-    return [Out(first, last + 1, between)]
-
-
-def _grouped(columns: Sequence[Column]) -> list[list[Column]]:
-    """Put neighbours of one kind together: columns that follow one another, numbers that do."""
     groups: list[list[Column]] = []
-    for column in columns:
+    for column in columns:  # columns that follow one another, and numbers that do, go together
         before = groups[-1][-1] if groups else None
-        if (isinstance(column, Kept) and isinstance(before, Kept) and column.place == before.place + 1) or (
-            isinstance(column, New) and isinstance(before, New) and column.number == before.number + 1
-        ):
+        if isinstance(column, (Kept, New)) and type(before) is type(column) and column[0] == before[0] + 1:
             groups[-1].append(column)
         else:
             groups.append([column])
-    return groups
+    for at, group in enumerate(groups):
+        first, last = group[0], at == len(groups) - 1
+        follows = not last and not isinstance(groups[at + 1][0], Kept)
+        if isinstance(first, Kept):
+            end = first.place + len(group) - 1
+            ending = "line" if last and end == width - 1 else "gap" if follows and end < width - 1 else "cell"
+            begin = "line" if not at and not first.place else "gap" if at and first.place else "cell"
+            stretches.append((first.place, end, begin, ending))
+            pieces.append(In(len(stretches) - 1))
+            follows = follows and end == width - 1
+        elif isinstance(first, Named):
+            stretches += [(first.place, first.place, "cell", "cell"), (first.role, first.role, NAMED, NAMED)]
+            pieces.append(Instead(len(stretches) - 2, len(stretches) - 1))
+        elif isinstance(first, New):
+            pieces.append(Out(first.number, first.number + len(group), between))
+        else:
+            pieces.append(Const(first.word.encode()) if isinstance(first, Fixed) else Word(first.number, first.words))
+        if follows:
+            pieces.append(Const(between))
+    if not stretches or stretches[-1][3] != "line":
+        stretches.append((width - 1, width - 1, "end", "line"))
+        pieces.append(In(len(stretches) - 1))
+    null = b"" if delimiter else b"nan"
+    return Layout(tuple(columns), tuple(places), tuple(frames), tuple(pieces), tuple(stretches), delimiter, null)
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:

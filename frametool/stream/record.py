@@ -490,8 +490,8 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     _refuse_typos(value, rotations=bool(turned), position=bool(there))
     key = positions[0] if positions else ""
     turns = turned or (not request.operation.moves and _turns_in_doubt(value))
-    kind = key if not turns and _stays_point(value, key, request) else _kind(key, turns, request)
-    record = Record(path, Shape(kind, None), key=key)
+    stays = not turns and _stays_point(value, key, request)
+    record = Record(path, Shape(key if stays else _kind(key, turns, request), None), key=key)
     if positions:
         record = _with_position(record, value[key], POINT_KEYS[key], partial="header" not in value)
     elif flat and flat.position:
@@ -500,12 +500,15 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
     if flat and flat.rotation:
         record = _with_flat_rotation(record, value, flat, reading, request)
     elif rotations:
-        if not (request.operation.multiples and _is_matrix(rotations[0])):
+        row = ROTATION_KEYS.get(rotations[0])
+        if not (request.operation.multiples and row and row.representation.whole):
             within((rotations[0],), read_rotation, rotations[0], value[rotations[0]], reading)
         record = _with_rotation(value[rotations[0]], rotations[0], record, (rotations[0],), reading, request)
-    record = record._replace(others=(*rotations[1:], *positions[1:]))
     _refuse_disagreement(value, positions, rotations, reading)
-    record = record._replace(shape=record.shape._replace(inverse=_is_inverse(value)))
+    if (flag := value.get("inverse", "false")) not in ("true", "false"):
+        raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
+    shape = record.shape._replace(inverse=flag == "true")
+    record = record._replace(shape=shape, others=(*rotations[1:], *positions[1:]))
     is_ecef = flat and flat.position and flat.position.prefix.lower().endswith("ecef_")
     place = request.given_place or ("ecef" if is_ecef else "")
     return _given_on_earth(record, request._replace(given_place=place)) if place else record
@@ -570,17 +573,6 @@ def _placed(found: Placed, path: Path) -> Record:
     )  # fmt: skip
 
 
-def _is_matrix(key: str) -> bool:
-    return key in ROTATION_KEYS and ROTATION_KEYS[key].representation.whole is not None
-
-
-def _is_inverse(value: dict[str, Any]) -> bool:
-    flag = value.get("inverse", "false")
-    if flag not in ("true", "false"):
-        raise Misfit(f"inverse must be true or false, found {kind(flag)}", ("inverse",))
-    return bool(flag == "true")
-
-
 def _two_vectors(value: dict[str, Any], name: str, path: Path, request: Request) -> Record:
     """Read a twist or a wrench."""
     if request.kind not in ("", name) or not request.operation.moves:
@@ -599,14 +591,11 @@ def _refuse_typos(value: dict[str, Any], *, rotations: bool, position: bool) -> 
     if (rotations and position) or KNOWN.issuperset(value):
         return
     wanted = {*([] if rotations else ROTATION_KEYS), *([] if position else POSITION_KEYS)} - LISTED_WORDS
-    unknown = islice((key for key in value if key not in KNOWN and not _is_letter(key, value[key])), MOST_COMPARED)
+    # a number under a letter or two, as px and ry, is no misspelt list of them
+    others = (key for key in value if key not in KNOWN and (key[2:] or type(value[key]) is not str))
+    unknown = islice(others, MOST_COMPARED)
     if near := [(key, hint) for key in unknown if (hint := _meant(key, value[key], wanted))]:
         raise _unknown(near)
-
-
-def _is_letter(key: str, value: Any) -> bool:
-    """Return True for a number under a letter or two, as px and ry, which is no misspelt list of them."""
-    return not key[2:] and type(value) is str
 
 
 # what others call a rotation or a position; as a list or mapping it is no further field of a record

@@ -103,12 +103,6 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
     bad.finish(rows)
 
 
-def stream_results(stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows) -> Iterator[Value]:
-    """Yield the results of a stream of records one by one."""
-    for rows in stream_rows(stream, form, request, style, bad):
-        yield from rows.in_order()
-
-
 def _no_result(record: bytes, form: str, style: Style) -> NoResult:
     """Return what a bad record says beside its numbers; in a table those are empty cells under names of their own."""
     try:

@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from frametool.stream.record_text import RecordText
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
-    from frametool.stream.row_layout import Shape
     from frametool.stream.splitter import Splitter
     from frametool.stream.template import Template
     from frametool.text.spans import Bytes, Floats, Ints
@@ -155,7 +154,7 @@ class RecordRows:
             return [], range(len(cut.starts)), 0
         plan, marked = planned
         run = Run(plan, block_of(cut, data, text), State())
-        tells = template.notes or template.own_notes or any(map(self._carries, template.shapes))
+        tells = template.notes or template.own_notes or any(map(self.request.operation.carried, template.shapes))
         left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not told[DEGREES])}
         left |= {*run.mended[:1]} if not told[ROUNDED] else set()
         left |= {*run.reasons, *run.rows[run.locked != 0].tolist()}
@@ -203,10 +202,6 @@ class RecordRows:
             found.append(made)
         plan = plan_of(template, self.request, yaml=self.is_yaml)
         return plan._replace(pieces=(), targets=tuple(targets)), found
-
-    def _carries(self, shape: Shape) -> bool:
-        """Return True if results have a covariance, of which there may be something to tell."""
-        return bool(self.request.operation.carried(shape))
 
     def _target(self, own: Target, kind: str) -> Target:
         """Choose which numbers of a result are written."""

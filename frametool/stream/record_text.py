@@ -11,7 +11,7 @@ from frametool.documents.document import Aliased, Document, Node, locate_many, p
 from frametool.documents.json import strict_json
 from frametool.documents.source import Source, check_text, decode
 from frametool.errors import FormatError, FrametoolError
-from frametool.stream.answers import answer, number_writer, read_entries, written
+from frametool.stream.answers import answer, number_writer, read_entries, wide_turn, written
 from frametool.stream.faults import ZONES, Fault, RowNote
 from frametool.stream.layout import Const, IfLocked, In, Out, Renamed, Word
 from frametool.stream.record import value_at
@@ -121,6 +121,8 @@ class RecordText:
         locked = any(each.entry.target.locked(each.parts) for each in answers)
         text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers, locked=locked)
         notes = self._notes_at(line, column)
+        wide = next(filter(None, (wide_turn(each, self.request.operation) for each in answers)), None)
+        notes += [RowNote(line + self.line, wide.rule, wide.message)] if wide else []
         if (place := answers[0].entry.target.place if answers else None) is not None:
             from frametool.geometry.transverse_mercator import ZONES as ZONE_NAMES
 

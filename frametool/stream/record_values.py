@@ -21,7 +21,7 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.answers import Outside, read_entries, written
+from frametool.stream.answers import Outside, read_entries, wide_turn, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.record_text import RecordText
 from frametool.stream.request import Memory, Request
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
-SIX_BY_SIX = 36  # entries of the covariance of a pose
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
 LOST = "lost"  # rule of frames that results cannot name
@@ -199,12 +198,8 @@ def _answer(known: RecordText, entry: Entry, memory: Memory, own: Teller) -> Ans
     except ValueInvalid as error:
         bad = NotARotation(str(error), record.path)  # what was read well has no result
         raise placed(bad, source) from bad
-    operation = known.request.operation  # of what is uncertain and moves others that is told elsewhere
-    if found is not None and not operation.uncertain and len(operation.carried(record.shape)) == SIX_BY_SIX:
-        from frametool.geometry.uncertainty import WIDE_RULE, doubt
-
-        if not own.counts[WIDE_RULE] and (told := doubt(found.parts[-SIX_BY_SIX:])):
-            own.tell(source, [Finding(WIDE_RULE, told, path=record.path)])
+    if found and (warning := wide_turn(found, known.request.operation)) and not own.counts[warning.rule]:
+        own.tell(source, [warning])
     return found
 
 

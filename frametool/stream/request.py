@@ -279,7 +279,7 @@ class Operation(NamedTuple):
         found = self.pose(compared(own), edge, xp)
         if self.velocity:
             last = EXACT + len(RELATIVE_EXTRAS)
-            found = (*self.with_velocity(found[:last], seconds(), xp), *found[last:])
+            found = (*_with_velocity(found[:last], seconds(), xp), *found[last:])
         return self._with_place(shape, numbers, (*found, *beside))
 
     def _moved(self, own: Components, edge: Components | None) -> Components:
@@ -311,27 +311,12 @@ class Operation(NamedTuple):
             return result[:EXACT]  # a pose that is scaled is one
         if not self.of:
             return result
-        first, second = self._pair([result, *poses[1:]])
+        others = poses[1:] if self.fixed is None else (self.fixed,)
+        first, second = (*others, result) if self.of == "first" else (result, *others)
         exact = len(first) == len(second) == EXACT
         result = rigid.relative(*first, *second) if exact else _placed().relative(first, second)
         metres, angle = rigid.extent(*pose_of(result[:3], result[3:EXACT]), xp)
         return (*result[:EXACT], metres, angle, angle * RADIAN, *result[EXACT:])
-
-    @staticmethod
-    def with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
-        """Add the body twist that makes this step in so many seconds, seen in the first of the two frames.
-
-        Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
-        """
-        turned = vectors.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
-        return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
-
-    def _pair(self, poses: Sequence[Components]) -> tuple[Components, Components]:
-        if self.of == "first" and self.fixed is not None:
-            return self.fixed, poses[0]
-        if self.of == "second" and self.fixed is not None:
-            return poses[0], self.fixed
-        return poses[0], poses[1]
 
 
 def _or_none(number: Number) -> Number | None:
@@ -340,6 +325,15 @@ def _or_none(number: Number) -> Number | None:
 
 PLAIN = Shown({}, {})
 COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
+
+
+def _with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Components:
+    """Add the body twist that makes this step in so many seconds, seen in the first of the two frames.
+
+    Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
+    """
+    turned = vectors.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
+    return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
 
 
 def _product(a: Components, b: Components) -> Components:

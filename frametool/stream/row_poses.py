@@ -20,7 +20,7 @@ from frametool.grammar.result import NoResult, Result, with_entries
 from frametool.stream.row_layout import AS_READ, PARTS
 from frametool.stream.stamp_columns import NOWHERE
 from frametool.text.cells import without_quotes
-from frametool.text.spans import MARGIN, Spans, framed
+from frametool.text.spans import Spans
 from frametool.text.write import rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
@@ -94,13 +94,11 @@ def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
         read=None if block.read is None else block.read[rows],
         parents=parents,
         names=names,
-        extras={name: cells_at(each, rows) for name, each in block.extras.items()},
+        extras={
+            name: Spans(each.data, each.starts[rows], each.ends[rows]) if isinstance(each, Spans) else each[rows]
+            for name, each in block.extras.items()
+        },
     )
-
-
-def cells_at(cells: Cells, rows: slice | Ints) -> Cells:
-    """Return some cells of a column."""
-    return Spans(cells.data, cells.starts[rows], cells.ends[rows]) if isinstance(cells, Spans) else cells[rows]
 
 
 def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
@@ -231,13 +229,6 @@ def spelled(kind: str, numbers: Sequence[float] | None) -> dict[str, Any]:
         return {kind: numbers if numbers is None else list(numbers)}
     halves = (None, None) if numbers is None else (list(numbers[:3]), list(numbers[3:]))
     return {kind: dict(zip(PARTS[kind], halves, strict=True))}
-
-
-def spans_of(texts: list[bytes]) -> Spans:
-    """Return texts, one a row, as spans."""
-    lengths = np.fromiter(map(len, texts), np.int64, len(texts))
-    ends = np.cumsum(lengths) + MARGIN
-    return Spans(framed(b"".join(texts)), ends - lengths, ends)
 
 
 def texts_of(cells: Cells) -> list[str]:

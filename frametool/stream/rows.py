@@ -121,44 +121,34 @@ def assemble(
 
     values: the texts of the results; locked: (n,) 1 where angles are not unique
     """
-    return [
-        worded(results[:, piece.number], piece) if isinstance(piece, Word) and results is not None
-        else _spans(piece, parts, values, locked)
-        for piece in pieces
-    ]  # fmt: skip
-
-
-def _distinct(numbers: Floats) -> tuple[list[float], Ints]:
-    """Return the numbers that differ, and which of them each is."""
-    found, of_row = np.unique(numbers, return_inverse=True)
-    return found.tolist(), of_row
+    found = []
+    for piece in pieces:
+        if isinstance(piece, (In, Instead)):
+            found.append(parts[piece.part if isinstance(piece, In) else piece.new])
+        elif isinstance(piece, Out) and values is not None:
+            ends = values.ends[:, piece.first : piece.last].copy()
+            ends[:, -1] -= 1
+            found.append(Spans(values.data, values.starts[:, piece.first : piece.last], ends))
+        elif isinstance(piece, Word) and results is not None:
+            found.append(worded(results[:, piece.number], piece))
+        else:
+            text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", len(locked))
+            is_flag = isinstance(piece, IfLocked)
+            found.append(text._replace(ends=text.starts + locked * len(piece.text)) if is_flag else text)
+    return found
 
 
 def worded(numbers: Floats, piece: Word) -> Spans:
     """Return the words that numbers (n,) stand for."""
     counts = type(piece) is Word
-    found, of_row = ([*range(len(piece.words))], numbers.astype(np.int64)) if counts else _distinct(numbers)
-    texts = [piece.text(number) for number in found]
-    ends = np.cumsum([len(text) for text in texts]) + MARGIN
-    starts = ends - [len(text) for text in texts]
-    return Spans(framed(b"".join(texts)), starts[of_row], ends[of_row])
+    found, of_row = (np.arange(len(piece.words)), numbers) if counts else np.unique(numbers, return_inverse=True)
+    return chosen(spans_of([*map(piece.text, found.tolist())]), of_row.astype(np.int64))
 
 
 def constant(text: bytes, size: int) -> Spans:
     """Return one text for so many rows."""
     starts = np.full(size, MARGIN, np.int64)
     return Spans(framed(text), starts, starts + len(text))
-
-
-def _spans(piece: Piece, parts: Sequence[Spans], values: Spans | None, locked: Ints) -> Spans:
-    if isinstance(piece, (In, Instead)):
-        return parts[piece.part if isinstance(piece, In) else piece.new]
-    if isinstance(piece, Out) and values is not None:
-        ends = values.ends[:, piece.first : piece.last].copy()
-        ends[:, -1] -= 1
-        return Spans(values.data, values.starts[:, piece.first : piece.last], ends)
-    text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", len(locked))
-    return text._replace(ends=text.starts + locked * len(piece.text)) if isinstance(piece, IfLocked) else text
 
 
 def chosen(spans: Spans, rows: Ints) -> Spans:
@@ -169,10 +159,14 @@ def chosen(spans: Spans, rows: Ints) -> Spans:
 def texts_as_rows(odd: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
     """Return texts as rows in the order of their places."""
     odd = sorted(odd, key=itemgetter(0))
-    lengths = np.array([len(text) for _, text in odd], np.int64)
+    return np.array([place for place, _ in odd], np.int64), [spans_of([text for _, text in odd])]
+
+
+def spans_of(texts: list[bytes]) -> Spans:
+    """Return texts, one a row, as spans."""
+    lengths = np.fromiter(map(len, texts), np.int64, len(texts))
     ends = np.cumsum(lengths) + MARGIN
-    data = framed(b"".join(text for _, text in odd))
-    return np.array([place for place, _ in odd], np.int64), [Spans(data, ends - lengths, ends)]
+    return Spans(framed(b"".join(texts)), ends - lengths, ends)
 
 
 def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from frametool.documents.document import Node
-    from frametool.geometry.place import Place
     from frametool.stream.answers import Entry
     from frametool.stream.layout import Piece
     from frametool.stream.record import Name, Record
@@ -93,7 +92,8 @@ class Splicer:
         """Return the edits, in no order."""
         shape = self.record.shape
         if self.request.operation.only_adds:
-            self.node = root_of_extras(self.root, self.record)
+            lists = [at for at, step in enumerate(self.record.path) if type(step) is int]
+            self.node = self.root.at(self.record.path[: lists[-1] + 1])  # the outermost that holds this record alone
             for member in self._extras(0):
                 self._insert_after(self._last_value(), member)
             return self.edits
@@ -166,7 +166,7 @@ class Splicer:
         elif None in self.slots[:there] or (there < 3 and not target.absent) or target.place != self.record.shape.place:
             self._replace(self.node.value[members[0]], self._place(key or kind))
             self.dropped.update(members[1:])
-        elif not self._position_stays():
+        elif not self.request.keeps_position or self.record.shape.inverse:  # else it keeps its text
             self._numbers(range(there), 0)
 
     def _place(self, key: str) -> tuple[Piece, ...]:
@@ -179,12 +179,12 @@ class Splicer:
             entry = {key: entry.pop(place.name)} | entry
         elif self.target.notations:
             entry |= {AXES_KEY: place.axes}
-        return tuple(_with_words(self._member(entry, 0), place, self.first, quote=self.json))
-
-    def _position_stays(self) -> bool:
-        """Tell whether only the notation of the rotation changes: then the position keeps its text."""
-        request = self.request
-        return request.keeps_position and not self.record.shape.inverse
+        words = {self.first + at: each for at, each in place.words.items()}
+        return tuple(
+            Word(piece.first, words[piece.first], b'"' * self.json)
+            if isinstance(piece, Out) and piece.first in words else piece
+            for piece in self._member(entry, 0)
+        )  # fmt: skip
 
     def _rotation(self) -> None:
         """Write the rotation where it stands, or its members anew."""
@@ -333,37 +333,25 @@ class Splicer:
         self.edits.append(Edit(node.start, node.end, (Const(self._text(key).encode()),)))
         return True
 
-    def _text(self, value: str) -> str:
-        return self._dumped(value).rstrip("\n")
-
-    def _dumped(self, value: Any) -> str:
-        def number(_value: float) -> str:
-            return MARK
-
+    def _text(self, value: Any) -> str:
+        """Write a value in the record's syntax, each number a mark."""
+        if value is True or (type(value) is str and not self.json):
+            return "true" if value is True else quoted(value)
         if self.json:
             from frametool.documents.json import dump
-
-            return dump(value, number) if value is not True else "true"
-        if type(value) is str:
-            return quoted(value)
-        from frametool.documents.yaml_writer import dump as dump_yaml
-
-        return dump_yaml(value, number)
+        else:
+            from frametool.documents.yaml_writer import dump
+        return dump(value, lambda _: MARK).rstrip("\n")
 
     def _member(self, entry: dict[str, Any], first: int) -> tuple[Piece, ...]:
         """Write members in the record's style, each number a piece."""
         if self.json:
-            text = ", ".join(
-                f"{self._text(key)}: {'true' if value is True else self._dumped(value)}" for key, value in entry.items()
-            )
+            text = ", ".join(f"{self._text(key)}: {self._text(value)}" for key, value in entry.items())
         elif self.node.flow:
             text = ", ".join(f"{self._text(key)}: {_flow(value, self._text)}" for key, value in entry.items())
         else:
-            text = self._dumped(entry).rstrip("\n").replace("\n", "\n" + " " * self._indent())
+            text = self._text(entry).replace("\n", self._between())
         return tuple(_with_numbers(text, self.first + first))
-
-    def _indent(self) -> int:
-        return self._first_key().column
 
     def _first_key(self) -> Node:
         key, _ = next(iter(self.node.value.values()))
@@ -373,7 +361,7 @@ class Splicer:
         return list(self.node.value.values())[-1][1]  # type: ignore[no-any-return]
 
     def _between(self) -> str:
-        return ", " if self.json or self.node.flow else "\n" + " " * self._indent()
+        return ", " if self.json or self.node.flow else "\n" + " " * self._first_key().column
 
     def _insert_before(self, key: Node, pieces: tuple[Piece, ...]) -> None:
         self.edits.append(Edit(key.start, key.start, (*pieces, Const(self._between().encode()))))
@@ -432,12 +420,6 @@ def refuse_member(key: str, members: Any) -> None:
         raise ValueInvalid(f"key {shown(key)} is there already; name the new ones with --prefix")
 
 
-def root_of_extras(root: Node, record: Record) -> Node:
-    """Return the mapping that an expression's results stand in: the outermost that holds this record alone."""
-    lists = [at for at, step in enumerate(record.path) if type(step) is int]
-    return root.at(record.path[: lists[-1] + 1])
-
-
 def _flow(value: Any, text: Any) -> str:
     """Write a value in brackets."""
     if isinstance(value, dict):
@@ -445,13 +427,6 @@ def _flow(value: Any, text: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_flow(each, text) for each in value) + "]"
     return str(text(value))
-
-
-def _with_words(pieces: Sequence[Piece], place: Place, first: int, *, quote: bool) -> Iterator[Piece]:
-    """Put words in the place of the numbers that stand for them."""
-    for piece in pieces:
-        words = place.words.get(piece.first - first) if isinstance(piece, Out) else None
-        yield piece if words is None else Word(piece.first, words, b'"' * quote)  # type: ignore[union-attr]
 
 
 def _with_numbers(text: str, first: int) -> Iterator[Piece]:

@@ -224,7 +224,9 @@ def as_trajectory(table: Table, form: str, request: Request, source: str) -> Tab
         line = table.head.count(b"\n") + 1
         raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
     if form == "kitti":
-        return table._replace(names=row.columns, pose=_rows_of_matrix(row.columns))
+        places = tuple(range(len(row.columns)))
+        rows = Columns(places, row.columns, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True)
+        return table._replace(names=row.columns, pose=PoseColumns(None, rows))
     if form == "euroc":
         names = table.names or row.columns[: table.width]
         if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
@@ -233,12 +235,6 @@ def as_trajectory(table: Table, form: str, request: Request, source: str) -> Tab
     tum = FORMATS["tum"].columns
     columns = row.columns or (tum if table.width == len(tum) else ())
     return table if table.names or not columns else table._replace(names=columns, width=len(columns))
-
-
-def _rows_of_matrix(names: tuple[str, ...]) -> PoseColumns:
-    """Take all columns for the first three rows of a 4x4 matrix."""
-    places = tuple(range(len(names)))
-    return PoseColumns(None, Columns(places, names, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True))
 
 
 def _euroc(names: Sequence[str], known: Sequence[str], source: str) -> PoseColumns:
@@ -401,7 +397,9 @@ def _is_number(text: str) -> bool:
 def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Block:
     """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
     cells = table.split(text)
-    columns = _as_slice(layout.places)
+    places = layout.places
+    is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
+    columns = slice(places[0], places[-1] + 1) if is_run else list(places)
     numbers = Spans(cells.data, cells.starts[:, columns], cells.ends[:, columns])
     if b'"' in text and layout.places:
         numbers = without_quotes(numbers)
@@ -415,12 +413,14 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Bl
     odd, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
+        named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
         for line in cells.odd_lines().tolist():
             raw = cells.line(line)
             if cells.counts[line] == 0 or (cells.counts[line] == 1 and not raw.strip()):
                 odd.append((line, raw))
             else:
-                broken.append(Broken(line, lines_before(line), "", _ragged(table, int(cells.counts[line]))))
+                reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
+                broken.append(Broken(line, lines_before(line), "", reason))
     return Block(
         numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), odd, broken, names.frames,
         stamps, names.bad, names.lost,
@@ -444,13 +444,6 @@ def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) ->
     return replaced(text, edits)
 
 
-def _as_slice(places: Sequence[int]) -> slice | list[int]:
-    """Return neighbouring columns as a slice, which copies nothing."""
-    if places and tuple(places) == tuple(range(places[0], places[0] + len(places))):
-        return slice(places[0], places[0] + len(places))
-    return list(places)
-
-
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
     """Return the span from one cell to another in every row, with what stands before or after as told."""
     if begin == "line":
@@ -472,7 +465,3 @@ def _line_counter(cells: Cells) -> Callable[[int], int]:
     return lambda line: int(np.searchsorted(newlines(), cells.line_starts[line]))
 
 
-def _ragged(table: Table, count: int) -> str:
-    """Say that a row has too few or too many cells."""
-    named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
-    return f"expected {table.width} cells{named}, found {count}"

@@ -37,7 +37,7 @@ from frametool.stream.table import rename_of
 from frametool.text.numbers import number_or_none
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from frametool.geometry.representations import Notation
     from frametool.stream.layout import Column, Layout
@@ -85,7 +85,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     edge_of = request.pose_from_frame if on_earth else request.pose_of_row_frame
     if frames and edge_of is None and request.operation.moves and not on_earth:
         edge_of = request.pose_from_frame
-    words, marked = readers_of(shapes[0]) if on_earth else ({}, request.operation.shown and _may_be_empty(shapes[0]))
+    asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # an empty cell is none
+    words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = {frames[0]: PARENT} if frames and request.poses else {}
     named = named if name is None else {**named, name: NAME}
     poses = [_written(pose) for pose in poses] if on_earth else poses
@@ -107,7 +108,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     return Plan(
         shapes, targets, request, tuple(table.name(place) for place in places), layout.pieces, layout.null, edge_of,
         source=EARTH_FRAMES[0] if on_earth else "", frame_column=table.name(frames[0]) if len(frames) == 1 else "",
-        words=words, marked=marked or {},
+        words=words, marked=marked,
     ), layout  # fmt: skip
 
 
@@ -213,11 +214,6 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     if request.operation.formula is None:
         return shapes
     return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
-
-
-def _may_be_empty(shape: Shape) -> dict[int, Callable[[str], float]]:
-    """Return how the columns that a formula asks for are read where an empty cell is no number."""
-    return dict.fromkeys(range(shape.own_size, shape.size), number_or_none)
 
 
 def _by_width(width: int, given: Notation | None) -> str:

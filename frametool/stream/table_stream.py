@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from itertools import chain
+from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -156,7 +157,9 @@ class PlannedRows:
         """Return warnings about the rows of a block; frames: that they are given in."""
         notes = notes_of(run, run.block)
         if self.unasked is not None and run.count and moves_in_time(self.unasked, {*frames} or {None}):
-            notes.append(RowNote.of_latest(run.block.line_of(0), self.unasked.name))
+            remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
+            ignored = f"column {self.unasked.name!r} is not looked at, rows move at the latest time; {remedy}"
+            notes.append(RowNote(run.block.line_of(0), "latest", ignored))
             self.unasked = None
         return sorted(notes)
 

@@ -46,11 +46,10 @@ from frametool.stream.row_poses import (
     plain_cells,
     points_of,
     results_of,
-    spans_of,
     spelled,
     texts_of,
 )
-from frametool.stream.rows import constant, number_spans
+from frametool.stream.rows import constant, number_spans, spans_of
 from frametool.text.csv_line import quoted
 from frametool.text.spans import Spans, join
 

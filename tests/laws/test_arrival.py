@@ -40,22 +40,16 @@ READ = {
     "postures.yaml": ("fk arm.urdf arm_base tool",),
 }  # fmt: skip
 WHOLE: dict[tuple[str, str], Outcome] = {}
-SEAMS = {  # a beginning of the line, a file, cuts: why the pieces differ today
-    (MOVE, "odometry.yaml", "byte by byte, line by line"): "a large sigma is warned of in records that come alone, and not in a block of several",
-    (MOVE, "odometry.jsonl", "byte by byte, line by line"): "a large sigma is warned of in records that come alone, and not in a block of several",
-}
 
 
 def cases() -> list[Any]:
-    """Pair lines, files and cuts; those whose pieces differ today are marked."""
-    found = []
-    for name, some in READ.items():
-        for line in some:
-            for cut in CUTS:
-                reasons = [why for (begin, file, cuts), why in SEAMS.items() if line.startswith(begin) and file == name and cut in cuts.split(", ")]
-                marks = [pytest.mark.xfail(strict=True, reason=reasons[0])] if reasons else []
-                found.append(pytest.param(line, name, cut, marks=marks, id=f"{line.replace(A, 'A')} < {name}, {cut}"))
-    return found
+    """Pair lines, files and cuts."""
+    return [
+        pytest.param(line, name, cut, id=f"{line.replace(A, 'A')} < {name}, {cut}")
+        for name, some in READ.items()
+        for line in some
+        for cut in CUTS
+    ]
 
 
 def came(run: Run, line: str, stdin: object) -> Outcome:
