@@ -142,10 +142,8 @@ class RecordText:
         """Return all warnings about the records and their numbers, each with its place."""
         begin = Source("", self.text, line, column)
         places = [begin.place(*each) for each in locate_many(self.text, [note.path for note in self.notes])]
-        found = [
-            RowNote(at, note.rule, note.message, str(there))
-            for note, (at, there) in zip(self.notes, places, strict=True)
-        ]
+        notes = zip(self.notes, places, strict=True)
+        found = [RowNote(at, note.rule, note.message, str(there)) for note, (at, there) in notes]
         known = {note.about for note in found}
         others = [each._replace(line=line + self.line) for each in self.row_notes() if each.about not in known]
         return sorted(found + others)

@@ -133,8 +133,8 @@ def assemble(
             found.append(worded(results[:, piece.number], piece))
         else:
             text = constant(piece.text if isinstance(piece, (Const, IfLocked)) else b"", len(locked))
-            is_flag = isinstance(piece, IfLocked)
-            found.append(text._replace(ends=text.starts + locked * len(piece.text)) if is_flag else text)
+            shown = text.starts + locked * (text.ends - text.starts) if isinstance(piece, IfLocked) else text.ends
+            found.append(text._replace(ends=shown))
     return found
 
 

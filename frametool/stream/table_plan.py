@@ -87,8 +87,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         edge_of = request.pose_from_frame
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # an empty cell is none
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
-    named = {frames[0]: PARENT} if frames and request.poses else {}
-    named = named if name is None else {**named, name: NAME}
+    named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
     poses = [_written(pose) for pose in poses] if on_earth else poses
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
     if beside and not request.keep:
