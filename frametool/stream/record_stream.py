@@ -227,17 +227,12 @@ class RecordBlocks:
             out = written([*groups, texts_as_rows(texts)] if texts else groups)
         else:
             out = b"".join(piece for _, piece in texts)
-        return Outcome(
-            out,
-            [fault for _, fault in sorted(found.faults)],
-            rows,
-            text.count(b"\n"),
-            sum(len(run.mended) for run in runs) + found.mended,
-            sorted(found.notes),
-            len(text),
-            sum(len(run.rows) for run in runs) + found.alone + found.nulls,
-            None if self.splitter.layout != ARRAY else not closed,
-        )
+        mended = found.mended + sum(len(run.mended) for run in runs)
+        kept = found.alone + found.nulls + sum(len(run.rows) for run in runs)
+        faults = [fault for _, fault in sorted(found.faults)]
+        is_open = None if self.splitter.layout != ARRAY else not closed
+        lines, notes = text.count(b"\n"), sorted(found.notes)
+        return Outcome(out, faults, rows, lines, mended, notes, len(text), kept, is_open)
 
     def _runs(self, text: bytes, cuts: Sequence[Cut], found: Found) -> list[Run]:
         """Run the records of all templates; one that is bad is taken alone, which says where it is wrong."""
