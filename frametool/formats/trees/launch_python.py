@@ -3,23 +3,22 @@
 A call is read anywhere: `Node(package="tf2_ros", executable="static_transform_publisher", arguments=[..])`,
 or under another name, and `ExecuteProcess(cmd=[.., "static_transform_publisher", ..])`.
 
-Literals are strings, numbers, lists of them, and names bound to such once.  An `Action` is what a launch file in any
-language comes down to.
+Literals are strings, numbers, lists of them, and names bound to such once.
 """
 
 from __future__ import annotations
 
 import ast
 import warnings
-from typing import NamedTuple
 
 from frametool.errors import FormatError, shown
+from frametool.formats.trees.launch import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
 from frametool.ros.publisher import CALL
 
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from typing import TypeAlias
 
     from frametool.documents.source import Source
@@ -31,45 +30,6 @@ LONGEST = 10_000  # characters or words: doubling a text thirty times is a short
 _SCOPES = (ast.Module, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 _CHANGING = frozenset(("append", "extend", "insert", "pop", "remove", "reverse", "sort", "clear"))
 _EXECUTABLE = ("executable", "node_executable")  # the second until Foxy
-PACKAGES = ("tf", "tf2_ros")
-COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
-
-
-class Action(NamedTuple):
-    """One item of a launch file that is read or reported.
-
-    arguments: of a call, as one text for a shell or as words
-    unread: why there is nothing to read; "" if there is
-    conditions: under which it starts, as written
-    key: the attribute with the arguments
-    """
-
-    arguments: str | Sequence[str] = ()
-    unread: str = ""
-    conditions: Sequence[str] = ()
-    key: str = ""
-    line: int = 0
-    column: int = 0
-
-    @classmethod
-    def not_read(cls, why: str, key: str = "") -> Action:
-        """Return the action for a call that cannot be read."""
-        return cls(unread=f"{CALL} not read: {why}", key=key)
-
-    @classmethod
-    def not_followed(cls, what: str, named: object) -> Action:
-        """Return the action for an included file."""
-        return cls(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
-
-
-COMPOSED = Action.not_read("it is a composable node, whose transform stands in its parameters")
-
-
-def runs_publisher(words: Sequence[str]) -> bool:
-    """Return True if a command line starts the publisher."""
-    return any(word.rsplit("/", 1)[-1] == CALL for word in words)
-
-
 class NotLiteral(ValueError):
     """An expression whose value is not literal."""
 
