@@ -12,17 +12,18 @@ are named, and calls that start under a condition are read and listed.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import format_error, locate_many, parse_documents
 from frametool.documents.xml import XmlFile
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.detect import Beginning
+from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
 from frametool.grammar.readers import Misfit, kind
 from frametool.ros import publisher
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from frametool.documents.source import InputFile, Source
     from frametool.frames.lookups import Frames
@@ -33,45 +34,6 @@ if TYPE_CHECKING:
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
 _SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
 _NO, _YES = ("0", "false"), ("1", "true")
-
-
-PACKAGES = ("tf", "tf2_ros")
-COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
-
-
-class Action(NamedTuple):
-    """One item of a launch file that is read or reported.
-
-    arguments: of a call, as one text for a shell or as words
-    unread: why there is nothing to read; "" if there is
-    conditions: under which it starts, as written
-    key: the attribute with the arguments
-    """
-
-    arguments: str | Sequence[str] = ()
-    unread: str = ""
-    conditions: Sequence[str] = ()
-    key: str = ""
-    line: int = 0
-    column: int = 0
-
-    @classmethod
-    def not_read(cls, why: str, key: str = "") -> Action:
-        """Return the action for a call that cannot be read."""
-        return cls(unread=f"{publisher.CALL} not read: {why}", key=key)
-
-    @classmethod
-    def not_followed(cls, what: str, named: object) -> Action:
-        """Return the action for an included file."""
-        return cls(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
-
-
-COMPOSED = Action.not_read("it is a composable node, whose transform stands in its parameters")
-
-
-def runs_publisher(words: Sequence[str]) -> bool:
-    """Return True if a command line starts the publisher."""
-    return any(word.rsplit("/", 1)[-1] == publisher.CALL for word in words)
 
 
 def write_tree(tree: Frames, style: Style) -> str:

@@ -12,7 +12,7 @@ import ast
 import warnings
 
 from frametool.errors import FormatError, shown
-from frametool.formats.trees.launch import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
+from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
 from frametool.ros.publisher import CALL
 
 TYPE_CHECKING = False
@@ -30,6 +30,8 @@ LONGEST = 10_000  # characters or words: doubling a text thirty times is a short
 _SCOPES = (ast.Module, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 _CHANGING = frozenset(("append", "extend", "insert", "pop", "remove", "reverse", "sort", "clear"))
 _EXECUTABLE = ("executable", "node_executable")  # the second until Foxy
+
+
 class NotLiteral(ValueError):
     """An expression whose value is not literal."""
 
