@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from datetime import UTC, datetime
-from functools import partial
 from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,9 +13,8 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.json import dump
 from frametool.errors import printable
-from frametool.view import fit_text
 from frametool.view.charts import Area, Chart, ChartLine
-from frametool.view.fit_text import CSV_TITLES, TITLES, short_cell
+from frametool.view.fit_text import write_comparison, write_table
 from frametool.view.pictures import (
     SERIES,
     Picture,
@@ -87,13 +85,17 @@ def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
         f"<p>{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, frametool {__version__}</p>\n"
         f"<pre><code>$ {escape(printable(command))}</code></pre>\n"
         f"{''.join(f'<p class=hint>{escape(hint)}</p>' for hint in hints)}</header>\n"
-        f"{_tiles(numbers[0]) if len(found) == 1 else _table(numbers, curves)}"
-        f'<div id="figures">\n{drawn}</div>\n{"".join(map(partial(_measured, one=len(found) == 1), numbers))}'
-        '</main>\n<output id="tip" hidden></output>\n'
+        f"<noscript><pre>{escape(_text(numbers))}</pre></noscript>\n"
+        f'<div id="figures">\n{drawn}</div>\n</main>\n<output id="tip" hidden></output>\n'
     )
     samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0][0]) for each in curves]}
     held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
-    return write_html(title, body, script="report.js", data=held)
+    return write_html(title, body, script="tables.js report.js", data=held)
+
+
+def _text(numbers: Sequence[dict[str, Any]]) -> str:
+    """Return the numbers as the terminal shows them."""
+    return "\n".join([*([write_table(numbers)] if len(numbers) > 1 else []), *map(write_comparison, numbers)])
 
 
 def _curve(found: Comparison, at: int, count: int) -> Curve:
@@ -147,7 +149,7 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
     start = PictureDot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
-    return _figure(chart.area.height, [*chart.drawn(_named(lines)), *shapes, start])
+    return _figure(chart.area.height, [*chart.drawn(_named(lines, chart.names[1])), *shapes, start])
 
 
 def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
@@ -170,9 +172,9 @@ def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart)
     return shapes
 
 
-def _named(lines: list[ChartLine]) -> list[ChartLine]:
+def _named(lines: list[ChartLine], title: str) -> list[ChartLine]:
     """Drop the names of estimates from a legend too long for one line; their table shows the colours."""
-    if sum(text_width(line.name, 12.0) + 33.0 for line in lines) < WIDE - 60.0:
+    if sum(text_width(line.name, 12.0) + 33.0 for line in lines if line.name) < WIDE - text_width(title, 12.0):
         return lines
     return [line._replace(name=line.name * (line.name == REFERENCE)) for line in lines]
 
@@ -195,7 +197,7 @@ def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[Ch
         low, high = min(0.0, *(each[2].min() for each in drawn)), max(each[2].max() for each in drawn)
         area = Area(LEFT, TOP + at * (HIGH + TOP + BOTTOM - 14.0), WIDE, HIGH)
         ends = (float(low), float(high))
-        charts.append((Chart(area, (0.0, end), ends, (along * (at == len(kinds) - 1), name)), _named(lines)))
+        charts.append((Chart(area, (0.0, end), ends, (along * (at == len(kinds) - 1), name)), _named(lines, name)))
     return charts
 
 
@@ -252,7 +254,7 @@ def _samples(curve: Curve, map_chart: Chart, seen: Any, time_chart: Chart) -> di
     over = [time_chart.place(*point) for point in curve.over_time(ate.m)]
     numbers = {"m": ate.m[chosen], **({} if ate.rad is None else {"deg": np.degrees(ate.rad[chosen])})}
     return {
-        "name": curve.name, "t": [round(each, 3) for each in curve.times],
+        "name": curve.name, "colour": curve.colour, "t": [round(each, 3) for each in curve.times],
         "path": [[round(at, 1) for at in each] for each in places],
         "errors": [[round(at, 1) for at in each] for each in over],
         **{key: [float(f"{each:.4g}") for each in values.tolist()] for key, values in numbers.items()},
@@ -270,74 +272,3 @@ def _side_by_side(title: str, columns: Sequence[dict[str, Picture]]) -> str:
         bottom = max(bottom, top)
     heading = PictureWords(LEFT, 20.0, title, bold=True)
     return write_svg(Picture(len(columns) * columns[0]["path"].width, bottom, [heading], title), drawn)
-
-
-def _tiles(found: dict[str, Any]) -> str:
-    """Return the tiles: absolute error, relative error, poses paired."""
-    ate, poses = found["ate"]["m"], found["poses"]
-    align = found["settings"]["align"]
-    said = f"rmse; at most {ate['max']:.4g} m, {'not aligned' if align == 'none' else f'aligned by {align}'}"
-    tiles = [("ATE", f"{ate['rmse']:.4g}", "m", said)]
-    if steps := [row for row in found["rpe"] if row["percent"] is not None]:
-        *others, last = (f"{row['percent']:.3g} % over {row['delta']}" for row in steps)
-        value, _, said = last.partition(" % ")
-        tiles.append(("RPE", value, "%", "; ".join([said, *others])))
-    else:
-        tiles.append(("RPE", "-", "", "needs rotations" if found["rpe"] else "no motion over the distances asked for"))
-    share = f"of {poses['possible']}, {100 * poses['paired'] / max(poses['possible'], 1):.3g} %"
-    tiles.append(("Poses paired", str(poses["paired"]), "", share))
-    cells = (f"<div><h2>{name}</h2><p><strong>{value}</strong> {unit}</p><p>{said}</p></div>"
-             for name, value, unit, said in tiles)  # fmt: skip
-    return f'<div id="tiles">{"".join(cells)}</div>\n'
-
-
-TABLE_UNITS = {"m": "m", "deg": "deg", "percent": "%"}
-TABLE_MEANINGS = (
-    "", "rmse of the error in position", "greatest error in position", "rmse of the error in rotation",
-    "rmse along the path", "rmse across the path", "rmse at right angles to the path, up",
-    "relative error over the longest distance", "mean error over stretches of path", "of the alignment",
-    "poses of the estimate with a partner in the reference",
-)  # fmt: skip
-
-
-def _table(numbers: Sequence[dict[str, Any]], curves: Sequence[Curve]) -> str:
-    """Return the sortable table of estimates, with the best value of each column marked."""
-    rows = [fit_text.table_row(each) for each in numbers]
-    best = fit_text.best_of(rows)
-    shown = [at for at in range(len(TITLES)) if any(row[at] is not None for row in rows)]
-    head, body = "", ""
-    for at in shown:
-        unit = TABLE_UNITS.get(CSV_TITLES[at].rpartition("_")[2], "")
-        head += f'<th><button title="{TABLE_MEANINGS[at]}">{TITLES[at]} <small>{unit}</small></button></th>'
-    for row, curve in zip(rows, curves, strict=True):
-        swatch = f'<svg class="swatch" viewBox="0 0 1 1"><rect class="{curve.colour}" width="1" height="1"/></svg>'
-        body += f"<tr><th>{swatch}{escape(curve.name)}</th>"
-        for at in shown[1:]:
-            value = "" if row[at] is None else row[at]
-            body += f'<td data-value="{value}"{" class=best" * (value == best[at])}>{short_cell(row[at])}</td>'
-        body += "</tr>\n"
-    return f'<table id="estimates"><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>\n'
-
-
-def _measured(found: dict[str, Any], *, one: bool) -> str:
-    """Return the table of measures with their explanations, and the folded settings."""
-    rows = ["".join(f"<th>{title}</th>" for title in ("", "", *fit_text.COLUMNS, "%"))]
-    row = '<th tabindex="0" data-tip="{}">{}</th><td>{}</td>{}'.format
-    for label, meaning, summed, percent in fit_text.measures(found):
-        cells = "".join(f"<td>{fit_text.exact(summed and summed[key])}</td>" for key in fit_text.COLUMNS)
-        name, unit = label.strip().rsplit(" ", 1)
-        cells += "<td></td>" if percent is None else f"<td>{percent:.2f}</td>"
-        rows.append(row(escape(meaning), name, unit, cells))
-    fits = ", ".join(f"{kind} {short_cell(value)}" for kind, value in found["ate_by_alignment"].items())
-    for name, unit, meaning, text in (
-        ("kitti", "", "Mean error of stretches of path, as the KITTI benchmark has it", fit_text.kitti_sentence(found)),
-        ("ate by fit", "m", "The absolute error under each alignment", fits),
-    ):
-        rows.append(row(meaning, name, unit, f'<td colspan="6">{text}</td>'))
-    table = f'<table class="measures">{"".join(f"<tr>{each}</tr>" for each in rows)}</table>\n'
-    settings = found["settings"] | {key: found[key] for key in ("offset_s", "transform", "duration_s", "path_m")}
-    entries = "".join(f"<dt>{key}</dt><dd>{escape(each if isinstance(each, str) else dump(each))}</dd>"
-                      for key, each in settings.items() if each is not None)  # fmt: skip
-    folded = f"<details><summary>Settings</summary><dl>{entries}</dl></details>\n"
-    summary = f"<details><summary>{escape(printable(found['est']))}</summary>\n{table}{folded}</details>\n"
-    return table + folded if one else summary

@@ -277,51 +277,30 @@ def write_comparison(found: dict[str, Any]) -> str:
     folded = partial(fill, width=WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     lines = [*map(folded, lines)]
     lines.append(indent + "".join(f"{title:>{CELL}}" for title in COLUMNS))
-    for label, _, summed, percent in measures(found):
-        share_of_delta = "" if percent is None else f"{percent:>8.2f} %"
-        lines.append(_row(label, summed) + share_of_delta)
-    return "\n".join([*lines, f"{'kitti':<{NAME}}{kitti_sentence(found)}", ""])
-
-
-MEANINGS = {
-    "ate m": ("m", "Absolute error: the distance between each pose of the estimate, as aligned, and its reference"),
-    "ate deg": ("deg", "Absolute error in rotation: the angle between the two orientations of a pair"),
-    "ate rot": ("rot", "Norm of the difference between the two rotation matrices of a pair, as evo has it"),
-    "ate full": ("full", "Norm of the difference between the two 4 x 4 matrices of a pair, as evo has it"),
-    "  along m": ("along_m", "The part of the absolute error along the path, positive ahead"),
-    "  across m": ("across_m", "The part of the absolute error across the path, positive to the left"),
-    "  up m": ("up_m", "The part of the absolute error at right angles to the path, positive up"),
-}
-
-
-def measures(found: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, float] | None, float | None]]:
-    """Yield (label with the unit last, explanation, statistics, percent) for each measure of a comparison."""
-    for label, (key, meaning) in MEANINGS.items():
+    for label, key in (("ate m", "m"), ("ate deg", "deg"), ("ate rot", "rot"), ("ate full", "full"),
+                       ("  along m", "along_m"), ("  across m", "across_m"), ("  up m", "up_m")):  # fmt: skip
         if key in found["ate"]:
-            yield label, meaning, found["ate"][key], None
+            lines.append(_row(label, found["ate"][key]))
     for row in found["rpe"]:
-        way = f"the motion over {row['delta']}: estimate against reference, {row['pairs']} pairs of poses"
-        yield f"rpe {row['delta']} m", f"Relative error of {way}; % of {row['delta']}", row["m"], row["percent"]
-        if row["deg"] is not None:
-            yield f"rpe {row['delta']} deg", f"Relative error in rotation of {way}", row["deg"], None
-        else:
-            yield "  distance m", f"Difference of the distance covered by {way}", row["distance_m"], None
+        share_of_delta = "" if row["percent"] is None else f"{row['percent']:>8.2f} %"
+        lines.append(_row(f"rpe {row['delta']} m", row["m"]) + share_of_delta)
+        turned = row["deg"] is not None
+        lines.append(_row(f"rpe {row['delta']} deg", row["deg"]) if turned else _row("  distance m", row["distance_m"]))
+    return "\n".join([*lines, f"{'kitti':<{NAME}}{_kitti(found)}", ""])
 
 
 def _row(label: str, summed: dict[str, float] | None) -> str:
-    return f"{label:<{LABEL}}" + "".join(f"{exact(summed and summed[key]):>{CELL}}" for key in COLUMNS)
+    return f"{label:<{LABEL}}" + "".join(f"{_exact(summed and summed[key]):>{CELL}}" for key in COLUMNS)
 
 
-def kitti_sentence(found: dict[str, Any]) -> str:
-    """Return the KITTI errors as text, or why there are none."""
+def _kitti(found: dict[str, Any]) -> str:
     if kitti := found["kitti"]:
         return f"{kitti['percent']:.4f} %  {kitti['deg_per_m']:.6f} deg/m  ({kitti['segments']} segments)"
     asked = min(found["settings"]["segments_m"])
     return f"-  ({found['path_m']['ref']:.1f} m of path, {asked:g} m asked)"
 
 
-def exact(value: Any) -> str:
-    """Write a number that fits its column; `-` for None."""
+def _exact(value: Any) -> str:
     if value is None:
         return "-"
     whole = len(str(int(abs(value)))) + (value < 0)
@@ -364,7 +343,7 @@ def write_explanation(found: dict[str, Any]) -> str:
     return "\n".join([*lines, ""])
 
 
-def table_row(found: dict[str, Any]) -> list[Any]:
+def _table_row(found: dict[str, Any]) -> list[Any]:
     """Return the table row of a comparison: the name of the estimate and its errors."""
     ate, last = found["ate"], found["rpe"][-1] if found["rpe"] else None
     rmse = [(ate[key] or {}).get("rmse") for key in ("m", "deg", "along_m", "across_m", "up_m")]
@@ -376,15 +355,15 @@ def table_row(found: dict[str, Any]) -> list[Any]:
 
 def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
-    rows = [table_row(each) for each in found]
+    rows = [_table_row(each) for each in found]
     if form == "csv":
         lines = [CSV_TITLES, *(["" if cell is None else str(cell) for cell in row] for row in rows)]
         return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
-    best = best_of(rows)
+    best = _best(rows)
     marked = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[form]
     shown = []
     for row in rows:
-        texts = [*map(short_cell, row)]
+        texts = [*map(_cell, row)]
         if form == "latex":
             texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
         is_best = (cell is not None and cell == best[at] for at, cell in enumerate(row))
@@ -404,14 +383,13 @@ def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
     return "".join(f"{line}\n" for line in aligned)
 
 
-def best_of(rows: Sequence[Sequence[Any]]) -> list[float | None]:
+def _best(rows: Sequence[Sequence[Any]]) -> list[float | None]:
     """Return the minimum of each ranked column; None if there is one row only."""
     columns = ([cell for cell in column if isinstance(cell, float)] for column in zip(*rows, strict=True))
     return [min(there) if at in RANKED and there and len(rows) > 1 else None for at, there in enumerate(columns)]
 
 
-def short_cell(cell: Any) -> str:
-    """Write a cell of a table of comparisons."""
+def _cell(cell: Any) -> str:
     return cell if isinstance(cell, str) else str(cell) if isinstance(cell, int) else _short(cell)
 
 

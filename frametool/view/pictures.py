@@ -170,7 +170,8 @@ def write_html(
     texts = {"style": page_file(style), "script": "".join(map(page_file, script.split()))}
     if style == "report.css":
         light, dark = ("".join(f"--{name}: {NAMED[name][scheme]}; " for name in NAMED) for scheme in (0, 1))
-        rules = "".join(f".{name} {{fill: var(--{name})}} .{name}-line {{stroke: var(--{name})}}\n" for name in NAMED)
+        rule = ".{0} {{fill: var(--{0})}} .{0}-line {{stroke: var(--{0})}} .{0}-swatch {{color: var(--{0})}}\n"
+        rules = "".join(map(rule.format, NAMED))
         dark = f"@media screen and (prefers-color-scheme: dark) {{:root {{{dark}}}}}"
         texts["style"] = f":root {{{light}}}\n{dark}\n{SHARED}{rules}{texts['style']}"
     digests = (f"{kind}-src '{_digest(text)}'; " if text else "" for kind, text in texts.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from pathlib import Path
@@ -222,15 +223,7 @@ def test_a_report_says_what_was_compared_and_holds_the_numbers_of_json(run: Run,
     assert re.search(r"<p>\d{4}-\d\d-\d\d \d\d:\d\d UTC, frametool [\d.]+</p>", text)
     assert re.search(r"<code>\$ frametool .*</code>", text)
     assert held_in(text, "numbers") == [found(run, *DRONE)]
-    assert re.findall("<h2>(.*?)</h2><p><strong>(.*?)</strong> (.*?)</p>", text) == [("ATE", "0.043", "m"), ("RPE", "0.786", "%"), ("Poses paired", "160", "")]
-
-
-def test_each_measure_of_the_text_is_a_row_of_the_report_with_its_meaning(run: Run, tmp_path: Path) -> None:
-    lines = run("compare", *DRONE, files=FILES).out.splitlines()
-    wanted = [line.split() for line in lines if re.match(r"ate (m|deg)|rpe|  (along|across|up)", line)]
-    rows = re.findall(r'data-tip="([^"]{20,})">([^<]*)</th><td>([^<]*)</td>((?:<td>[^<]*</td>){6})', report(run, tmp_path, *DRONE))
-    cells = [[*name.split(), unit, *re.findall("<td>([^<]+)</td>", numbers)] for _, name, unit, numbers in rows]
-    assert cells == [[cell for cell in row if cell != "%"] for row in wanted]
+    assert html.unescape(re.search("<noscript><pre>(.*?)</pre>", text, re.DOTALL)[1]) == run("compare", *DRONE, files=FILES).out  # type: ignore[index]
 
 
 def test_the_path_of_a_report_has_equal_scales_and_axes_in_metres(run: Run, tmp_path: Path) -> None:
@@ -256,15 +249,10 @@ def test_nothing_is_drawn_beside_its_chart(run: Run, tmp_path: Path, names: tupl
         wide, high = map(float, re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', figure)[0])
         places = [(float(x), float(y)) for x, y in re.findall(r"[ML]([-\d.]+) ([-\d.]+)", figure)]
         assert all(0 <= x <= wide and 0 <= y <= high for x, y in places)
-    assert text.count("<h2>") == 3
 
 
-def test_a_report_of_several_has_a_row_and_a_box_each(run: Run, tmp_path: Path) -> None:
+def test_a_report_of_several_has_a_box_each(run: Run, tmp_path: Path) -> None:
     text = report(run, tmp_path, "drone-ref.tum", "drone-est.tum", "drone-ref.tum")
-    rows = re.findall(r"<tr><th><svg.*?</svg>([^<]*)</th>(.*?)</tr>", text)
-    table = run("compare", "drone-ref.tum", "drone-est.tum", "drone-ref.tum", "-f", "csv", files=FILES).out.splitlines()
-    cells = [[name, *re.findall('data-value="([^"]*)"', cells)] for name, cells in rows]
-    assert cells == [[cell for cell in line.split(",") if cell] for line in table[1:]]
     distribution = re.search('<figure id="?distribution"?>(.*?)</figure>', text, re.DOTALL)[1]  # type: ignore[index]
     assert distribution.count("<rect") == 2
     assert len(held_in(text, "samples")["curves"]) == 2

@@ -347,15 +347,50 @@ def test_a_thousand_frames_are_ready_in_a_second_and_drawn_in_thirty_millisecond
 # --- the report of a comparison ---------------------------------------------------------------------------------------
 
 
+GOLDEN = ROOT / "tests" / "golden" / "compare"
+
+
 @pytest.fixture
 def report_of(run: Callable[..., Any], tmp_path: Path) -> Callable[..., Path]:
-    """Write the report of estimates against the first trajectory."""
+    """Write the report of estimates against the first trajectory, of the examples or the goldens."""
 
-    def write(*names: str) -> Path:
-        assert run("compare", *(str(ROOT / "examples" / name) for name in names), "-o", "report.html", "--align", "sim3").status == 0
+    def write(*names: str, align: str = "sim3") -> Path:
+        paths = [next(path for folder in (ROOT / "examples", GOLDEN) if (path := folder / name).exists()) for name in names]
+        assert run("compare", *map(str, paths), "-o", "report.html", "--align", align, "--force").status == 0
         return tmp_path / "report.html"
 
     return write
+
+
+def test_each_measure_of_the_text_is_a_row_of_the_report_with_its_meaning(report_of: Callable[..., Path], visit: Visit, run: Callable[..., Any]) -> None:
+    names = ("drone-ref.tum", "drone-est.tum")
+    tab = visit(report_of(*names, align="se3"))
+    lines = run("compare", *(str(GOLDEN / name) for name in names)).out.splitlines()
+    wanted = [line.replace("%", "").split() for line in lines if re.match(r"ate (m|deg)|rpe|  (along|across|up)", line)]
+    rows = [row.locator("th, td").all_inner_texts() for row in tab.locator(".measures tr:has(th[data-tip])").all()]
+    assert [" ".join(row).split() for row in rows[:-2]] == wanted
+    assert [row[:2] for row in rows[-2:]] == [["kitti", ""], ["ate by fit", "m"]]
+    assert min(map(len, tab.evaluate("[...document.querySelectorAll('[data-tip]')].map((each) => each.dataset.tip)"))) > 20
+    tiles = [each.inner_text().split("\n") for each in tab.locator("#tiles div").all()]
+    assert [[line for line in tile if line][:2] for tile in tiles] == [["ATE", "0.043 m"], ["RPE", "0.786 %"], ["Poses paired", "160"]]
+
+
+@pytest.mark.parametrize(("names", "said"), [(("prism-ref.csv", "prism-est.tum"), "needs rotations"), (("truth.tum", "truth.tum"), "over 100m")])
+def test_there_are_always_three_tiles(report_of: Callable[..., Path], visit: Visit, names: tuple[str, ...], said: str) -> None:
+    tab = visit(report_of(*names, align="none"))
+    assert tab.locator("#tiles div").count() == 3
+    assert said in tab.locator("#tiles div").nth(1).inner_text()
+    assert "not aligned" in tab.locator("#tiles div").first.inner_text()
+
+
+def test_the_table_of_a_report_has_the_numbers_of_csv_and_marks_the_best(report_of: Callable[..., Path], visit: Visit, run: Callable[..., Any]) -> None:
+    names = ("truth.tum", "odometry.tum", "mono.tum")
+    tab = visit(report_of(*names))
+    rows = tab.evaluate("[...document.querySelectorAll('#estimates tbody tr')].map((row) => [...row.cells].map((cell) => cell.dataset.value ?? cell.textContent))")
+    csv = run("compare", *(str(ROOT / "examples" / name) for name in names), "--align", "sim3", "-f", "csv").out.splitlines()[1:]
+    assert [[*map(float, row[1:])] for row in rows] == [[*map(float, line.split(",")[1:])] for line in csv]
+    assert [row[0] for row in rows] == [line.split(",")[0] for line in csv]
+    assert tab.locator("#estimates tr:nth-child(2) .best").count() == 8
 
 
 def test_pointing_at_a_curve_marks_its_place_on_the_path(report_of: Callable[..., Path], visit: Visit) -> None:

@@ -1,7 +1,6 @@
-// Point at a place of a path or of a curve: both show the pair, with its time and errors.  Click a title: the table sorts.
+// Point at a place of a path or of a curve: both show the pair, with its time and errors.
 
 const SVG = "http://www.w3.org/2000/svg";
-const {unit, curves} = JSON.parse(document.getElementById("samples").textContent);
 const pictures = {path: document.querySelector("#path svg"), errors: document.querySelector("#errors svg")};
 const tip = document.getElementById("tip");
 
@@ -58,17 +57,5 @@ for (const [name, svg] of Object.entries(pictures)) {
   svg.addEventListener("pointermove", look);
   svg.addEventListener("pointerdown", look);
   svg.addEventListener("pointerleave", hide);
-}
-
-// ---- the table of estimates
-for (const title of document.querySelectorAll("#estimates thead th")) {
-  title.onclick = () => {
-    const up = title.getAttribute("aria-sort") !== "ascending", at = title.cellIndex, body = title.closest("table").tBodies[0];
-    for (const each of title.parentElement.cells) each.removeAttribute("aria-sort");
-    title.setAttribute("aria-sort", up ? "ascending" : "descending");
-    const key = (row) => row.cells[at].dataset.value ?? row.cells[at].textContent;
-    const order = (a, b) => (key(a) === "") - (key(b) === "") || (at ? key(a) - key(b) : key(a).localeCompare(key(b))) * (up ? 1 : -1);
-    body.append(...[...body.rows].sort(order));
-  };
 }
 document.documentElement.dataset.ready = "1";
