@@ -227,7 +227,7 @@ def _write_names(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[c
 
 
 def _is_negative(argument: str) -> bool:
-    """Tell whether an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
+    """Return True if an argument begins as a number; most need no pattern for that, whose compiling takes longest."""
     is_long = argument[:2] == "--" and argument[2:3].isalpha()
     return argument[:1] == "-" and not is_long and re.match(NEGATIVE, argument) is not None
 
@@ -457,7 +457,7 @@ def _say_not_needed(given: Inputs) -> None:
     for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
         if chosen and not given.quiet and not any(ask in asks for _, asks in given.forms_read):
             forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
-            why = f": {forms} does not leave that open" if forms else " here"
-            say(f"note: --{ask.replace('_', '-')} changes nothing{why}")
+            why = f": {forms} specifies its {'own frames' if ask == 'frames' else 'camera axes'}" if forms else " here"
+            say(f"note: --{ask.replace('_', '-')} has no effect{why}")
 
 

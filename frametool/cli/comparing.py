@@ -69,27 +69,27 @@ def read_delta(text: str, *units: str) -> Delta:
 ALIGN = ("se3", "sim3", "yaw", "origin", "origin+scale", "none")
 pairing_options = together(
     option("--match HOW", "interpolate or nearest  [default: interpolate]", ("interpolate", "nearest")),
-    option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span, name="max_gap_ns"),
-    option("--max-diff TIME", "of nearest stamps  [default: 10ms]", read_span, name="max_diff_ns"),
-    option("--min-match SHARE", "fewer partners are an error  [default: 10%]", parse_share),
-    option("--start TIME", "first pair, a stamp of REF; +5s is after the first", _read_limit, under="Time"),
-    option("--stop TIME", "last pair", _read_limit, under="Time"),
-    option("--offset TIME|auto", "what EST's clock is behind; auto:LIMIT finds it", _read_offset),
-    option("--mount POSE|auto", "REF's body in EST's; also FILE:BODY:POINT"),
+    option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", read_span, name="max_gap_ns"),
+    option("--max-diff TIME", "largest difference of stamps  [default: 10ms]", read_span, name="max_diff_ns"),
+    option("--min-match SHARE", "fewer pairs are an error  [default: 10%]", parse_share),
+    option("--start TIME", "ignore pairs before, a stamp of REF; +5s: after the first", _read_limit, under="Time"),
+    option("--stop TIME", "ignore pairs after", _read_limit, under="Time"),
+    option("--offset TIME|auto", "seconds by which EST's clock lags; auto:LIMIT", _read_offset),
+    option("--mount POSE|auto", "pose of REF's sensor in EST's body; FILE:BODY:POINT"),
     option("--align FIT", ", ".join(ALIGN).replace("se3", "se3 (default)", 1), ALIGN),
-    option("--align-first N|10s|5m", "fit by the first pairs alone", lambda text: read_delta(text, "frames", "s", "m")),
-    option("--tie-first", "of se3, sim3, yaw: first position on first"),
-    option("--up AXIS", "of REF's world: z, -y ..  [default: z]", _read_up),
+    option("--align-first N|10s|5m", "fit to the first pairs only", lambda text: read_delta(text, "frames", "s", "m")),
+    option("--tie-first", "with se3, sim3, yaw: first positions coincide"),
+    option("--up AXIS", "up axis of REF's world: z, -y ..  [default: z]", _read_up),
 )  # fmt: skip
 error_options = together(
-    option("--delta 1m,5deg,..", "of rpe: m, s, deg, frames  [default: 1m,10m,100m]",
+    option("--delta 1m,5deg,..", "of rpe, also s, deg, frames  [default: 1m,10m,100m]",
            lambda text: tuple(map(read_delta, text.split(","))), name="deltas"),
-    option("--all-pairs", "rpe from every pose, not in a chain"),
-    option("--tolerance SHARE", "of the delta of all pairs  [default: 10%]", parse_share, requires=("all_pairs",)),
+    option("--all-pairs", "rpe from every pose, not from end to end"),
+    option("--tolerance SHARE", "of --delta with --all-pairs  [default: 10%]", parse_share, requires=("all_pairs",)),
     option("--pairs-from WHICH", "reference or estimate  [default: reference]", ("reference", "estimate")),
-    option("--segments 100,200,..", "of kitti, metres  [default: 100,200,..,800]", parse_lengths),
-    option("--segment-step N", "one from every N-th pair  [default: 10]", click.IntRange(1)),
-    option("--as", "what evo does where nothing else is said", ("evo",), name="like"),
+    option("--segments 100,200,..", "lengths of kitti, metres  [default: 100,..,800]", parse_lengths),
+    option("--segment-step N", "one for every N-th pair  [default: 10]", click.IntRange(1)),
+    option("--as", "defaults of evo", ("evo",), name="like"),
 )  # fmt: skip
 trajectory_options = option("--on-error", "bad rows", (STOP, "skip"), default=STOP, under="Rows")
 

@@ -82,7 +82,7 @@ class PoseTask:
         return request._replace(place=place, given_place=self.stream.given_place, earth=earth(), by_default=usual)
 
     def has_table(self, argument: str) -> bool:
-        """Tell whether an argument is a file of rows; it is then what -i FILE would be."""
+        """Return True if an argument is a file of rows; it is then what -i FILE would be."""
         return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
 
     def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:

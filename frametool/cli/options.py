@@ -192,29 +192,29 @@ UTF8 = Utf8()
 _of_files, _of_times, _of_rotations, _of_results, _of_forms = (
     partial(option, under=heading) for heading in ("Files", "Time", "Rotations", "Result", "Formats")
 )
-verbose_option = _of_files("-v --verbose", "say what each input was taken for")
-_IN = "form of the input (`frametool formats`), once a file"
+verbose_option = _of_files("-v --verbose", "report the detected format of each input")
+_IN = "format of the input (`frametool formats`), once per file"
 in_option = _of_files("--in FORM", _IN, Form(READ, "read"), name="input_forms", multiple=True)
 _CAMERA_AXES = _of_forms(
-    "--camera-axes", "what the axes of the cameras in a file are, which turns nothing  [default: those of its form]",
+    "--camera-axes", "axes of the cameras in a file; converts nothing  [default: those of its format]",
     CAMERA_AXES,
 )  # fmt: skip
-_STAMPS = _of_forms("--stamps FILE", "times of the poses of a form without, one a line")
+_STAMPS = _of_forms("--stamps FILE", "timestamps for poses without any, one per line")
 _EDGES = _of_forms("--edges", "read the edges of a g2o graph instead of its vertices")
 _TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)
 _ORDER = _of_forms("--from", "order of quaternions in lists of numbers", ORDERS, name="order")
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
-    _of_forms("-j --joint NAME=VALUE", "value of a joint of a robot: radians or metres, 30deg, 2cm, a POSE; "
+    _of_forms("-j --joint NAME=VALUE", "value of a robot's joint: radians or metres, 30deg, 2cm, a POSE; "
               "may be repeated", JointSetting(), name="joints", multiple=True),
-    _of_forms("--joints FILE", "values of joints: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
+    _of_forms("--joints FILE", "joint values: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
               multiple=True),
-    _of_forms("--frames WORLD,BODY", "names of frames that a form does not name; may be repeated, "
+    _of_forms("--frames WORLD,BODY", "frame names that a format does not store; may be repeated, "
               "in the order of the files", name="named_frames", multiple=True),
-    _of_forms("--direction", "of matrices whose key does not say which frame they are seen from", DIRECTIONS),
+    _of_forms("--direction", "direction of matrices whose key does not say it", DIRECTIONS),
     _CAMERA_AXES,
-    _of_forms("--dh", "which Denavit-Hartenberg parameters a table holds", DH),
+    _of_forms("--dh", "convention of Denavit-Hartenberg parameters", DH),
     _STAMPS,
 )  # fmt: skip
 
@@ -229,7 +229,7 @@ def reading_options(
     """
     if streams:
         return together(_TOPIC, *(camera_axes if each is _CAMERA_AXES else each for each in _READING))
-    quiet = _of_files("--quiet", "no word on what files were taken for")
+    quiet = _of_files("--quiet", "suppress notes on files")
     return together(in_option, *[_TOPIC] * topics, quiet, *_READING, *[_ORDER] * order)
 
 
@@ -254,8 +254,8 @@ def say_if_verbose(text: str) -> None:
 
 _PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", Digits())
 _PLACE = (
-    _of_results("-o --output FILE", "write this file, whole or not at all"),
-    _of_results("--force", "let --output replace a file", requires=("output", "report")),
+    _of_results("-o --output FILE", "write to this file, atomically"),
+    _of_results("--force", "let --output overwrite a file", requires=("output", "report")),
 )
 
 
@@ -272,12 +272,12 @@ def parse_messages(text: str) -> tuple[str, ...]:
 
 
 _RECORDING = (
-    _of_results("--messages KIND,..", f"messages of a recording: {', '.join(MESSAGES)}  [default: as the rows are]",
+    _of_results("--messages KIND,..", f"message types of a recording: {', '.join(MESSAGES)}  [default: by the rows]",
                 parse_messages, default=()),
-    _of_results("--topic-out NAME", "the topic of a recording with one"),
+    _of_results("--topic-out NAME", "topic of the messages of a recording"),
 )  # fmt: skip
 # of commands that have no --frames for what they read
-_FRAMES_OUT = "what the frames of poses in a recording are called; adds /tf"
+_FRAMES_OUT = "names of the frames of poses in a recording; adds /tf"
 frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, name="recorded_frames")
 
 
@@ -305,17 +305,17 @@ _TO = together(
     _of_rotations("--deg", "angles in degrees"),
 )  # fmt: skip
 _SIGNS = together(
-    _of_rotations("--keep-sign", "leave the quaternion's sign as it comes out"),
-    _of_rotations("--local-axes", "what rotations at a place on the Earth are given in (help earth)",
+    _of_rotations("--keep-sign", "do not normalize the quaternion's sign to w >= 0"),
+    _of_rotations("--local-axes", "axes of rotations at a position on the Earth (help earth)",
                   ("enu", "ned", "grid", "ecef")),
-    _of_rotations("--origin PLACE|first", "where east north up 0 0 0 is"),
-    _of_rotations("--zone 32N", "the one zone of UTM"),
+    _of_rotations("--origin PLACE|first", "position of east north up 0 0 0"),
+    _of_rotations("--zone 32N", "UTM zone for all positions"),
 )  # fmt: skip
 # how poses are read; how rotations are written; both
-pose_options = _of_rotations("--normalize", "take any non-zero quaternion, matrices off by 0.1")
+pose_options = _of_rotations("--normalize", "accept any non-zero quaternion, matrices off by 0.1")
 rotation_options = together(_TO, _SIGNS)
 whole_pose_options = together(_TO, pose_options, _SIGNS)
-scale_option = option("--scale", "take a matrix s R as a similarity of scale s")
+scale_option = option("--scale", "read a matrix s R as a similarity with scale s")
 
 
 def pose_result_options(*what: str) -> Adds:
@@ -416,23 +416,23 @@ def at_ns(chosen: int | str | None) -> int | None:
 LIMIT = Time(latest=False)
 # how moving frames are taken
 rules_options = together(
-    _of_times("--moving", "an edge with one stamp answers only that instant"),
-    _of_times("--cache SECONDS", "forget what is older  [default: nothing]", LIMIT),
+    _of_times("--moving", "an edge with one timestamp is valid only at that time"),
+    _of_times("--cache SECONDS", "drop older transforms  [default: none]", LIMIT),
 )
-_TIMES = "many: T,T,.., START:STOP:STEP, or the stamps of FILE"
+_TIMES = "several: T,T,.., START:STOP:STEP, or the stamps of FILE"
 times_option = _of_times("--times TIMES", _TIMES, excludes=("explain",))
-_OFFSET = "add this to all stamps read; first: they begin at 0"
+_OFFSET = "add this to all timestamps read; first: start at 0"
 offset_option = _of_times("--time-offset SECONDS|first", _OFFSET, Offset(latest=False))
 limit_options = together(
-    _of_times("--start TIME", "leave out what is before", LIMIT),
-    _of_times("--stop TIME", "leave out what is after", LIMIT),
+    _of_times("--start TIME", "ignore everything before", LIMIT),
+    _of_times("--stop TIME", "ignore everything after", LIMIT),
     offset_option,
 )
 # a command of files of frames; of one tree whose frames may move; and one that writes poses of it
 file_options = together(reading_options(), verbose_option, pose_options)
 moving_options = together(rules_options, offset_option, reading_options(order=False), verbose_option)
 tree_options = together(moving_options, _ORDER, whole_pose_options)
-_COLOR = "colour of the text; auto is on a terminal, and NO_COLOR is heeded"
+_COLOR = "colour of the text; auto: on terminals, unless NO_COLOR is set"
 color_option = _of_results("--color", _COLOR, ("auto", "always", "never"), default="auto")
 
 

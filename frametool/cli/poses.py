@@ -194,7 +194,7 @@ def pose_source(argument: str | Source, request: Request) -> Source:
         parse_documents(source.text, source.name)  # raises where it is broken
         text, count = at_other_times(source.text, request.offset_ns)
         if not count:
-            raise FormatError("--time-offset changes nothing: no stamps in it", source=source.name)
+            raise FormatError("--time-offset has no effect: no timestamps in it", source=source.name)
         source = Source(source.name, text)
     if source.name != INLINE and source.text.lstrip().startswith("<"):
         from frametool.formats.detect import refuse_robots

@@ -55,41 +55,41 @@ _of_turtles = partial(option, under="Turtles")
 def follow_options(duration: str) -> Callable[[Any], Any]:
     """Add to a command the options of followers; `duration` is how long it runs by default."""
     return together(
-        option("--followers N", "each follows the one before, the first follows turtle1", click.IntRange(0, 1000),
+        option("--followers N", "each follows the previous one, the first follows turtle1", click.IntRange(0, 1000),
                default=1),
         option("--law", "the tutorial's listener: 10 Hz and gains 0.5, 4 (ros1), or 1 Hz and 0.5, 1 (ros2)", (*LAWS,),
                default="ros1"),
-        option("--rate HZ", "control steps a second", parse_number),
+        option("--rate HZ", "control steps per second", parse_number),
         _of_turtles("--gain-linear K", "speed for each metre of distance", parse_number),
         _of_turtles("--gain-angular K", "turn rate for each radian of bearing", parse_number),
         _of_turtles("--max-linear V", "fastest speed in m/s  [default: none]", parse_number),
         _of_turtles("--max-angular W", "fastest turn in rad/s  [default: none]", parse_number),
         _of_turtles("--target", "the leader, a carrot 2 m to its left, or a carrot that circles it at 10 m", TARGETS,
                     default="leader"),
-        _of_turtles("--delay S", "follow where the target was so long ago, looked up through world  [default: 0]",
+        _of_turtles("--delay S", "follow the target's past position, looked up through world  [default: 0]",
                     parse_seconds, default=0.0),
-        option("--spawn X,Y,THETA", "where turtle2 begins: metres, radians (or 90deg)", parse_spawn, default="4,2,0"),
+        option("--spawn X,Y,THETA", "start of turtle2: metres, radians (or 90deg)", parse_spawn, default="4,2,0"),
         option("--duration S", "simulated seconds, or inf", parse_duration, default=duration),
         _of_turtles("--turtlesim", "whose turtlesim", VARIANTS, default="ros1"),
-        _of_turtles("--holonomic", "let linear.y count in ROS 2, as the node's parameter does"),
-        _of_turtles("--seed", "of the random leader", click.IntRange(0), default=0),
+        _of_turtles("--holonomic", "use linear.y in ROS 2, like the node's parameter"),
+        _of_turtles("--seed", "seed of the random leader", click.IntRange(0), default=0),
     )  # fmt: skip
 
 
 output_options = together(  # what is shown of a run
-    option("--emit", "followers' velocity commands, every turtle's pose a tick, or transforms for `lookup -`", EMITS,
+    option("--emit", "velocity commands of followers, poses of all turtles, or transforms for `lookup -`", EMITS,
            default="commands"),
-    _of_turtles("--reach D", "metres that count as having come to the target", parse_number, default=0.5),
-    _of_turtles("--realtime", "one simulated second a second, instead of as fast as possible"),
+    _of_turtles("--reach D", "distance in metres at which the target is reached", parse_number, default=0.5),
+    _of_turtles("--realtime", "run in real time, instead of as fast as possible"),
     option("--live", "draw the turtles in the terminal, in real time"),
-    option("--view FILE.html", "show their frames over time in a page, as `view`", file_with(".html")),
-    option("-f --format", "form of the records  [default: text on a terminal, yaml otherwise]", FORMS,
+    option("--view FILE.html", "show the frames over time on a page, like `view`", file_with(".html")),
+    option("-f --format", "format of the records  [default: text on a terminal, yaml otherwise]", FORMS,
            name="format_name"),
     option("--precision N|full", "digits after the point  [default: the shortest text that reads back to the same "
            "bits]", Digits(), under="Result"),
-    option("-o --output FILE", "write there instead of stdout, whole or not at all", under="Result"),
+    option("-o --output FILE", "write to this file instead of stdout, atomically", under="Result"),
     option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(".svg", ".html", ".png")),
-    option("--force", "let --output and --plot replace existing files", requires=("output", "plot", "view"),
+    option("--force", "let --output and --plot overwrite files", requires=("output", "plot", "view"),
            under="Result"),
 )  # fmt: skip
 

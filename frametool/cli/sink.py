@@ -118,7 +118,7 @@ def refuse_existing(path: str | None, *, force: bool) -> None:
 
 
 def is_special(path: str) -> bool:
-    """Tell whether a path leads to something that is no plain file: a device, a pipe, a folder, an own stream."""
+    """Return True if a path leads to something that is no plain file: a device, a pipe, a folder, an own stream."""
     return _own_stream(path) is not None or (os.path.exists(path) and not os.path.isfile(path))
 
 

@@ -57,7 +57,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     if unknown:
         warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
     if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
-        _tell_taken(inputs, f"in no loop, so that nothing checks them: {first_of(alone, 5)}")
+        _tell_taken(inputs, f"in no loop, cannot be cross-checked: {first_of(alone, 5)}")
     labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
     rows = _rows(found, labels, checked=list(map(bool, found.checked)), fits=found.fits)
     return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
@@ -91,7 +91,8 @@ def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
     for each in recordings:
         own = [row for row in found if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
-        _tell_taken(inputs, f"{each.name}: {len(own)} rows, each the pose of child in parent{first}")
+        rows = f"{len(own)} row{'s' * (len(own) != 1)}"
+        _tell_taken(inputs, f"{each.name}: {rows}, each the pose of child in parent{first}")
     return without(found, inputs.without)
 
 

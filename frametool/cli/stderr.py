@@ -115,7 +115,7 @@ def words_of(trouble: Exception) -> str:
 
 
 def wants_json(arguments: Sequence[str]) -> bool:
-    """Tell whether the arguments of a command ask for JSON."""
+    """Return True if the arguments of a command ask for JSON."""
     if "--format=json" in arguments or "-fjson" in arguments:
         return True
     return any(option in ("-f", "--format") and value == "json" for option, value in pairwise(arguments))

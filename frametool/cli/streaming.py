@@ -34,19 +34,19 @@ RECORDS = readers("records")
 
 _of_rows = partial(option, under="Rows")
 _ROWS = (
-    option("--from REP", "what unnamed numbers are", options.Notations(), name="given", under="Rotations"),
-    _of_rows("--columns NAME,..", "our columns, by name or number, once for each pose; one key of records, a.b",
+    option("--from REP", "representation of bare numbers", options.Notations(), name="given", under="Rotations"),
+    _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
              options.ColumnNames(), multiple=True),
-    _of_rows("--keep", "add the result's columns, leave ours"),
-    _of_rows("--prefix TEXT", "begin the names of the result's columns so", options.UTF8, default=""),
+    _of_rows("--keep", "append result columns, keep the input's"),
+    _of_rows("--prefix TEXT", "prefix of the result's column names", options.UTF8, default=""),
     _of_rows("--on-error", "bad rows", ON_ERROR, default=STOP),
-    _of_rows("--max-errors N", "report at most N bad rows, count all", click.IntRange(0), default=MOST),
-    _of_rows("--no-header", "a table without names; columns are numbered", name="header",
+    _of_rows("--max-errors N", "report at most N bad rows, but count all", click.IntRange(0), default=MOST),
+    _of_rows("--no-header", "table without a header; columns are numbered", name="header",
              callback=lambda _context, _option, chosen: not chosen),
-    option("--quiet", "no progress and no word on forms on stderr", under="Files"),
+    option("--quiet", "suppress progress and notes on files", under="Files"),
 )  # fmt: skip
-_INPUT = _of_rows("-i --input FILE", "stream this file instead of standard input", name="input_path")
-_SEVERAL = "stream this file, not stdin; several clouds become one"
+_INPUT = _of_rows("-i --input FILE", "read this file instead of standard input", name="input_path")
+_SEVERAL = "read this file, not stdin; several clouds become one"
 SEVERAL = _of_rows("-i --input FILE", _SEVERAL, name="input_path", multiple=True)
 
 
@@ -142,13 +142,13 @@ class Stream:
                 yield bytes(made.text)
 
     def has_input(self) -> bool:
-        """Tell whether something is piped in."""
+        """Return True if something is piped in."""
         if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
             return False
         return bool(self.opened().peek(1))
 
     def is_wanted(self, argument: object) -> bool:
-        """Tell whether standard input or -i FILE is to be read in this argument's place."""
+        """Return True if standard input or -i FILE is to be read in this argument's place."""
         if self.path is not None and argument not in (None, "-"):
             raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
         return self.path is not None or argument in (None, "-")
@@ -313,7 +313,7 @@ class Stream:
         return run_table(stream, form, request, source=self.name, header=self.inputs.header), None
 
     def _says_columns(self) -> bool:
-        """Tell whether an option says that the stream is a table."""
+        """Return True if an option says that the stream is a table."""
         looked = self.inputs.peek
         return bool(looked("columns") or looked("keep") or looked("prefix") or looked("header") is False)
 

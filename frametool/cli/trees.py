@@ -200,7 +200,7 @@ def opened(
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:
-            say(f"note: --frames {','.join(names)} changes nothing: {file.name} names its own frames")
+            say(f"note: --frames {','.join(names)} has no effect: {file.name} names its own frames")
     chosen.forms_read = (*chosen.forms_read, *((file.form, file.required_options) for file in found))
     return found
 

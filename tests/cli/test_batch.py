@@ -158,7 +158,7 @@ def test_a_kept_pose_has_all_its_bits(run: Run) -> None:
         ("convert $HOME", "unknown name $HOME; names: base; variables of the shell are not known here"),
         ("convert $1", "$1 names nothing"),
         ("batch more.txt", "a batch runs no batch"),
-        ("frametool convert 1", "leave that word out"),
+        ("frametool convert 1", "omit the word `frametool`"),
         ("convert -", "standard input is not for the lines of a batch"),
         ("calc", "standard input is not for the lines of a batch"),
         ("monitor -", "standard input is not for the lines of a batch"),

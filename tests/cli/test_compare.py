@@ -123,7 +123,7 @@ def test_what_is_not_determined_is_refused_in_one_line(run: Run, arguments: tupl
 def test_limits_decide_the_exit_status(run: Run, limits: str, status: int) -> None:
     done = run("compare", *DRONE, "--fail", limits, files=FILES)
     assert done.status == status
-    assert ("limit passed" in done.err) == (status == 1)
+    assert ("limit exceeded" in done.err) == (status == 1)
 
 
 def test_trouble_is_no_limit_passed(run: Run) -> None:

@@ -131,7 +131,7 @@ measurements:
 TOLD = """\
 frametool: m.yaml: 6 rows, each the pose of child in parent: base_link<-lidar ..
 frametool: warning: 2 loops do not tell metres from radians: the sigmas are rough; give sigma
-frametool: in no loop, so that nothing checks them: m.yaml:7
+frametool: in no loop, cannot be cross-checked: m.yaml:7
 4 frames from 5 of 6 measurements, 4 in loops; rms 0.5 mm 7e-05 deg
 noise of one axis 0.5 mm 3e-03 deg, estimated
   frame            x        y        z  sigma mm   deg  rows

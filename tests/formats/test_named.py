@@ -127,7 +127,7 @@ def test_what_was_assumed_is_told_and_changed_by_frames(run: Run) -> None:
 
 def test_frames_that_change_nothing_are_told(run: Run) -> None:
     files = {"e.yaml": "a: {parent: w, xyz: [0, 0, 1], yaw: 0}\nb: {parent: w, xyz: [0, 0, 2], yaw: 0}\n"}
-    said = "--frames map changes nothing: each pose names its parent"
+    said = "--frames map has no effect: each pose names its parent"
     assert said in run("tree", "e.yaml", "--frames", "map", files=files).err
 
 

@@ -231,7 +231,7 @@ def test_stated_axes_override_those_of_the_form_and_turn_nothing_by_themselves(s
         expected = (turn @ plain if way == "relative" else plain) @ turn
         assert abs(found - expected).max() < 1e-12, stated
         assert ("camera axes turned" in told) == (INTO[target] not in ("", stated)), told
-        assert ("--camera-axes changes nothing" in told) == (source not in AXES and not INTO[target]), told
+        assert ("--camera-axes has no effect" in told) == (source not in AXES and not INTO[target]), told
 
 
 @pytest.mark.parametrize("source", AXES)

@@ -13,22 +13,22 @@ from frametool.stream.faults import ROWS_SKIPPED
 @argument("ref")
 @argument("est")
 @pairing_options
-@option("--names REF,EST", "names of the two worlds  [default: as they are called]")
+@option("--names REF,EST", "names of the two worlds  [default: their own]")
 @trajectory_options
 @reading_options()
 @rotation_options
 @result_options("poses")
 def command(inputs: Inputs) -> int:
-    """Print where EST's world is in REF's: the fit that `compare` makes, as an entry of a tree.
+    """Print the pose of EST's world in REF's, as `compare` fits it, as a tree entry.
 
     \b
       frametool align truth.tum odometry.tum --offset auto --names map,odom
       frametool align truth.tum odometry.tum --offset auto -o aligned.tum
       frametool align truth.tum mono.tum --align sim3 --to matrix
 
-    -o FILE takes all of EST as it was compared: on REF's clock, mounted and moved, in the form of its suffix or of -f.
-    `frametool help trajectories` says what is fitted. The scale of sim3 is beside the pose: p' = scale R p + t; such
-    an entry is no part of a tree.
+    -o FILE writes all of EST as it was compared: on REF's clock, with the mount and the fit applied, in the format of
+    its suffix or of -f. `frametool help trajectories` describes the fits. The scale of sim3 is separate from the pose:
+    p' = scale R p + t; such an entry cannot be part of a tree.
     """
     into = Output(inputs, "poses") if inputs.output else None
     entry = Output(inputs.but(output=None, format_name=None) if into else inputs, "poses")

@@ -38,16 +38,16 @@ CHOICES = ("point", "vector", "pose", "twist", "wrench")
 @command_named("apply", own=("input_path", "output"))
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE TARGET [SOURCE]] [X Y Z | RECORD]..")
 @option("--transform POSE", "move by this pose, not by a lookup", name="pose", excludes=("at", "time_column"))
-@option("--as KIND", "point, vector, pose, twist, wrench; once a --columns", CHOICES, name="kinds", multiple=True)
+@option("--as KIND", "point, vector, pose, twist, wrench; once per --columns", CHOICES, name="kinds", multiple=True)
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
 @partial(stream_options, first=SEVERAL)
 @options.pose_result_options("points", "trajectory")
-@option("--covariance", "also that of the tree's edges, or of --transform", excludes=("explain",))
+@option("--covariance", "include that of the tree's edges, or of --transform", excludes=("explain",))
 @options.scale_option
 @EXPLAIN
-@option("--frame-column NAME", "column with each row's frame, without SOURCE", options.ColumnNames())
-@option("--time-column NAME", "column or key of each row's own time", options.ColumnNames(), excludes=("at",))
-@option("--at TIME", "move all at this time  [default: latest]", options.TIME)
+@option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.ColumnNames())
+@option("--time-column NAME", "column or key with the time of each row", options.ColumnNames(), excludes=("at",))
+@option("--at TIME", "one time for all  [default: latest]", options.TIME)
 @options.rules_options
 @options.offset_option
 @options.reading_options(streams=True)
@@ -60,8 +60,8 @@ def command(inputs: Inputs) -> int:
       frametool apply robot.yaml map '{frame: lidar, point: [1, 0, 0]}'
       frametool apply robot.yaml base_link lidar -i cloud.csv
 
-    A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its
-    frame. -i FILE or stdin holds many: rows, JSON lines, clouds, what `ros2 topic echo` prints.
+    A RECORD is a pose, {vector: [x, y, z]} or a point, also X Y Z (help records). Without SOURCE it names its frame. -i
+    FILE or stdin holds several: rows, JSON lines, clouds, what `ros2 topic echo` prints.
     """
     task = PoseTask(inputs, "points", "trajectory")
     stream, output, plan = task.stream, task.output, task.plan

@@ -243,7 +243,7 @@ def _refuse(words: Sequence[str]) -> None:
     if words[0] == "batch":
         raise Misused("a batch runs no batch; put the lines of that one here")
     if words[0] == "frametool":
-        raise Misused("a line is what stands behind frametool; leave that word out")
+        raise Misused("omit the word `frametool`: a line begins with the command")
     endless = next((each for each in words if each in ENDLESS), "")
     if words[0] == "sim" and (endless or "--duration inf" in " ".join(words)):
         raise Misused(f"sim {endless or '--duration inf'} keeps the lines behind it waiting; run it alone")
@@ -268,9 +268,9 @@ class _NoInput(TextIOBase):
 
 @command_named("batch", epilog=EXIT_CODES)
 @argument("file", FILE, default="-", metavar="[FILE]")
-@option("--on-error", "end at a line that fails, or report it and go on", (STOP, SKIP), name="on_failure", default=STOP)
+@option("--on-error", "stop at a line that fails, or report and skip it", (STOP, SKIP), name="on_failure", default=STOP)
 def command(inputs: Inputs) -> int:
-    """Run the commands of FILE, or of standard input, in one process: one a line, as typed behind frametool.
+    """Run the commands of FILE, or of standard input, in one process: one per line, as typed after frametool.
 
     \b
       frametool batch commands.txt
@@ -281,17 +281,17 @@ def command(inputs: Inputs) -> int:
       base = lookup robot.yaml map base_link                  # kept, not printed
       compose $base '{xyz: [0, 0, 1]}' --to rpy_deg
 
-    Each line prints what it prints alone into a pipe, and nothing stands between; a pipe is answered line by line.
-    Files of frames that several lines name are read once, and anew when they have changed.
+    Each line prints what it prints alone into a pipe, without separators; a pipe is answered line by line. Files of
+    frames that several lines name are read once, and again when they have changed.
 
     NAME = COMMAND keeps a pose, point, number or tree instead of printing it; $NAME or ${NAME} in an argument is then
-    that result, with all its digits. Words are a shell's: in 'single quotes' all is as written, in "double quotes" and
-    bare $NAME counts, \\ takes the next character as it is, $$ is a dollar sign, # begins a comment, and a backslash at
-    its end joins a line with the next. Pipes, > and < are not for a batch.
+    that result, with all its digits. Words are quoted as in a shell: 'single quotes' keep everything as written, $NAME
+    is replaced in "double quotes" and in bare words, \\ keeps the next character, $$ is a dollar sign, # begins a
+    comment, and a backslash at its end joins a line with the next. Pipes, > and < are not available.
 
-    A line that fails is reported with its number: commands.txt:12: .. The status is that of the failed line, or 3
-    where lines were skipped. Standard input is not for the lines: name files. A line cannot be a batch itself, nor run
-    on the clock or without end, as sim --realtime does.
+    A line that fails is reported with its number: commands.txt:12: .. The exit code is that of the failed line, or 3 if
+    lines were skipped. Lines cannot read standard input: name files. A line cannot be another batch, nor run in real
+    time or without end, like sim --realtime.
     """
     file, skips = inputs.file, inputs.on_failure == SKIP
     stream = opened(file)

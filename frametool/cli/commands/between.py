@@ -31,8 +31,8 @@ def command(inputs: Inputs) -> None:
       frametool between 0 0 1 0.1 -0.2 9.7
       frametool between '{x: 0, y: 0, z: 1}' '[1, 1, 0]'
 
-    A vector is three numbers or a mapping, of any length but 0. Between opposite directions every axis at right
-    angles to them does; one is taken, and stderr says so.
+    A vector is three numbers or a mapping, of any length but 0. For opposite directions any perpendicular axis is
+    valid; one is chosen and reported.
     """
     output = Output(inputs, "poses")
     start, end = _directions(inputs.vectors)

@@ -47,7 +47,7 @@ def _begins_with_minus(argument: str) -> bool:
 @command_named("calc", own=("input_path",), cls=CalcCommand)
 @argument("arguments", Expression(), nargs=-1, metavar="[NAME=FILE ..] [EXPR ..]")
 @option("--tree FILE", "the tree of look-ups; may be repeated  [default: FRAMETOOL_TREE]", name="trees", multiple=True)
-@option("-e NAME=EXPR", "a row's result in columns of its own: NAME, NAME_x ..; may be repeated; also EXPR, @FILE",
+@option("-e NAME=EXPR", "a result in its own columns: NAME, NAME_x ..; may be repeated; also EXPR, @FILE",
     Expression(), name="expressions", multiple=True)
 @option("--as", "what the rows are  [default: as they look]", KINDS, name="kind")
 @option("--time-column NAME", "of the time of @ row  [default: the one that looks so]", ColumnNames(), under="Time")

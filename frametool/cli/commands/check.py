@@ -45,15 +45,15 @@ class CheckCommand(Command):
 
 @command_named("check", cls=CheckCommand)
 @argument("files", FILE, nargs=-1, required=True)
-@option("-f --format", "how findings are written", (*WRITERS,), name="form", default="text")
-@option("--strict", "let warnings fail too")
+@option("-f --format", "format of the findings", (*WRITERS,), name="form", default="text")
+@option("--strict", "exit with 1 for warnings too")
 @option("--measured FILE", "compare these measurements (help solve) too", excludes=("each",), multiple=True)
-@option("--tolerance LENGTH,ANGLE", "what they may be off  [3 sigmas, or 10mm,1deg]", requires=("measured",),
+@option("--tolerance LENGTH,ANGLE", "their allowed deviation  [3 sigmas, or 10mm,1deg]", requires=("measured",),
         kind=partial(parse_tolerance, otherwise=Tolerance(0.01, radians(1.0))))  # fmt: skip
-@option("--each", "check each file on its own; one without frames is a warning")
+@option("--each", "check each file separately; one without frames is a warning")
 @file_options
 def command(inputs: Inputs) -> int:
-    """Look for mistakes in FILES, trees and recordings, taken as one tree.
+    """Look for mistakes in FILES, trees and recordings, read as one tree.
 
     \b
       frametool check robot.yaml
@@ -62,8 +62,8 @@ def command(inputs: Inputs) -> int:
       frametool check robot.yaml drive.yaml -f json || true
       frametool check --each robot.yaml arm.urdf camchain.yaml
 
-    Each finding is one line: file:line:column: level: message [rule]. The status is 1 if there is an error, with
-    --strict also if there is a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
+    Each finding is one line: file:line:column: level: message [rule]. The exit code is 1 if there is an error, with
+    --strict also for a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
     """
     files, measured, normalize = inputs.files, inputs.measured, inputs.normalize
     form, strict = inputs.form, inputs.strict

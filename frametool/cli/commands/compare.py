@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from frametool.fit.comparison import Comparison
     from frametool.fit.numbers import Limit
 
-PASSED, TROUBLE = 1, 2
-EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 holds, 1 passed, 2 trouble."
+EXCEEDED, TROUBLE = 1, 2
+EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 5 file; --fail: 0 within, 1 exceeded, 2 error."
 TABLES = ("csv", "markdown", "latex")
 REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
 
@@ -43,16 +43,16 @@ def _read_limits(text: str) -> list[Limit]:
 @argument("est", nargs=-1, required=True, metavar="EST..")
 @pairing_options
 @error_options
-@option("--rows [=ate|rpe|kitti]", "one a pair, step or stretch of path: CSV, JSON", OPTIONAL["--rows"])
+@option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON", OPTIONAL["--rows"])
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result")
-@option("--fail LIMIT,..", "end with 1 where a number passes one: ate>5cm", _read_limits,
+@option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits,
     name="limits")  # fmt: skip
-@option("--report FILE.html|svg", "also a plot of it, in one file; -o: instead", file_with(*REPORTS))
+@option("--report FILE.html|svg", "also write a report in one file; with -o instead", file_with(*REPORTS))
 @trajectory_options
 @reading_options()
 @list_options("markdown", "latex")
 def command(inputs: Inputs) -> int:
-    """Compare trajectories with a reference: errors in place and along the way.
+    """Compare trajectories with a reference: absolute and relative errors.
 
     \b
       frametool compare truth.tum odometry.tum --offset auto
@@ -60,7 +60,7 @@ def command(inputs: Inputs) -> int:
       frametool compare antenna.csv truth.tum --mount auto --report error.html
       frametool compare truth.tum mono.tum --align sim3 --fail 'ate>1m,paired<90%'
 
-    REF and EST are trajectories or positions in any form (help trajectories).
+    REF and EST are trajectories or positions in any format (help trajectories).
     """
     path, told, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
     limits, est = inputs.limits, inputs.est
@@ -92,8 +92,8 @@ def command(inputs: Inputs) -> int:
             error.exit_code = TROUBLE
         raise
     for each, limit, now in passed:
-        say(f"limit passed: {each['est']}: {limit.name} is {now:.6g}, {limit.text}")
-    return PASSED if passed else (TROUBLE if limits else ROWS_SKIPPED) if skipped else 0
+        say(f"limit exceeded: {each['est']}: {limit.name} is {now:.6g}, {limit.text}")
+    return EXCEEDED if passed else (TROUBLE if limits else ROWS_SKIPPED) if skipped else 0
 
 
 def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> None:

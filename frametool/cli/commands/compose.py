@@ -30,8 +30,8 @@ def command(inputs: Inputs) -> int:
       frametool compose 'inv({xyz: [1, 2, 3]})' '~{rpy_deg: [0, 0, 90]}'
       frametool compose inv '{rpy_deg: [0, 0, 90]}' '{xyz: [14, -4, 0]}'
 
-    POSE is a mapping, a file, or - for standard input. Where poses name their frames, the frames must touch. The
-    inverse of any of them is inv(POSE) or ~POSE, in quotes, or the word inv before it.
+    POSE is a mapping, a file, or - for standard input. If poses name their frames, adjacent frames must match. The
+    inverse of a pose is inv(POSE) or ~POSE, in quotes, or the word inv before it.
     """
     task, poses = PoseTask(inputs), inputs.poses
     if task.derives:

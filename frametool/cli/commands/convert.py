@@ -43,16 +43,16 @@ class ConvertCommand(Command):
 @command_named("convert", own=("given", "notations"), cls=ConvertCommand)
 @argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
 @option("--axes NAME", "the pose at the same place in these axes (help axes)", AXES)
-@option("--world-axes A_from_B", "axes of the frame it is seen from (help axes)", AXES, name="world")
+@option("--world-axes A_from_B", "axes of the reference frame (help axes)", AXES, name="world")
 @option("--all-axes A_from_B", "axes of both: unity_from_ros, or x,-y,-z", AXES, excludes=("axes", "world"))
 @option("--find A,B,C", "Euler conventions with these angles (help euler)")
-@option("--tolerance RAD", "how near --find wants it  [default: 1e-06]", parse_number, requires=("find",), default=1e-6)
+@option("--tolerance RAD", "tolerance of --find  [default: 1e-06]", parse_number, requires=("find",), default=1e-6)
 @pose_stream_options
 @options.pose_result_options("poses", "points")
 @options.frames_out_option
 @EXPLAIN
-@option("--unwrap", "let angles go on beyond half a turn")
-@option("--time-column NAME", "column or key of stamps, for the next three", options.ColumnNames(),
+@option("--unwrap", "continue angles beyond half a turn")
+@option("--time-column NAME", "column or key of the timestamps, for the next three", options.ColumnNames(),
     requires=("time_offset", "start", "stop"), under="Time")  # fmt: skip
 @options.limit_options
 def command(inputs: Inputs) -> int:
@@ -203,6 +203,6 @@ def _say_other_side(axes: str | None, world: str | None) -> None:
     from frametool.geometry.conventions import other_side
 
     if axes and world is None and (other := other_side(axes, of_world=False)):
-        say(f"note: the frame that poses are seen from keeps its axes; --world-axes {other} changes them")
+        say(f"note: only the body axes changed; the world axes are as before (--world-axes {other})")
     if world and axes is None and (other := other_side(world, of_world=True)):
-        say(f"note: the frames that these are the poses of keep their axes; --axes {other} changes them")
+        say(f"note: only the world axes changed; the body axes are as before (--axes {other})")

@@ -27,27 +27,27 @@ EXIT_CODES = "Exit codes: 0 the same, 1 different, 2 trouble of any kind, with f
 @option("--with-a FILE", "merge this file into A; may be repeated", multiple=True)
 @option("--with-b FILE", "merge this file into B; may be repeated", multiple=True)
 @option("--at TIME", "compare at this time: seconds, nanoseconds with ns  [default: the latest of each]", TIME)
-@option("--seen-from FRAME", "tell how far frames moved as seen from here too  [default: the root of A]", FRAME)
-@option("--tolerance LENGTH,ANGLE", "what still counts as the same, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]",
+@option("--seen-from FRAME", "also show motion as seen from this frame  [default: the root of A]", FRAME)
+@option("--tolerance LENGTH,ANGLE", "largest difference that is ignored, e.g. 1mm,0.1deg  [default: 1e-9 m, 1e-9 rad]",
     parse_tolerance, default=Tolerance())  # fmt: skip
-@option("--all", "list the frames that did not move, too", name="everything")
+@option("--all", "also list the frames that did not move", name="everything")
 @file_options
 @list_options("github")
 def command(inputs: Inputs) -> int:
-    """Compare two trees, calibrations or recordings, A and B, in any forms.
+    """Compare two trees, calibrations or recordings, A and B, in any formats.
 
     \b
       frametool diff robot.yaml robot.yaml
       sed 's/0.285/0.3/' robot.yaml | frametool diff - robot.yaml --tolerance 9mm
       frametool diff drive.yaml drive.yaml --at 2.5 --seen-from base_link
 
-    Told are the frames that only one has, those that hang under another parent, and of all others how far they moved
-    from A to B: in their own parent, and as seen from the root, so that two ways to build one robot compare too. The
-    farthest comes first; what only went along with its parent stands behind. Signs of quaternions and the order of
-    names do not count. What moves is compared at its latest and sample by sample, or with --at at one time.
+    Lists frames that only one has, frames with another parent, and for all others how far they moved from A to B: in
+    their own parent, and as seen from the root, so that two structures of one robot can be compared. The largest motion
+    comes first, frames that only moved with their parent last. Signs of quaternions and the order of names are ignored.
+    Moving frames are compared at their latest time and sample by sample, or with --at at one time.
 
-    A and B are files, - for standard input, or . for the file that FRAMETOOL_TREE names. --in and --frames are taken
-    in the order of the files: A, those of --with-a, B, those of --with-b; given for A only they count for both.
+    A and B are files, - for standard input, or . for the file that FRAMETOOL_TREE names. --in and --frames are taken in
+    the order of the files: A, those of --with-a, B, those of --with-b; given only for A they apply to both.
     """
     output = Output(inputs, "report", otherwise="text")
     sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)

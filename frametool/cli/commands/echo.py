@@ -29,26 +29,26 @@ if TYPE_CHECKING:
 @argument("tree", FILE)
 @argument("target", FRAME)
 @argument("source", FRAME)
-@option("--rate HZ", "blocks a second, in the time of the recording", lambda text: checked_rate(parse_number(text)),
+@option("--rate HZ", "blocks per second, in the time of the recording", lambda text: checked_rate(parse_number(text)),
         default=1.0)
 @option("--start T", "begin there  [default: when all edges have data]", LIMIT, under="Time")
 @option("--stop T", "end there  [default: when the first edge has no more]", LIMIT, under="Time")
-@option("-l --limit N", "at most so many blocks", click.IntRange(1))
+@option("-l --limit N", "print at most N blocks", click.IntRange(1))
 @option("--with FILE", "merge this file too; may be repeated", name="more", multiple=True, under="Files")
 @tree_options
 @result_options("poses")
 def command(inputs: Inputs) -> int:
-    """Print the pose of SOURCE in TARGET, time after time, as tf2_echo does on a running robot.
+    """Print the pose of SOURCE in TARGET over time, like tf2_echo on a running robot.
 
     \b
       frametool echo drive.yaml map base_link
       frametool echo drive.yaml map lidar --rate 10 --format csv
       frametool echo drive.yaml lidar box --start 2.5 --limit 1 --precision 6
 
-    Order is TARGET SOURCE, and the first line says in words what is seen from what: tf2_echo names its arguments the
-    other way round and then does the same. Blocks are text unless --format or the suffix of --output says otherwise;
-    they have 3 decimals unless --precision says otherwise. Stamps are seconds with nine decimals. TREE is also what
-    `ros2 topic echo /tf` printed (help recordings).
+    The order is TARGET SOURCE, as the first line says in words: tf2_echo names its arguments the other way round but
+    prints the same. Blocks are text unless --format or the suffix of --output says otherwise; they have 3 decimals
+    unless --precision sets another number. Timestamps are seconds with nine decimals. TREE is also what `ros2 topic
+    echo /tf` printed (help recordings).
     """
     target, source, start, stop, limit = inputs.target, inputs.source, inputs.start, inputs.stop, inputs.limit
     refuse(start is not None and stop is not None and start > stop, "--start is after --stop")

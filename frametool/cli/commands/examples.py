@@ -59,7 +59,7 @@ class Example(Text):
 @command_named("examples")
 @argument("name", Example(), required=False)
 @option("-o --output FOLDER|FILE", "copy all files into this folder, or NAME into this file", FILE, under="Result")
-@option("--force", "let --output replace files", requires=("output",), under="Result")
+@option("--force", "let --output overwrite files", requires=("output",), under="Result")
 def command(inputs: Inputs) -> None:
     """List the example files, print one, or copy them.
 

@@ -37,10 +37,9 @@ def command(inputs: Inputs) -> int:
       printf 't,gripper_mm\\n0,12.5\\n' | frametool fk arm.urdf tool left_finger
 
     Rows are a table with a column for each joint, JSON lines or YAML documents with a key for each, or JointState
-    messages as `ros2 topic echo` prints them. Columns are called as the joints: radians and metres, or elbow_deg,
-    elbow [deg], finger_mm. All other columns pass.  A joint on the way that has no column needs --joint or --joints;
-    one that mimics another follows it. For one posture there is
-    `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
+    messages as `ros2 topic echo` prints them. Columns have the names of joints: radians and metres, or elbow_deg, elbow
+    [deg], finger_mm. Other columns are unchanged. A joint of the chain without a column needs --joint or --joints; a
+    mimic joint follows its leader. For a single posture use `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
     stream, output = Stream(inputs), Output(inputs, "poses")
     (file,) = opened((inputs.tree,), streams=True)

@@ -14,16 +14,16 @@ from frametool.view.report_text import form_entry, write_form, write_forms
 @argument("name", Form(FORMATS, "known"), required=False)
 @list_options()
 def command(inputs: Inputs) -> None:
-    """List the forms of files that are read and written: their suffixes, what their numbers mean, what they leave open.
+    """List the file formats that are read and written: suffixes, meaning of the numbers, required options.
 
     \b
       frametool formats
       frametool formats yaml
       frametool formats -f json
 
-    The names are those of --in and of -f. `asks for` names the option that says what the form leaves open. A form is
-    known by its content first, then by the suffix of the file; --in NAME decides otherwise. With NAME all is said of
-    one form, with an example where there is one. `frametool help formats` is about the options that files need.
+    The names are those of --in and -f. `asks for` lists options for what a format does not specify. A format is
+    detected by content first, then by the suffix of the file; --in NAME overrides this. NAME shows one format in full,
+    with an example if there is one. `frametool help formats` explains the options that files need.
     """
     output, name = Output(inputs, "report", otherwise="text"), inputs.name
     entries = list(map(form_entry, FORMATS if name is None else [name]))

@@ -196,11 +196,11 @@ class Topic(Text):
 
 @command_named("help")
 @argument("words", Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
-@option("-f --format", "json, of all or a COMMAND: options, values, exit codes", ("text", "json"), name="form",
+@option("-f --format", "json: options, values and exit codes of all commands or one", ("text", "json"), name="form",
     default="text")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, inputs: Inputs) -> None:
-    """Explain a subject on one screen, or a command; find any word in them and in the cookbook.
+    """Explain a topic on one screen, or a command; search for any word in them and in the cookbook.
 
     \b
       frametool help

@@ -15,7 +15,7 @@ from frametool.cli.options import offset_option, pose_result_options, scale_opti
 @EXPLAIN
 @offset_option
 def command(inputs: Inputs) -> int:
-    """Turn poses around: a_from_b -> b_from_a; named frames change places.
+    """Invert poses: a_from_b -> b_from_a; frame names are swapped.
 
     \b
       frametool invert '{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}'

@@ -29,7 +29,7 @@ MANY = ("times", "start", "stop")
 
 
 def _column_option(end: str, *excludes: str) -> Adds:
-    about, under = f"column of each row's {end} in the table of -i or stdin", "Time" if end == "time" else "Rows"
+    about, under = f"column with the {end} of each row of -i or stdin", "Time" if end == "time" else "Rows"
     excluded = (*excludes, "times", "source_at", "fixed", "explain")  # a table has many look-ups
     return option(f"--{end.lower()}-column NAME", about, options.ColumnNames(), excludes=excluded, under=under)
 
@@ -42,8 +42,8 @@ def _column_option(end: str, *excludes: str) -> Adds:
 @option("--at TIME", "seconds, nanoseconds with ns  [default: latest]", options.TIME, excludes=MANY)
 @option("--source-at TIME", "the time at SOURCE, with --fixed; --at: at TARGET", options.TIME, requires=("fixed",),
         excludes=MANY)  # fmt: skip
-@option("--fixed FRAME", "what stands still between the two times: map", FRAME, excludes=MANY, requires=("source_at",))
-@option("--covariance", "how sure it is, by the edges' sigmas (help covariance)", excludes=("explain", "fixed"))
+@option("--fixed FRAME", "static frame between the two times: map", FRAME, excludes=MANY, requires=("source_at",))
+@option("--covariance", "also the covariance, from the edges' sigmas (help covariance)", excludes=("explain", "fixed"))
 @options.times_option
 @options.limit_options
 @options.rules_options

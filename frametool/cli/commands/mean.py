@@ -15,8 +15,8 @@ from frametool.text.numbers import parse_number
 
 @command_named("mean")
 @argument("poses", nargs=-1, metavar="[POSE.. | FILE]")
-@option("--weights NAME | W,W,..", "column or key of each pose's weight, or the weights of the POSEs", ColumnNames())
-@option("--by NAME", "a mean for each value of this column or key", ColumnNames(), excludes=("weights",))
+@option("--weights NAME | W,W,..", "column or key with weights, or the weights of the POSEs", ColumnNames())
+@option("--by NAME", "one mean per value of this column or key", ColumnNames(), excludes=("weights",))
 @option("--robust", "reject outliers, and list them")
 @pose_stream_options
 @pose_result_options("poses")
@@ -32,8 +32,8 @@ def command(inputs: Inputs) -> int:
 
     Poses are arguments, the rows of a FILE, or of standard input. The mean rotation is the chordal one: the least sum
     of squared differences of matrices. distance_rms and distance_max are metres, angle_rms and angle_max radians (and
-    _deg degrees) between the poses and the mean. covariance is that of one pose, over x y z and turns about X Y Z in
-    the parent's axes as in ROS, by n - 1; std_x, std_y, std_z and std_angle are roots of its diagonal.
+    _deg degrees) between the poses and the mean. covariance is that of one pose: x y z and rotations about X Y Z in the
+    parent's axes as in ROS, with n - 1; std_x, std_y, std_z and std_angle are roots of its diagonal.
 
     With --robust outliers, more than 3 sigmas off by medians, are rejected: all of that is of the poses kept, `used` of
     `count`. A warning lists each with its place, how far off it is, and u, that in sigmas. Without outliers the

@@ -35,12 +35,11 @@ def command(inputs: Inputs) -> int:
       frametool sim follow --duration 2 --emit tf | frametool monitor -
 
     RECORDING is a bag, a tree that moves, or what `ros2 topic echo /tf` prints. With TARGET and SOURCE only the edges
-    between them are told, and the interval in which all of them have data.
-    Rates are in stamp time: what the recorder's clock did is the delay, known from bags and `rostopic echo -p` only.
-    A gap is the longest pause between two stamps, in the order of time; back counts samples that come after a later
-    stamp, reparented the changes of parent; gaps are pauses 5 times the median one. length_m is that of the path,
-    speed_mean and speed_max metres a second from stamp to stamp. A jump is a step 10 times the median one and longer
-    than 0.1 m or 0.2 rad.
+    between them are reported, and the interval in which all of them have data. Rates are in stamp time; the delay is
+    the recorder's clock minus the stamp, known only from bags and `rostopic echo -p`. A gap is the longest pause
+    between two stamps, in the order of time; back counts samples that come after a later stamp, reparented the changes
+    of parent; gaps are pauses 5 times the median one. length_m is that of the path, speed_mean and speed_max metres a
+    second from stamp to stamp. A jump is a step 10 times the median one and longer than 0.1 m or 0.2 rad.
     """
     frames = inputs.frames
     refuse(len(frames) not in (0, 2), f"name TARGET and SOURCE, or neither; found {len(frames)} frames")

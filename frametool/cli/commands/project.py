@@ -62,19 +62,19 @@ def parse_size(text: str) -> tuple[int, int]:
 
 _AXES = option("--camera-axes AXES", "of CAMERA: optical, opengl or flu  [default: as TREE says]", AXES)
 camera_options = together(
-    option("--camera FILE[:NAME]", "intrinsics from here, or inline, not from TREE", CameraFile()),
-    option("--model NAME", "what the coefficients of --camera are", requires=("camera",)),
-    option("--size W,H", "of the picture, to which K is scaled", parse_size),
-    option("--rectified", "of the rectified picture: R, then P, no distortion"),
-    option("--from-first", "points are in the first camera's rectified frame", requires=("rectified",)),
+    option("--camera FILE[:NAME]", "intrinsics from this file, or inline, not from TREE", CameraFile()),
+    option("--model NAME", "distortion model of --camera", requires=("camera",)),
+    option("--size W,H", "image size, to which K is scaled", parse_size),
+    option("--rectified", "use the rectified image: R, then P, no distortion"),
+    option("--from-first", "points are in the rectified frame of the first camera", requires=("rectified",)),
     option("--first-pixel C", "centre of the first pixel; 0.5: COLMAP", parse_number, default=0.0),
     option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files"),
     stream_options,
     options.pose_options,
     options.result_options("points"),
-    option("--time-column NAME", "column or key of each row's own time", options.ColumnNames(), excludes=("at",),
+    option("--time-column NAME", "column or key with the time of each row", options.ColumnNames(), excludes=("at",),
            under="Time"),
-    option("--at TIME", "all at this time  [default: latest]", options.TIME, under="Time"),
+    option("--at TIME", "one time for all  [default: latest]", options.TIME, under="Time"),
     options.rules_options,
     options.offset_option,
     options.reading_options(streams=True, camera_axes=_AXES),
@@ -84,8 +84,8 @@ camera_options = together(
 @command_named("project", own=("input_path", "output"))
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE CAMERA [SOURCE]] [X Y Z | RECORD]..")
 @option("--range", "add range, the distance from the camera", name="ranged")
-@option("--image FILE", "draw over this picture: -o FILE.svg, .html, .png", requires=("output",))
-@option("--frame-column NAME", "column with each row's frame, without SOURCE", options.ColumnNames())
+@option("--image FILE", "draw over this image: -o FILE.svg, .html, .png", requires=("output",))
+@option("--frame-column NAME", "column with the frame of each row, without SOURCE", options.ColumnNames())
 @camera_options
 def command(inputs: Inputs) -> int:
     """Add to points the pixels at which a camera sees them.
@@ -94,9 +94,9 @@ def command(inputs: Inputs) -> int:
       frametool project cameras.yaml cam_front lidar -i yard.csv
       frametool project --camera camchain.yaml:cam0 0.5 0.2 4
 
-    Rows stay and get u, v, depth (z in optical axes) and in_image; u and v are empty where no pixel is. Without
-    SOURCE a row names its frame; without TREE points are in the camera's own. With --image FILE -o FILE.svg they are
-    drawn over the picture. `frametool help cameras` says more.
+    Rows get columns u, v, depth (z in optical axes) and in_image; u and v are empty if there is no pixel. Without
+    SOURCE each row names its frame; without TREE points are in the camera's frame. With --image FILE -o FILE.svg they
+    are drawn over the image. `frametool help cameras` says more.
     """
     from frametool.stream.pixels import PixelsOfPoints
 

@@ -42,21 +42,21 @@ def _between(text: str) -> tuple[int, int]:
 
 @command_named("record", own=("topics",), epilog=EXIT_CODES)
 @argument("tree", FILE, metavar="RECORDING")
-@option("-o --output FILE", "write this file or folder, whole or not at all")
-@option("--with FILE", "add the edges of this tree that are missing; may be repeated", name="more", multiple=True)
-@option("--replace", "let --with replace edges that are there with other values", requires=("more",))
-@option("--into FRAME", "move the messages of each --topic into this frame", FRAME)
-@option("--topic NAME", "a topic whose messages move, or whose transforms count; may be repeated", name="moved_topics",
+@option("-o --output FILE", "write to this file or folder, atomically")
+@option("--with FILE", "add the missing edges of this tree; may be repeated", name="more", multiple=True)
+@option("--replace", "let --with replace edges that have other values", requires=("more",))
+@option("--into FRAME", "transform the messages of each --topic into this frame", FRAME)
+@option("--topic NAME", "topic of messages to transform, or of transforms; may be repeated", name="moved_topics",
     multiple=True)  # fmt: skip
-@option("--on-error", "at a message that cannot be moved", ON_ERROR[:2], default=STOP)
-@option("--between START,STOP", "leave out what was logged before and after", _between)
-@option("-f --format", "form of the copy  [default: by the name of --output]", writers("recording"), name="format_name")
-@option("--force", "let --output replace a file", requires=("output",), under="Result")
+@option("--on-error", "for a message that cannot be transformed", ON_ERROR[:2], default=STOP)
+@option("--between START,STOP", "drop messages before and after", _between)
+@option("-f --format", "format of the copy  [default: by --output]", writers("recording"), name="format_name")
+@option("--force", "let --output overwrite a file", requires=("output",), under="Result")
 @reading_options(topics=False)
 @verbose_option
 @pose_options
 def command(inputs: Inputs) -> int:
-    """Copy RECORDING with something changed; all other messages stay as they are.
+    """Copy RECORDING with changes; all other messages are unchanged.
 
     \b
       frametool record run.mcap --with camchain.yaml -o fixed.mcap
@@ -64,11 +64,11 @@ def command(inputs: Inputs) -> int:
       frametool record run.mcap --into map --topic /pose --topic /odom -o map.mcap
       frametool record run.mcap --between 1700000010,1700000020 -o part.mcap
 
-    --with adds the edges of a tree, in any form, that are missing: one message on /tf_static that comes first. An edge
-    that is there with other values is an error; --replace puts the new ones into every message that has it.
-    --into moves PoseStamped, PoseWithCovarianceStamped, PoseArray, Path, PointStamped and Odometry (its twist stays)
-    at their stamps, by the transforms of the recording and of --with; covariances turn along.
-    --between keeps what was logged from START to STOP, and all of /tf_static.
+    --with adds the missing edges of a tree, in any format, in one message on /tf_static at the start. An edge with
+    other values is an error; --replace writes the new values into every message that has it. --into transforms
+    PoseStamped, PoseWithCovarianceStamped, PoseArray, Path, PointStamped and Odometry (its twist is unchanged) at their
+    stamps, by the transforms of the recording and of --with; covariances are rotated too. --between keeps what was
+    logged from START to STOP, and all of /tf_static.
 
     An MCAP file or ROS 2 bag becomes MCAP (-o NEW.mcap) or a folder (-f bag2 -o FOLDER), a ROS 1 bag one (-o NEW.bag).
     """

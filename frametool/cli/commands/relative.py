@@ -16,9 +16,9 @@ from frametool.grammar.pose_algebra import relative_names
 @argument("b", required=False)
 @pose_stream_options
 @pose_result_options("poses")
-@option("--consecutive", "of a stream, each row seen from the row before it", excludes=("first", "explain"))
-@option("--first", "of a stream, each row seen from the first", excludes=("explain",))
-@option("--velocity", "with --consecutive, also the twist from row to row, m/s and rad/s", requires=("consecutive",))
+@option("--consecutive", "of a stream, each row relative to the row before it", excludes=("first", "explain"))
+@option("--first", "of a stream, each row relative to the first", excludes=("explain",))
+@option("--velocity", "with --consecutive, also the twist between rows, m/s and rad/s", requires=("consecutive",))
 @option("--time-column NAME", "with --velocity, the column or key of the stamps  [default: stamp, t ..]", ColumnNames(),
     requires=("velocity", "time_offset", "start", "stop"))
 @EXPLAIN

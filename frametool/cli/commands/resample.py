@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 @command_named("resample")
 @argument("path", metavar="TRAJ")
-@option("--rate HZ", "so many poses a second, from the first on", parse_number)
-@option("--at FILE|TIMES", "at the stamps of a file; T,T,.., START:STOP:STEP", name="times")
-@option("--every 1m|5deg", "at even steps of the path, or of its turning", lambda text: read_delta(text, "m", "deg"))
-@option("--max-gap TIME", "that is interpolated  [default: 3 median intervals]", read_span,
+@option("--rate HZ", "poses per second, from the first on", parse_number)
+@option("--at FILE|TIMES", "at the timestamps of a file; T,T,.., START:STOP:STEP", name="times")
+@option("--every 1m|5deg", "at even steps of distance or rotation", lambda text: read_delta(text, "m", "deg"))
+@option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", read_span,
     name="max_gap_ns")  # fmt: skip
 @trajectory_options
 @limit_options
@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 @rotation_options
 @result_options("poses")
 def command(inputs: Inputs) -> int:
-    """Interpolate a trajectory at other moments: positions along the line, rotations by slerp.
+    """Interpolate a trajectory at other times: positions along the line, rotations by slerp.
 
     \b
       frametool resample walk.tum --rate 10
       frametool resample truth.tum --at mono.tum -o same_stamps.tum
       frametool resample walk.tum --every 0.5m -f csv
 
-    TRAJ is a trajectory as `compare` takes it. Nothing is made beyond its ends, nor where its poses are more than
-    --max-gap apart; how many moments have none is told.
+    TRAJ is a trajectory as for `compare`. There are no poses beyond its ends, nor in gaps longer than --max-gap; the
+    number of times without a pose is reported.
     """
     path, rate, times, every = inputs.path, inputs.rate, inputs.times, inputs.every
     refuse(sum(each is not None for each in (rate, times, every)) != 1, "give one of --rate, --at and --every")

@@ -119,7 +119,7 @@ def scene_of(inputs: Inputs, leader: MakeLeader) -> Scene:
 @command.command("run", cls=Command)
 @argument("scene")
 @option("--duration S", "simulated seconds, or inf  [default: the scene's]", parse_duration)
-@option("--seed", "of random leaders  [default: the scene's]", click.IntRange(0), under="Turtles")
+@option("--seed", "seed of random leaders  [default: the scene's]", click.IntRange(0), under="Turtles")
 @output_options
 def run(inputs: Inputs) -> None:
     """Run SCENE, a YAML or JSON file, and print the followers' velocity commands.

@@ -35,21 +35,21 @@ def _read_names(text: str) -> list[str]:
 
 @command_named("solve", epilog=EXIT_CODES)
 @argument("files", FILE, nargs=-1, required=True, metavar="FILE.. | GRIPPER TARGET | SAMPLES | A B")
-@option("--root FRAME", "of all the others  [default: never a child]", excludes=SHAPES)
-@option("--fix TREE", "exact edges, kept as they are; may be repeated", FILE, excludes=SHAPES, multiple=True)
-@option("--without FILE:LINE", "leave this row out; may be repeated", excludes=SHAPES, multiple=True)
-@option("--hand-eye", "where a camera sits, from poses of gripper and target", excludes=("points",))
-@option("--eye-to-hand", "the camera stands still, the target moves", requires=("hand_eye",))
-@option("--max-gap TIME", "between stamps that are paired  [default: 50ms]", read_span,
+@option("--root FRAME", "root of the result  [default: a frame that is never a child]", excludes=SHAPES)
+@option("--fix TREE", "exact edges that are not changed; may be repeated", FILE, excludes=SHAPES, multiple=True)
+@option("--without FILE:LINE", "ignore this row; may be repeated", excludes=SHAPES, multiple=True)
+@option("--hand-eye", "pose of a camera from poses of gripper and target", excludes=("points",))
+@option("--eye-to-hand", "the camera is static, the target moves", requires=("hand_eye",))
+@option("--max-gap TIME", "longest time between paired stamps  [default: 50ms]", read_span,
     name="max_gap_ns", requires=("hand_eye",))  # fmt: skip
-@option("--columns NAME,..", "of GRIPPER, then of TARGET, side by side in one table", ColumnNames(),
+@option("--columns NAME,..", "columns of GRIPPER, then of TARGET, in one table", ColumnNames(),
     multiple=True, requires=("hand_eye",), under="Rows")  # fmt: skip
-@option("--points", "A<-B from points that are the same in both")
-@option("--scale", "of A to B too", requires=("points",))
+@option("--points", "A<-B from matched points")
+@option("--scale", "estimate the scale from A to B too", requires=("points",))
 @option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names,
     requires=("hand_eye", "points"))  # fmt: skip
 @option("--no-robust", "use all rows, outliers too")
-@option("--report FILE.json|csv", "numbers of the fit and of each row", file_with(".json", ".csv"))
+@option("--report FILE.json|csv", "statistics of the fit and of each row", file_with(".json", ".csv"))
 @reading_options()
 @whole_pose_options
 @result_options("tree", "trajectory")
@@ -62,10 +62,10 @@ def command(inputs: Inputs) -> None:
       frametool solve --hand-eye hand_eye_samples.json -f handeye
       frametool solve --points points_a.csv points_b.csv --scale --report fit.json
 
-    A measurement is {parent, child, a pose, sigma or covariance}: the pose of child in parent, in whatever `tree`
-    reads. The result is a tree with covariances, of all frames in one root. GRIPPER holds base<-gripper, TARGET
-    camera<-target, row by row or by their stamps; SAMPLES are {gripper, target}, columns gripper_x .. target_qw, or
-    of moveit_calibration or easy_handeye. Points are matched by id, else by row; a column weight counts.
+    A measurement is {parent, child, a pose, sigma or covariance}: the pose of child in parent, in any file that `tree`
+    reads. The result is a tree with covariances and one root. GRIPPER holds base<-gripper, TARGET camera<-target, row
+    by row or by their stamps; SAMPLES are {gripper, target}, columns gripper_x .. target_qw, or of moveit_calibration
+    or easy_handeye. Points are matched by id, else by row; a column weight counts.
     """
     for library in ("OPENBLAS", "OMP", "MKL"):  # sums come out in one order: the same bytes each run
         os.environ[f"{library}_NUM_THREADS"] = "1"

@@ -41,10 +41,10 @@ def command(inputs: Inputs) -> None:
       frametool static --x 0.1 --yaw 1.5 --frame-id base --child-frame-id camera
       frametool static 0.1 0 0.2 1.5 0 0 base camera --format json
 
-    A tree is written one line an edge, static2 (flags) unless --format says static1 (x y z qx qy qz qw PARENT CHILD)
+    A tree is written one line per edge, static2 (flags) unless --format says static1 (x y z qx qy qz qw PARENT CHILD)
     or another form. With --to rpy angles are written: --roll --pitch --yaw, and yaw pitch roll in static1, in radians.
     Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent. Their angles
-    are radians, as the tool has them; --deg is about the result.
+    are in radians, like the tool's; --deg applies to the result.
     """
     flags = {name: value for name in FLAGS if (value := getattr(inputs, name.replace("-", "_"))) is not None}
     arguments = inputs.arguments

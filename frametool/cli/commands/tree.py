@@ -18,7 +18,7 @@ from frametool.cli.trees import load_tree
 @tree_options
 @result_options("tree", "trajectory")
 def command(inputs: Inputs) -> None:
-    """Draw the frames of TREE, each with its pose in its parent; those that move with their rate and interval too.
+    """Draw the frames of TREE with their poses in their parents; moving frames with rate and interval.
 
     \b
       frametool tree robot.yaml
@@ -27,10 +27,10 @@ def command(inputs: Inputs) -> None:
       frametool tree robot.yaml --with '{name: tip, parent: tool, xyz: [0, 0, 1]}'
       frametool tree drive.yaml --at 2.5
 
-    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. yaml and json are trees again
-    and read back, frames that move with all their samples; csv is a table, a row an edge. dot draws what
-    moves as ROS's view_frames does, tf2 is the listing of tf2's all_frames_as_yaml. --at draws the tree as it stood
-    at one time. Of frames.gv and that listing names and rates are shown: they hold no poses.
+    TREE is a file, - for standard input, or . for the file that FRAMETOOL_TREE names. yaml and json can be read back
+    and hold all samples of moving frames; csv has one row per edge. dot draws moving frames like ROS's view_frames, tf2
+    is the listing of tf2's all_frames_as_yaml. --at draws the tree at one time. Files of these two have no poses: only
+    names and rates are shown.
     """
     output = Output(inputs, "tree", "trajectory")
     place, drawn = output.style.place, output.style.form in ("yaml", "json", "text", "dot", "mermaid")

@@ -34,22 +34,22 @@ DEPTH = '"depth"'
 
 @command_named("unproject", own=("input_path",))
 @argument("arguments", FRAME, nargs=-1, metavar="[TREE TARGET CAMERA] [U V [DEPTH] | RECORD]..")
-@option("--depth D", "points so deep in optical axes", parse_number, excludes=("range", "ground", "undistort"))
-@option("--range R", "points so far from the camera", parse_number, excludes=("ground", "undistort"))
-@option("--ground FRAME", "where rays meet z = 0 of this frame", FRAME, excludes=("undistort",))
+@option("--depth D", "points at this depth in optical axes", parse_number, excludes=("range", "ground", "undistort"))
+@option("--range R", "points at this distance from the camera", parse_number, excludes=("ground", "undistort"))
+@option("--ground FRAME", "points where rays meet z = 0 of this frame", FRAME, excludes=("undistort",))
 @option("--height H", "z = H of that frame instead", parse_number, requires=("ground",), default=0.0)
 @option("--undistort", "pixels without distortion, or --rectified")
 @camera_options
 def command(inputs: Inputs) -> int:
-    """Add to pixels the rays that they see, or points on these.
+    """Add to pixels their rays, or points on the rays.
 
     \b
       frametool unproject cameras.yaml map cam_front 160 120
       frametool unproject cameras.yaml map cam_front 160 200 --ground map
       frametool unproject --camera camchain.yaml:cam0 --undistort 12 30
 
-    Rows with columns u, v, or a key pixel, stay and get origin_x .. ray_z in TARGET; with a depth or range, in a
-    column or an option, x, y, z. They are empty beyond the model and above the horizon (help cameras).
+    Rows with columns u, v, or a key pixel, get origin_x .. ray_z in TARGET; with a depth or range, in a column or an
+    option, x, y, z. They are empty outside the model and above the horizon (help cameras).
     """
     from frametool.stream.pixels import PointsOfPixels
 

@@ -41,23 +41,23 @@ def _eye(text: str) -> Eye:
 @argument("target", FRAME, required=False)
 @argument("source", FRAME, required=False)
 @option("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True, under="Files")
-@option("--frame FIXED", "what all is seen in  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
-@option("--at TIME", "seconds, nanoseconds with ns  [default: the first time that all edges have]", TIME)
-@option("--below FRAME", "only this frame and those that hang from it", FRAME)
+@option("--frame FIXED", "reference frame  [default: TARGET, or the root of most frames]", FRAME, name="fixed")
+@option("--at TIME", "seconds, nanoseconds with ns  [default: first time at which all edges have data]", TIME)
+@option("--below FRAME", "only this frame and its descendants", FRAME)
 @option("--only REGEX", "only frames whose name matches")
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
 @option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye",
     default="slanted")
 @moving_options
-@option("-f --format", "form of the picture  [default: by the suffix of --output, else text]", FORMS, name="form")
-@option("-o --output FILE", "write there instead of stdout, whole or not at all")
-@option("--force", "let --output replace an existing file", requires=("output",), under="Result")
-@option("--overlay", "lay TREE over a second tree, named in TARGET's place: what has moved?")
+@option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="form")
+@option("-o --output FILE", "write to this file instead of stdout, atomically")
+@option("--force", "let --output overwrite a file", requires=("output",), under="Result")
+@option("--overlay", "compare TREE with a second tree, given as TARGET: what has moved?")
 @option("--no-sliders", "no sliders for the joints of a robot on its page", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
 @color_option
 def command(inputs: Inputs) -> None:
-    """Plot the frames of TREE: in the terminal, as one HTML page that turns, as SVG, PNG, or GLB for 3-D programs.
+    """Plot the frames of TREE: in the terminal, as an interactive HTML page, as SVG, PNG, or GLB for 3-D programs.
 
     \b
       frametool view robot.yaml
@@ -66,8 +66,8 @@ def command(inputs: Inputs) -> None:
       frametool view drive.yaml --at 2.5 -o drive.svg
       sed s/0.28/0.3/ robot.yaml | frametool view robot.yaml - --overlay -o b.html
 
-    The page needs nothing beside it and asks nothing of anybody: turn it, search, click a frame to see its transform
-    from TARGET in every notation, play what moves. TREE is a file, a recording, - for standard input, or . for the
+    The page is self-contained and makes no network requests: rotate it, search, click a frame to see its transform from
+    TARGET in every representation, play moving frames. TREE is a file, a recording, - for standard input, or . for the
     file that FRAMETOOL_TREE names.
     """
     tree, target, source, output = inputs.tree, inputs.target, inputs.source, inputs.output

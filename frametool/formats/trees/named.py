@@ -75,7 +75,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
     yield from document_edges(file, options, take)
     if frames and said:
-        options.tally.note(f"--frames {','.join(frames)} changes nothing: each pose names its parent", 1)
+        options.tally.note(f"--frames {','.join(frames)} has no effect: each pose names its parent", 1)
     count_of = f"{count} {'pose' if count == 1 else 'poses'}"
     assumed = f"{count_of} in {bare(base)} (--frames says another)" if told and not frames else ""
     others = f"{', '.join(map(bare, left))} left out" if left else ""
