@@ -121,6 +121,24 @@ def test_a_typed_line_is_answered_and_the_next_ones_soon(tab: Any) -> None:
     assert tab.locator("#results").get_attribute("aria-live") == "polite"
 
 
+def test_the_first_answer_comes_soon_after_python_is_there(open_page: Visit) -> None:
+    tab = open_page("#l=convert --from rpy_deg 0 0 90")
+    tab.locator(".answer").wait_for(timeout=120_000)
+    own, of_python = (float(tab.get_attribute("body", f"data-{name}")) for name in ("own", "pyodide"))
+    first = float(tab.get_attribute(".answer", "data-took"))
+    assert of_python + own + first <= 1.5 * of_python + 2000
+    tab.close()
+
+
+def test_without_webassembly_the_page_says_so_and_keeps_its_answers(browser: Any, address: str) -> None:
+    tab = browser.new_page()
+    tab.add_init_script("delete globalThis.WebAssembly")
+    tab.goto(address)
+    expect(tab.locator("#said")).to_contain_text("this browser has no WebAssembly")
+    assert tab.locator("#answers article").count() == 12
+    tab.close()
+
+
 def test_an_error_is_the_line_of_the_shell(tab: Any) -> None:
     answer = typed(tab, "lookup examples/robot.yaml map bse")
     assert answer.locator("pre.err").inner_text().startswith("frametool: unknown frame 'bse' in examples/robot.yaml")
@@ -174,6 +192,9 @@ def test_tab_completes_commands_options_frames_and_files(tab: Any) -> None:
     tab.press("#line", "Tab")
     expect(tab.locator("#offers code")).to_have_text(["compose", "compare"])
     assert tab.input_value("#line") == "comp"
+    tab.press("#line", "Escape")
+    tab.press("#line", "Tab")
+    assert tab.evaluate("document.activeElement.textContent") == "Run"
 
 
 def test_arrows_go_through_the_lines_before(tab: Any) -> None:

@@ -4,7 +4,7 @@ const MOST_ANSWERS = 30;
 const $ = (id) => document.getElementById(id);
 const about = JSON.parse($("about").textContent);
 const [line, results, said, files, history] = [$("line"), $("results"), $("said"), new Map(), []];
-let [worker, pending, next, asked, before, running, shown] = [null, new Map(), 0, 0, 0, null, 0];
+let [worker, pending, next, before, running, shown, leaving] = [null, new Map(), 0, 0, null, 0, false];
 
 function make(tag, props = {}, ...inner) {
   const made = Object.assign(document.createElement(tag), props);
@@ -249,7 +249,9 @@ function recalled(step) {
 
 line.addEventListener("keydown", (event) => {
   const act = { ArrowUp: () => recalled(-1), ArrowDown: () => recalled(1) }[event.key];
-  if (event.key === "Tab" && !event.shiftKey && line.value.trim() && document.body.dataset.state === "ready" && !running) {
+  const completes = line.value.trim() && document.body.dataset.state === "ready" && !running && !leaving;
+  leaving = event.key === "Escape"; // a Tab behind it goes on to the next button
+  if (event.key === "Tab" && !event.shiftKey && completes) {
     event.preventDefault();
     complete();
   } else if (act) {
