@@ -90,7 +90,7 @@ def _line(page: Page) -> str:
 
 def _home(kinds: list[Section], single: list[Page], *, calculator: bool) -> str:
     heads = [Page(f"{kind.folder}/index.md", kind.title, kind.title, "", "") for kind in kinds]
-    tried = f'<p class="try"><a href="{CALCULATOR}">Try it in the browser</a>, without an installation.</p>\n\n' if calculator else ""
+    tried = f'<p class="try"><a href="{CALCULATOR}">Try it in the browser</a> without an installation</p>\n\n' if calculator else ""
     title, _, text = texts.home().partition("\n\n")
     return f"{title}\n\n{tried}{text}\n\n{_toctree([*heads, *single])}"
 

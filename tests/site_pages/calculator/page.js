@@ -65,7 +65,6 @@ async function run(text) {
   if (history.at(-1) !== text) history.push(text);
   before = history.length;
   running = text;
-  const begun = performance.now();
   const late = setTimeout(() => { $("stop").hidden = false; }, 1000);
   document.body.dataset.running = "yes";
   const { result, took } = await ask("answer", text, Object.fromEntries(files), columns());
@@ -73,7 +72,7 @@ async function run(text) {
   running = null;
   $("stop").hidden = true;
   delete document.body.dataset.running;
-  if (result) show(text, result, performance.now() - begun, took);
+  if (result) show(text, result, took);
 }
 
 function stop() {
@@ -84,7 +83,7 @@ function stop() {
   waiting.forEach((each) => each({}));
 }
 
-function show(text, { out, err, status, files: written, needs }, whole = 0, took = 0) {
+function show(text, { out, err, status, files: written, needs }, took = 0) {
   const shownOut = readable(out);
   const card = make("article", { className: "answer" });
   const copy = make("button", { textContent: "Copy", onclick: () => copied(copy, plain(shownOut ?? err)) });
@@ -96,7 +95,7 @@ function show(text, { out, err, status, files: written, needs }, whole = 0, took
   else if (err) card.append(make("pre", { className: status ? "err" : "note" }, colored(err)));
   if (!shownOut && !err && !Object.keys(written).length) card.append(make("p", { textContent: "(no output)" }));
   for (const [name, content] of Object.entries(written)) card.append(download(name, content));
-  card.append(make("footer", { textContent: status ? `exit code ${status}` : took ? `${whole.toFixed(0)} ms` : "" }));
+  card.append(make("footer", { textContent: status ? `exit code ${status}` : took ? `${took.toFixed(0)} ms` : "" }));
   Object.assign(card.dataset, { status, took });
   results.prepend(card);
   card.id = `answer-${++shown}`;
