@@ -60,6 +60,10 @@ class RowNote(NamedTuple):
     sentence: str
     column: str = ""
 
+    def place(self) -> tuple[int, str, int, str]:
+        """Return what notes are sorted by: line, kind, column; records may share a line."""
+        return self.line, self.about, len(self.column), self.column
+
     @classmethod
     def of_lost_name(cls, line: int, name: str) -> RowNote:
         """Tell that a frame is not named any more."""

@@ -231,7 +231,7 @@ class RecordBlocks:
         kept = found.alone + found.nulls + sum(len(run.rows) for run in runs)
         faults = [fault for _, fault in sorted(found.faults)]
         is_open = None if self.splitter.layout != ARRAY else not closed
-        lines, notes = text.count(b"\n"), sorted(found.notes)
+        lines, notes = text.count(b"\n"), sorted(found.notes, key=RowNote.place)
         return Outcome(out, faults, rows, lines, mended, notes, len(text), kept, is_open)
 
     def _runs(self, text: bytes, cuts: Sequence[Cut], found: Found) -> list[Run]:

@@ -120,7 +120,7 @@ class RecordText:
         write = number_writer(self.request.precision, yaml=not self.json)
         locked = any(each.entry.target.locked(each.parts) for each in answers)
         text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers, locked=locked)
-        notes = self._notes_at(line, column)
+        mended, notes = sum(note.rule == "rounded" for note in self.notes), self._notes_at(line, column)
         wide = next(filter(None, (wide_turn(each, self.request.operation) for each in answers)), None)
         notes += [RowNote(line + self.line, wide.rule, wide.message)] if wide else []
         if (place := answers[0].entry.target.place if answers else None) is not None:
@@ -128,7 +128,7 @@ class RecordText:
 
             zones = (ZONE_NAMES[int(numbers[at])] for at in place.words)
             notes += [RowNote(line + self.line, ZONES, zone) for zone in zones]
-        return Rendered(text.encode() if self.entries else b"", sum(each.mended for each in answers), notes)
+        return Rendered(text.encode() if self.entries else b"", mended, notes)
 
     def row_notes(self) -> Iterator[RowNote]:
         """Yield warnings that hold for all records that are written alike."""
