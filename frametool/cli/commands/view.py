@@ -53,7 +53,7 @@ def _eye(text: str) -> Eye:
 @option("-o --output FILE", "write to this file instead of stdout, atomically")
 @option("--force", "let --output overwrite a file", requires=("output",), under="Result")
 @option("--overlay", "compare TREE with a second tree, given as TARGET: what has moved?")
-@option("--no-sliders", "no sliders for the joints of a robot on its page", name="no_sliders")
+@option("--no-sliders", "leave out the sliders for the joints of a robot", name="no_sliders")
 @option("--open", "show the page in the browser", name="opens")
 @color_option
 def command(inputs: Inputs) -> None:
@@ -67,8 +67,9 @@ def command(inputs: Inputs) -> None:
       sed s/0.28/0.3/ robot.yaml | frametool view robot.yaml - --overlay -o b.html
 
     The page is self-contained and makes no network requests: rotate it, search, click a frame to see its transform from
-    TARGET in every representation, play moving frames. TREE is a file, a recording, - for standard input, or . for the
-    file that FRAMETOOL_TREE names.
+    TARGET in every representation, play moving frames. Robots have a slider for each joint, and their boxes, cylinders,
+    spheres and capsules are drawn. TREE is a file, a recording, - for standard input, or . for the file that
+    FRAMETOOL_TREE names.
     """
     tree, target, source, output = inputs.tree, inputs.target, inputs.source, inputs.output
     chosen = _form(inputs.form, output, opens=inputs.opens)
