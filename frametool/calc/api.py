@@ -233,17 +233,17 @@ def line_of_value(term: Term, style: Style) -> str:
 def machine_text(term: Term, style: Style) -> str:
     """Write a value as a document or line of a machine format."""
     result = plain_result(term, style)
-    if isinstance(result, Result) and is_trajectory(style.form):
+    if isinstance(result, Result) and is_trajectory(style.format):
         from frametool.stream.writers import write_poses
 
         return write_poses([result], style)
-    if "arrays" in FORMATS[style.form].writes:
-        raise ValueInvalid(f"{style.form} holds columns of numbers: calc writes rows of -i in it, and no single value")
-    module = import_module(FORMATS[style.form].writer)
+    if "arrays" in FORMATS[style.format].writes:
+        raise ValueInvalid(f"{style.format} holds columns of numbers: calc writes rows of -i in it, not single values")
+    module = import_module(FORMATS[style.format].writer)
     if isinstance(result, Result):
         return str(module.write_poses([result], style))
-    if term.type.kind not in (POINT, VECTOR) and style.form not in ("json", "yaml"):
-        raise ValueInvalid(f"{style.form} has no form for {term.type.named}; write it as text, json, yaml or csv")
+    if term.type.kind not in (POINT, VECTOR) and style.format not in ("json", "yaml"):
+        raise ValueInvalid(f"{style.format} has no form for {term.type.named}; write it as text, json, yaml or csv")
     return str(module.write_points([result], style))
 
 

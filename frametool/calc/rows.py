@@ -66,7 +66,7 @@ class RowExpressions:
         self.degrees = style.degrees
         forms = style.notations or (notation("quaternion"),)
         whole = len(forms) == 1 and forms[0].representation.whole is not None
-        written = tuple((form, style.in_degrees(form)) for form in forms)
+        written = tuple((fmt, style.in_degrees(fmt)) for fmt in forms)
         self.target = Target(None if whole else 1.0, written, style.keep_sign, whole)
         self.adds = all(line.name for line in lines)
         trees = [line.tree for line in (*bindings, *lines)]
@@ -175,14 +175,14 @@ def _row_type(row: str, parent: str | None, name: str | None) -> Type:
     return Type(POSE, parent, name) if row == POSE else Type(row, parent)
 
 
-def poses_of_table(path: str, form: str, *, normalize: bool, degrees: bool) -> Term:
+def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
     gathered = Gathered()
     request = Request(gathered=gathered, normalize=normalize, degrees=degrees)
     line = 1
     file: Any = opened(path)
     with file as stream:
-        for outcome in run_table(stream, form, request, source=path):
+        for outcome in run_table(stream, fmt, request, source=path):
             if outcome.faults:
                 fault = outcome.faults[0]
                 raise BadRow(fault._replace(line=fault.line + line), fault.reason, source=path)

@@ -105,15 +105,15 @@ def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
     Each is written before the next one is looked at, but for the rows of a table, which share their columns.
     """
     values = (item for term in terms for item in (term.items if term.type.kind == LIST else (wanted(term),)))
-    if style.form == "csv":
+    if style.format == "csv":
         yield machine_table(list(values), style)
         return
     before = ""
     for value in values:
-        text = _for_a_person(value, style) if style.form == "text" else machine_text(value, style)
-        if before and style.form == "yaml":
+        text = _for_a_person(value, style) if style.format == "text" else machine_text(value, style)
+        if before and style.format == "yaml":
             yield "---\n"
-        elif before and style.form == "text" and (before.count("\n") > 1 or text.count("\n") > 1):
+        elif before and style.format == "text" and (before.count("\n") > 1 or text.count("\n") > 1):
             yield "\n"
         yield text
         before = text

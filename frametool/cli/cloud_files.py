@@ -107,7 +107,7 @@ class BagOfClouds:
             bad.take([Fault.of(cloud.number, "", error)])
             return 0
         name = self._name(cloud)
-        style = self.output.style.in_form(self.output.told or "")
+        style = self.output.style.with_format(self.output.told or "")
         with writing(name, force=self.output.force) as write:
             for outcome in moved_cloud(cloud, pose, style, self.path):
                 for fault in outcome.faults:
@@ -171,7 +171,7 @@ class SeveralClouds:
             for path, told, frame in zip(self.paths, self.forms, self.frames or [""] * len(self.paths), strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
-                file.form = form = told or detect(file.head(), "records", "rows", "arrays", name=path)[0]
+                file.format = form = told or detect(file.head(), "records", "rows", "arrays", name=path)[0]
                 if "arrays" not in FORMATS[form].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[form].summary}, no cloud; {hint}", source=path)
@@ -182,7 +182,7 @@ class SeveralClouds:
             into = self.output.told or form
             refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; forms: {_WRITTEN}")
             refuse(self.output.path is self.output.told is None, "several clouds become one file: give -o all.ply")
-            merged = MergedClouds(planned, self.output.style.in_form(into))
+            merged = MergedClouds(planned, self.output.style.with_format(into))
             status = 0
             with writing(self.output.path, force=self.output.force) as write:
                 for at, path in enumerate(self.paths):

@@ -100,7 +100,7 @@ class Output:
         stated = self._inputs.peek("camera_axes") or ""
         self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style.in_camera = operation is not None and operation.looks_back
-        row = table.FORMATS.get(self.style.form)
+        row = table.FORMATS.get(self.style.format)
         if stated and self.style.axes and row and row.poses.axes:
             self._inputs.forms_read = (*self._inputs.forms_read, ("", ("camera_axes",)))
 
@@ -118,9 +118,9 @@ class Output:
 
     def _refuse_place(self) -> None:
         """Stop where a form has no place for latitude and longitude."""
-        if self.style.place is not None and self.style.form not in WITH_PLACES:
+        if self.style.place is not None and self.style.format not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
-            raise ValueInvalid(f"{self.style.form} has no place for {names}; write csv, json, yaml or text")
+            raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
 
     def values(self, values: Iterable[Result | dict[str, Any]]) -> None:
         """Write results: poses as poses; points, vectors and messages as the mappings they are."""
@@ -130,7 +130,7 @@ class Output:
             return
         found = list(values)
         poses = [each for each in found if isinstance(each, Result)]
-        if len(poses) < len(found) and self.style.form != "csv":
+        if len(poses) < len(found) and self.style.format != "csv":
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
             return
         beside = {key for each in poses for key in each.said(self.style)}
@@ -139,7 +139,7 @@ class Output:
         if "scale" in beside:
             from frametool.stream.writers import refuse_scale_in
 
-            refuse_scale_in(self.style.form, beside)
+            refuse_scale_in(self.style.format, beside)
         self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
         self._tell_dropped(key for each in poses for key in each.extras)
 
@@ -151,8 +151,8 @@ class Output:
     def _tell_dropped(self, keys: Iterable[str]) -> None:
         """Name what results say besides where the form has no place for it."""
         others = {*keys} - {"stamp_ns", "point", "vector", "frame"}
-        if others and self.style.form not in ("text", "yaml", "json", "csv"):
-            warn(f"{self.style.form}: {listing(others)} left out")
+        if others and self.style.format not in ("text", "yaml", "json", "csv"):
+            warn(f"{self.style.format}: {listing(others)} left out")
 
     def poses_as_they_come(self, results: Iterator[Result]) -> None:
         """Write poses that have the same keys, in batches."""
@@ -188,7 +188,7 @@ class Output:
         for batch in batches:
             kind, block = self._block(batch, placed=placed)
             if kind != known:
-                raise ValueInvalid(f"{self.style.form} holds things of one kind, found {known} and {kind}")
+                raise ValueInvalid(f"{self.style.format} holds things of one kind, found {known} and {kind}")
             yield writer.of_block(block)
         yield from writer.end()
 
@@ -206,13 +206,13 @@ class Output:
         if self.is_trajectory:
             raise ValueInvalid("a trajectory holds poses; a point has no rotation")
         if poses:
-            raise ValueInvalid(f"{self.style.form} holds things of one kind, found poses among others")
+            raise ValueInvalid(f"{self.style.format} holds things of one kind, found poses among others")
         return block_of_points([each for each in found if not isinstance(each, Result)])
 
     def rows(self, blocks: Iterator[BlockResults]) -> None:
         """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
         good = self._before_a_fault(blocks)
-        if self.style.form == "csv":
+        if self.style.format == "csv":
             from frametool.stream.csv_table import CsvTable
 
             self.pieces(CsvTable(self.style).pieces(good))
@@ -227,7 +227,7 @@ class Output:
         if in_blocks:
             self._refuse_place()
             self.pieces(self._blocks(chain(first, values)))
-        elif self.style.form in ("yaml", "json"):
+        elif self.style.format in ("yaml", "json"):
             self.pieces(self._documents(chain(first, values)))
         else:
             self.values(chain(first, values))
@@ -242,7 +242,7 @@ class Output:
     def _documents(self, values: Iterator[Result | dict[str, Any]]) -> Iterator[str]:
         """Yield results as documents of YAML, or lines of JSON, some at a time."""
         between = ""
-        write, parting = self._module("").write_points, "---\n" if self.style.form == "yaml" else ""
+        write, parting = self._module("").write_points, "---\n" if self.style.format == "yaml" else ""
         while batch := list(islice(values, BATCH)):
             found = [each.mapping(self.style) if isinstance(each, Result) else each for each in batch]
             yield between + write(found, self.style)
@@ -251,22 +251,22 @@ class Output:
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
         if tree.drawn and self._form_is_default:
-            self.style = self.style.in_form("text")
-        if tree.drawn and self.style.form != "text":
-            raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.form}; -f text shows its frames")
-        if tree.covariances and self.style.form not in ("yaml", "json", "text"):
-            warn(f"{self.style.form}: covariances left out")
-        if table.is_recording(self.style.form):
+            self.style = self.style.with_format("text")
+        if tree.drawn and self.style.format != "text":
+            raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.format}; -f text shows its frames")
+        if tree.covariances and self.style.format not in ("yaml", "json", "text"):
+            warn(f"{self.style.format}: covariances left out")
+        if table.is_recording(self.style.format):
             self.pieces(self._module("").tree_pieces(tree, self.style))
             return
         holds_samples = "trajectory" in self._writes or (tree.moves and "poses" in self._writes)
-        if holds_samples and self.style.form not in ("yaml", "json"):
+        if holds_samples and self.style.format not in ("yaml", "json"):
             if self.is_trajectory:
-                self.take_axes_in(tree, _only_mover(tree, self.style.form))
+                self.take_axes_in(tree, _only_mover(tree, self.style.format))
             self.values(sample_results(tree))
             return
-        if self.style.form != "text":
-            if loses := table.FORMATS[self.style.form].not_stored:
+        if self.style.format != "text":
+            if loses := table.FORMATS[self.style.format].not_stored:
                 say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return
@@ -285,8 +285,8 @@ class Output:
     def points(self, records: Iterable[dict[str, Any]]) -> None:
         """Write points; for a person one a line, but what has more than three numbers as a mapping."""
         found = list(records)
-        if self.style.form in table.FORMATS and "points" not in self._writes:
-            raise ValueInvalid(f"{self.style.form} holds poses; a point has no rotation")
+        if self.style.format in table.FORMATS and "points" not in self._writes:
+            raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
         if self._in_blocks:
             self.pieces(self._blocks(_batched(iter(found))))
             return
@@ -298,7 +298,7 @@ class Output:
 
     def report(self, entries: Sequence[dict[str, Any]]) -> None:
         """Write flat records that are neither poses nor points."""
-        if self.style.form != "text":
+        if self.style.format != "text":
             self.text(self._module("").write_points(entries, self.style))
             return
         from frametool.view.report_text import trouble, write_report
@@ -308,15 +308,15 @@ class Output:
 
     @property
     def _writes(self) -> tuple[str, ...]:
-        return table.FORMATS[self.style.form].writes if self.style.form in table.FORMATS else ()
+        return table.FORMATS[self.style.format].writes if self.style.format in table.FORMATS else ()
 
-    def _module(self, text_module: str) -> Any:
-        return import_module(table.FORMATS[self.style.form].writer if self.style.form in table.FORMATS else text_module)
+    def _module(self, default: str) -> Any:
+        return import_module(table.FORMATS[self.style.format].writer if self.style.format in table.FORMATS else default)
 
     def pieces(self, pieces: Iterable[str | bytes]) -> None:
         """Write text as it comes; into a file, whole or not at all."""
-        is_plain = self.style.form == "text"
-        if not table.has_no_text(self.style.form):
+        is_plain = self.style.format == "text"
+        if not table.has_no_text(self.style.format):
             self._inputs.ask("precision")
         with self.opened() as write:
             for piece in pieces:
@@ -329,14 +329,14 @@ class Output:
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
-        return opened_place(self.style.form, self.path, force=self.force)
+        return opened_place(self.style.format, self.path, force=self.force)
 
     def _tell_of_suffix(self) -> None:
         """Say what a file holds whose suffix stands for no form, where none was told."""
         suffix = splitext(self.path or "")[1]
         if self._form_is_default and self.path and suffix and not is_special(self.path):
             none = f"no form written here has the suffix {shown(suffix)}"
-            say(f"note: {self.path}: {none}; it holds {self.style.form}, -f says another")
+            say(f"note: {self.path}: {none}; it holds {self.style.format}, -f says another")
 
     def text(self, text: str) -> None:
         """Write text."""

@@ -261,7 +261,7 @@ class Stream:
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
         no_room |= output.is_trajectory and output.style.place is not None
         turns = bool(output.style.axes) and not output.notations
-        no_room |= turns and is_turned(output.style.in_form(output.told or form))
+        no_room |= turns and is_turned(output.style.with_format(output.told or form))
         return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
 
     def _as_columns(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
@@ -277,12 +277,12 @@ class Stream:
             raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
-        file.form = form
+        file.format = form
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
         into: Any = module
         if output.told is not None and request.gathered is None:
             into = import_module(FORMATS[output.told].writer)
-        style = output.style.in_form(output.told or form)
+        style = output.style.with_format(output.told or form)
         request = request._replace(by_default=not output.notations)
         return run_columns(opened, request, style, source=self.name, into=None if into is module else into), None
 
@@ -296,7 +296,7 @@ class Stream:
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         request = request._replace(by_default=not output.notations)
-        converted = FormatConverter(form, request, output.style.in_form(target), self.name, answers())
+        converted = FormatConverter(form, request, output.style.with_format(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.inputs.header)
         return outcomes, lambda: converted.tally.assumed
 
@@ -334,7 +334,7 @@ class Stream:
         from frametool.stream.record_results import stream_rows
 
         if self.inputs.on_error == NULL and output.told not in ("csv", *RECORDS):
-            raise click.UsageError(f"--on-error null: {output.told} has no place for a row without a result; give skip")
+            raise click.UsageError(f"--on-error null: {output.told} cannot hold a row without a result; give skip")
         bad = self.policy(self.name)
         request = request._replace(by_default=has_no_text(output.told or "") and not output.notations)
         if is_recording(output.told or ""):
@@ -363,7 +363,7 @@ class Stream:
             told.ask("precision")
         return request._replace(
             given=request.given or self.given, notations=request.notations or output.notations,
-            place=output.style.in_form(output.told or form).place, given_place=self.given_place,
+            place=output.style.with_format(output.told or form).place, given_place=self.given_place,
             precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=told.on_error,
         )  # fmt: skip
 

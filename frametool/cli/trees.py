@@ -184,7 +184,7 @@ def opened(
         if is_inline(each)
         else FrameFile(
             tree_file(each),
-            form=next(form_of_next, None),
+            fmt=next(form_of_next, None),
             topics=chosen.topics,
             answers=general,
             reads=reads,
@@ -196,12 +196,12 @@ def opened(
         close_all(found)
         raise click.UsageError(f"--frames is given {len(named)} times, {len(lacking)} of the files need names")
     if len(named) == 1:  # for poses that have no names at all, rather than for names that others go without saying
-        lacking = [file for file in lacking if "rows" in FORMATS[file.form].reads] or lacking
+        lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:
             say(f"note: --frames {','.join(names)} has no effect: {file.name} names its own frames")
-    chosen.forms_read = (*chosen.forms_read, *((file.form, file.required_options) for file in found))
+    chosen.forms_read = (*chosen.forms_read, *((file.format, file.required_options) for file in found))
     return found
 
 

@@ -396,7 +396,7 @@ class InputFile:
         """
         self.path = str(path)
         self.name = "stdin" if self.path == "-" else self.path
-        self.form = ""
+        self.format = ""
         self.beside: Sequence[InputFile] = ()  # all files that are read together
         self.stream: BinaryIO = BufferedReader(BytesIO()) if folder else stream or opened(path)
         self._is_pipe = not self.stream.seekable()

@@ -235,11 +235,11 @@ class XmlNode:
         return self.xml.numbers_in(self.text, self.element, "", count)
 
 
-def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = "", *, texts: bool = True) -> XmlNode:
+def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], fmt: str = "", *, texts: bool = True) -> XmlNode:
     """Return the root element with the selected elements below it.
 
     held: the children kept for each element, the root first; all others are dropped.
-    form: the format's name, for a file with another root.  texts: without them it is faster.
+    fmt: the format's name, for a file with another root.  texts: without them it is faster.
     Raises FormatError.
     """
     top = next(iter(held))
@@ -257,7 +257,7 @@ def read_nodes(xml: XmlFile, held: Mapping[str, Collection[str]], form: str = ""
         if element.ends:
             continue
         if root is None and element.tag != top:
-            expected = f"{form} begins with <{top}>" if form else f"expected <{top}>"
+            expected = f"{fmt} begins with <{top}>" if fmt else f"expected <{top}>"
             raise xml.error(element, f"{expected}, found <{bare(element.tag)}>")
         if opened and element.tag not in held.get(opened[-1].tag, ()):
             skipped = element.depth

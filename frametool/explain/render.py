@@ -212,11 +212,11 @@ class Explanation:
 
     _repr_markdown_ = markdown
 
-    def render(self, form: str = "text") -> str:
+    def render(self, fmt: str = "text") -> str:
         """Return the derivation as text or markdown; raises ValueInvalid for another format."""
-        if form not in FORMS:
-            raise ValueInvalid(f"unknown format {shown(form)}{alternatives(form, FORMS, 'formats')}")
-        return FORMS[form](self)
+        if fmt not in FORMS:
+            raise ValueInvalid(f"unknown format {shown(fmt)}{alternatives(fmt, FORMS, 'formats')}")
+        return FORMS[fmt](self)
 
 
 FORMS: dict[str, Callable[[Explanation], str]] = {"text": Explanation.__str__, "markdown": Explanation.markdown}

@@ -113,7 +113,7 @@ def cameras_of_tree(tree: Frames, files: Sequence[FrameFile]) -> Makers:
     for file in files:
         again = file
         if file.path != "-":
-            again = type(file)(file.path, form=file.form, answers=file.answers)
+            again = type(file)(file.path, fmt=file.format, answers=file.answers)
             again.beside = file.beside
         with closing(again):
             known = cameras_of(again)

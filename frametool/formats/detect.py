@@ -242,8 +242,8 @@ def _fitting(begin: Beginning, tests: dict[str, Shows], names: tuple[str, ...]) 
     return [], ""
 
 
-def _signs(form: str) -> tuple[tuple[str, str | bytes], ...]:
-    return (UNSUPPORTED[form] if form in UNSUPPORTED else FORMATS[form]).magic
+def _signs(fmt: str) -> tuple[tuple[str, str | bytes], ...]:
+    return (UNSUPPORTED[fmt] if fmt in UNSUPPORTED else FORMATS[fmt]).magic
 
 
 # kind -> the description of the sign; all other kinds are keys
@@ -269,7 +269,7 @@ def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]
     fitting, kind = _fitting(begin, _STRONG, (*readers(*reads), *UNSUPPORTED, *readers("drawing")))
     if fitting and kind != "magic" and not begin.head.startswith(UTF16) and not_text(begin.head):
         return None, ""  # bytes that resemble a line of some format by chance
-    found = [form for form in fitting if not _is_unread(form, reads)] or fitting
+    found = [fmt for fmt in fitting if not _is_unread(fmt, reads)] or fitting
     if not found:
         return None, ""
     if _is_unread(found[0], reads):
@@ -279,25 +279,25 @@ def _by_sign(begin: Beginning, *reads: str, name: str) -> tuple[str | None, str]
     return found[0], _KNOWN_BY.get(kind, "its keys")
 
 
-def _is_unread(form: str, reads: tuple[str, ...]) -> bool:
-    return form in UNSUPPORTED or set(reads).isdisjoint(FORMATS[form].reads)
+def _is_unread(fmt: str, reads: tuple[str, ...]) -> bool:
+    return fmt in UNSUPPORTED or set(reads).isdisjoint(FORMATS[fmt].reads)
 
 
 _NO_POSES = "no poses in it (frametool tree shows the frames); give what it was made from, as a bag of /tf, /tf_static"
 
 
-def not_read(form: str, name: str) -> FormatError:
+def not_read(fmt: str, name: str) -> FormatError:
     """Return the error for a file that is recognised but not supported: what it is, what to do."""
-    about = str(UNSUPPORTED[form]) if form in UNSUPPORTED else f"{FORMATS[form].summary}: {_NO_POSES}"
+    about = str(UNSUPPORTED[fmt]) if fmt in UNSUPPORTED else f"{FORMATS[fmt].summary}: {_NO_POSES}"
     return FormatError(about, source=name or "stdin")
 
 
 def of_folder(path: str) -> str | None:
     """Return the format of a folder; None for a file, and for any other folder."""
-    for form, row in FORMATS.items():
+    for fmt, row in FORMATS.items():
         for kind, what in row.magic:
             if kind == "folder" and os.path.isdir(path) and os.path.exists(os.path.join(path, str(what))):
-                return form
+                return fmt
     return None
 
 
@@ -309,9 +309,9 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     Raises FormatError if nothing matches and there is no default, or two formats fit.
     """
     begin = Beginning(head)
-    form, known_by = _by_sign(begin, *reads, name=name)
-    if form:
-        return form, known_by
+    fmt, known_by = _by_sign(begin, *reads, name=name)
+    if fmt:
+        return fmt, known_by
     if "tree" not in reads and (what := not_text(head)):
         raise _no_text(what, name)
     if "tree" in reads and begin.xml and (begin.elements or not by_suffix(name, readers(*reads))):
@@ -319,12 +319,12 @@ def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty:
     if others := _fitting(begin, {"magic": _STRONG["magic"]}, readers("arrays"))[0]:
         what = f"{FORMATS[others[0]].summary}: no frames in it; frametool convert and apply read it"
         raise FormatError(what, source=name or "stdin")
-    if form := by_suffix(name, readers(*reads)):
-        if (what := not_text(head)).startswith("not text but") and FORMATS[form].reader != BAG:
+    if fmt := by_suffix(name, readers(*reads)):
+        if (what := not_text(head)).startswith("not text but") and FORMATS[fmt].reader != BAG:
             raise _no_text(what, name)
-        return form, f"the suffix {name[name.rfind('.') :].lower()}"
-    if form := unsupported_by_suffix(name):
-        raise not_read(form, name)
+        return fmt, f"the suffix {name[name.rfind('.') :].lower()}"
+    if fmt := unsupported_by_suffix(name):
+        raise not_read(fmt, name)
     if (what := not_text(head)) and not head.startswith(UTF16):
         raise _no_text(what, name)
     found, _ = _fitting(begin, _WEAK, readers(*reads))
@@ -379,7 +379,7 @@ def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
     likely = readers(*reads)
     what = "this text"
     if begin.xml:
-        likely = tuple(form for form in likely if any(kind.startswith("xml") for kind, _ in FORMATS[form].magic))
+        likely = tuple(fmt for fmt in likely if any(kind.startswith("xml") for kind, _ in FORMATS[fmt].magic))
         what = f"XML without an element{f' in its first {HEAD >> 10} KiB' * (len(begin.head) >= HEAD)}"
         what = f"XML with the root element {bare(begin.elements[0])}" if begin.elements else what
     named = f"formats: {first_of(likely, _MOST_NAMED)}" if likely else "none of those read here is XML"
@@ -416,14 +416,14 @@ def with_hint(error: FormatError, text: bytes, name: str, *, told: bool = False)
 def _points_to_lookup(text: bytes, name: str) -> FormatError | None:
     begin = Beginning(text[:HEAD])
     try:
-        form, _ = _by_sign(begin, "tree", name=name)
+        fmt, _ = _by_sign(begin, "tree", name=name)
     except FormatError as error:
         return error
-    if form in (None, "yaml", "json"):
-        form = "yaml" if re.search(_FRAMES_KEY, begin.text) else None
-    if form is None or form in _MESSAGES or "rows" in FORMATS[form].reads:
+    if fmt in (None, "yaml", "json"):
+        fmt = "yaml" if re.search(_FRAMES_KEY, begin.text) else None
+    if fmt is None or fmt in _MESSAGES or "rows" in FORMATS[fmt].reads:
         return None
-    what = "a tree of frames" if form == "yaml" else f"{FORMATS[form].summary}: frames"
+    what = "a tree of frames" if fmt == "yaml" else f"{FORMATS[fmt].summary}: frames"
     file = "FILE" if name in ("", "stdin") else name
     hint = f"look one up: frametool lookup {file} TARGET SOURCE"
     return FormatError(f"{what}, not a pose; {hint}", source=name or "stdin")

@@ -65,7 +65,7 @@ class FrameFile(InputFile):
         self,
         path: str | PathLike[str],
         stream: BinaryIO | None = None,
-        form: str | None = None,
+        fmt: str | None = None,
         topics: Iterable[str] = (),
         answers: Answers = Answers(),  # noqa: B008 - it is frozen
         reads: Sequence[str] = ("tree",),
@@ -76,14 +76,14 @@ class FrameFile(InputFile):
         answers: options for what the format does not specify.  reads: restricts the formats, as in the table.
         Raises FileProblem.
         """
-        folder = found if (found := of_folder(str(path))) and form in (None, "", found) else None
-        if not (form or folder) and os.path.isdir(path):
+        folder = found if (found := of_folder(str(path))) and fmt in (None, "", found) else None
+        if not (fmt or folder) and os.path.isdir(path):
             raise FileProblem(f"{path}: {_about_folder(str(path))}")
         super().__init__(path, stream, folder=folder is not None)
         try:
-            self.form, self.known_by = form or folder or "", "what it holds" if folder else ""
-            if not self.form:
-                self.form, self.known_by = detect(self.head(), *reads, name=self.path, empty="yaml")
+            self.format, self.known_by = fmt or folder or "", "what it holds" if folder else ""
+            if not self.format:
+                self.format, self.known_by = detect(self.head(), *reads, name=self.path, empty="yaml")
         except BaseException:
             self.close()
             raise
@@ -101,13 +101,13 @@ class FrameFile(InputFile):
     @property
     def holds_samples(self) -> bool:
         """Return True for a recording, False for a tree in YAML or JSON."""
-        return "records" not in FORMATS[self.form].reads
+        return "records" not in FORMATS[self.format].reads
 
     @property
     def required_options(self) -> tuple[str, ...]:
         """Return what the file does not specify; of tables also frames without columns, of recordings poses."""
-        row = FORMATS[self.form]
-        if self.form in ("csv", "tsv", "semicolon"):
+        row = FORMATS[self.format]
+        if self.format in ("csv", "tsv", "semicolon"):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.delimiter)}
             return row.required_options[0 if words.isdisjoint(PARENT_COLUMNS) or words.isdisjoint(NAME_KEYS) else 1 :]
         return (*row.required_options, *["frames"] * bool(self.topics.chosen))
@@ -115,7 +115,7 @@ class FrameFile(InputFile):
     @property
     def known(self) -> str:
         """Return the detected format and its sign, unless the format was set."""
-        return f"{self.name}: {FORMATS[self.form].summary}{f', known by {self.known_by}' if self.known_by else ''}"
+        return f"{self.name}: {FORMATS[self.format].summary}{f', known by {self.known_by}' if self.known_by else ''}"
 
     @property
     def stated(self) -> str:
@@ -143,13 +143,13 @@ class FrameFile(InputFile):
         """
         try:
             options = Options(self.tally, self.topics, report, normalize, self.answers)
-            found = import_module(FORMATS[self.form].reader).read(self, options)
+            found = import_module(FORMATS[self.format].reader).read(self, options)
             if offset_ns := self.answers.time_offset:
                 found = (at_other_times(piece, offset_ns) for piece in found)
             yield from found
         finally:
             self.close()
-        if self.form in OWN and re.search(r"""\bcamera["']?:""", self.text):
+        if self.format in OWN and re.search(r"""\bcamera["']?:""", self.text):
             self._take_cameras()
         if missing := self.topics.missing():
             report(FormatError(missing, source=self.name))
@@ -540,10 +540,10 @@ def load(
     for ask, choices in CHOICES.items():
         if (answer := answers.get(ask)) and answer not in choices:
             raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
-    files = opened_together(FrameFile(path, form=format, topics=chosen, answers=known) for path in paths)
+    files = opened_together(FrameFile(path, fmt=format, topics=chosen, answers=known) for path in paths)
     for ask in ("frames", *answers):
         if getattr(known, ask) and not any(ask in file.required_options for file in files):
-            names = " and ".join(dict.fromkeys(file.form for file in files))
+            names = " and ".join(dict.fromkeys(file.format for file in files))
             warn(f"{ask} has no effect: {names} specifies this itself")
     return load_sources(files, rules)
 
@@ -572,7 +572,7 @@ def load_sources(
 
 def _with_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile]) -> FrameTree | TransformBuffer:
     """Add to a tree the robots of its files, and cameras: those of frametool trees now, others on demand."""
-    others = [file for file in files if FORMATS[file.form].cameras]
+    others = [file for file in files if FORMATS[file.format].cameras]
     tree.robots = [file.tally.robot for file in files if file.tally.robot is not None]
     tree.cameras = {name: camera for file in files for name, camera in file.cameras.items()}
     tree.read_cameras = partial(_read_cameras, tree, others)
@@ -610,4 +610,4 @@ def _add(builder: TreeBuilder, file: FrameFile) -> None:
         raise FormatError("no frames in it", source=file.name)
     builder.axes |= {frame: axes for frame, axes in file.tally.axes.items() if axes}
     builder.drawn |= file.tally.drawn
-    builder.has_cameras |= file.form not in OWN or bool(file.cameras)
+    builder.has_cameras |= file.format not in OWN or bool(file.cameras)

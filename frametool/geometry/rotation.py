@@ -92,7 +92,7 @@ class Batched(metaclass=OtherNames):
 NEAR = 1e-9  # rad: the default of `is_close`, three digits above the rounding of long chains
 
 _new = object.__new__
-_form = cache(notation)
+_notation = cache(notation)
 
 
 class Rotation(Batched):
@@ -170,13 +170,13 @@ class Rotation(Batched):
 
         Quaternions need an explicit order, xyzw or wxyz.
         """
-        form = _form(name)
-        form.bound_axes()
+        rep = _notation(name)
+        rep.bound_axes()
         if name == "quaternion":
             raise ValueInvalid("quaternion does not say its order; give xyzw=[..] or wxyz=[..]")
         if name == "matrix":
             return cls.from_matrix(numbers, normalize=normalize)
-        columns = validation.columns(numbers, len(form.columns), name)
+        columns = validation.columns(numbers, len(rep.columns), name)
         return cls.from_columns(name, columns, name, normalize=normalize)
 
     @classmethod
@@ -225,17 +225,17 @@ class Rotation(Batched):
         cls, spec: str, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
     ) -> Rotation:
         """Check and convert the columns of a notation; errors call them `name`, `into` receives the result of many."""
-        form = _form(spec)
+        rep = _notation(spec)
         if validation.single(given):
-            return cls.of(*form.checked_quaternion(given, floats, normalize=normalize))
+            return cls.of(*rep.checked_quaternion(given, floats, normalize=normalize))
         from frametool.geometry.batch_validation import require_rotations
 
-        return cls._of_columns(require_rotations(form, given, name, normalize=normalize, into=into))
+        return cls._of_columns(require_rotations(rep, given, name, normalize=normalize, into=into))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""
-        form = _form(spec)
-        return validation.rows(form.from_quaternion, inner or (len(form.columns),), self._components, out=out)
+        rep = _notation(spec)
+        return validation.rows(rep.from_quaternion, inner or (len(rep.columns),), self._components, out=out)
 
     def as_quaternion(self, *, out: Array | None = None) -> Array:
         """Return x, y, z, w of shape (..., 4), unit, with w >= 0 (w == 0: first non-zero of x, y, z positive)."""

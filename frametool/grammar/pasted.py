@@ -370,25 +370,25 @@ def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
 
 def _meant(rows: Rows, given: Notation | None) -> list[Any]:
     """Convert rows to values; bare lists if nothing states their notation."""
-    form = given or notation("matrix")
-    if form.representation.whole:
-        if (value := matrix_pose(rows, form, told=given is not None)) is not None:
+    rep = given or notation("matrix")
+    if rep.representation.whole:
+        if (value := matrix_pose(rows, rep, told=given is not None)) is not None:
             return [value]
-    elif (found := _spelled_rows(rows, form)) is not None:
+    elif (found := _spelled_rows(rows, rep)) is not None:
         return found
     if given is not None:
         counts = " and ".join(map(str, dict.fromkeys(map(len, rows))))
         several = f"{len(rows)} rows of " * (len(rows) > 1)
-        raise ValueInvalid(f"{form.counted}; found {several}{counts}")
+        raise ValueInvalid(f"{rep.counted}; found {several}{counts}")
     return [rows[0] if len(rows) == 1 else rows]
 
 
-def matrix_pose(rows: Rows, form: Notation, *, told: bool = False) -> dict[str, Any] | None:
+def matrix_pose(rows: Rows, rep: Notation, *, told: bool = False) -> dict[str, Any] | None:
     """Return a 3x3, a 3x4 or a 4x4 matrix, or its numbers row by row, as a mapping; None for another size.
 
     told: the user stated `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
     """
-    key = form.spec
+    key = rep.spec
     sizes = {len(row) for row in rows}
     cells = [cell for row in rows for cell in row]
     if (len(rows), sizes) in ((3, {3}), (4, {4})):
@@ -418,32 +418,32 @@ def is_rotation(rows: Rows) -> bool:
     return all(abs(product - same) < 1e-3 for product, same in products)
 
 
-def _spelled_rows(rows: Rows, form: Notation) -> list[Any] | None:
+def _spelled_rows(rows: Rows, rep: Notation) -> list[Any] | None:
     """Return the poses of rows in a notation: one per row, or one column, or a position and a rotation."""
-    size = len(form.columns)
+    size = len(rep.columns)
     lengths = [len(row) for row in rows]
     if len(rows) > 1 and set(lengths) == {1}:
         rows = [[cell for (cell,) in rows]]
         lengths = [len(rows[0])]
     if lengths == [3, size]:
         if size == 3:
-            hint = f"write {{xyz: [..], {form.representation.name}: ..}}"
+            hint = f"write {{xyz: [..], {rep.representation.name}: ..}}"
             raise ValueInvalid(f"two rows of 3 may be a pose or two rotations; {hint}")
         rows, lengths = [[*rows[0], *rows[1]]], [3 + size]
     if not set(lengths) <= {size, size + 3}:
         return None
-    return [_entry(row, form) for row in rows]
+    return [_entry(row, rep) for row in rows]
 
 
-def _entry(cells: Sequence[str], form: Notation) -> dict[str, Any]:
+def _entry(cells: Sequence[str], rep: Notation) -> dict[str, Any]:
     """Return the mapping of a rotation, after x y z if there are enough numbers."""
-    row = form.representation
+    row = rep.representation
     size = len(row.columns)
     for index, cell in enumerate(cells[-size:]):
         (parse_angle if index in row.angles else parse_number)(cell)
-    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
-    form.bound_axes()
-    entry = {f"{row.name}{unit}": spelled(form, list(cells[-size:]))}  # type: ignore[arg-type]
+    unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
+    rep.bound_axes()
+    entry = {f"{row.name}{unit}": spelled(rep, list(cells[-size:]))}  # type: ignore[arg-type]
     return {"xyz": list(cells[:-size]), **entry} if len(cells) > size else entry
 
 

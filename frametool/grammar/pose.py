@@ -314,18 +314,18 @@ def pose_of_numbers(texts: Sequence[str], given: Notation | None, reading: Readi
 
     Raises NotARotation for an invalid rotation, ValueInvalid for a list that is not such numbers.
     """
-    form = _form_of(texts, given)
-    whole, size = form.representation.whole, len(form.representation.columns)
+    rep = _notation_of(texts, given)
+    whole, size = rep.representation.whole, len(rep.representation.columns)
     if whole and len(texts) == _ROWS_OF_A_POSE:
         from frametool.grammar.pasted import matrix_pose
 
-        return read_pose(matrix_pose([list(texts)], form, told=given is not None) or {}, reading)
+        return read_pose(matrix_pose([list(texts)], rep, told=given is not None) or {}, reading)
     if whole and len(texts) == len(whole.columns):
-        return Pose(*read_spelled(form, texts, INDICES, reading))
-    if len(texts) not in form.counts:
-        raise ValueInvalid(f"{form.counted}; found {len(texts)}")
+        return Pose(*read_spelled(rep, texts, INDICES, reading))
+    if len(texts) not in rep.counts:
+        raise ValueInvalid(f"{rep.counted}; found {len(texts)}")
     x, y, z = map(parse_length, texts[:-size] or ("0", "0", "0"))
-    rotation = rotation_of(form, texts[-size:], INDICES, reading)
+    rotation = rotation_of(rep, texts[-size:], INDICES, reading)
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
@@ -334,17 +334,17 @@ def mapping_of_numbers(texts: Sequence[str], given: Notation | None) -> str:
     from frametool.documents.json import dump
     from frametool.documents.source import Verbatim
 
-    form = _form_of(texts, given)
-    whole = form.representation.whole
-    size = len(texts) if whole and len(texts) == len(whole.columns) else len(form.representation.columns)
-    unit = "" if form.degrees is None else "_deg" if form.degrees else "_rad"
+    rep = _notation_of(texts, given)
+    whole = rep.representation.whole
+    size = len(texts) if whole and len(texts) == len(whole.columns) else len(rep.representation.columns)
+    unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
     numbers: Any = list(map(Verbatim, texts))  # texts in place of numbers, read as such
     mapping = {"xyz": numbers[:-size]} if len(texts) > size else {}
-    mapping[form.representation.name + unit] = spelled(form, numbers[-size:])
+    mapping[rep.representation.name + unit] = spelled(rep, numbers[-size:])
     return dump(mapping)
 
 
-def _form_of(texts: Sequence[str], given: Notation | None) -> Notation:
+def _notation_of(texts: Sequence[str], given: Notation | None) -> Notation:
     """Return the notation of bare numbers; only a matrix is known by their number."""
     if given is not None:
         return given

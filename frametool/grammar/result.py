@@ -56,13 +56,13 @@ class Style:
     """
 
     __slots__ = (
-        "axes", "degrees", "form", "full", "in_camera", "in_cm", "keep_sign", "notations", "place", "precision",
+        "axes", "degrees", "format", "full", "in_camera", "in_cm", "keep_sign", "notations", "place", "precision",
         "recording", "screen",
     )  # fmt: skip
 
     def __init__(
         self,
-        form: str,
+        fmt: str,
         notations: tuple[Notation, ...] = (),
         *,
         degrees: bool = False,
@@ -71,7 +71,7 @@ class Style:
         keep_sign: bool = False,
     ) -> None:
         """Store the options of a command."""
-        self.form = form
+        self.format = fmt
         self.axes = ""
         self.in_camera = self.in_cm = self.screen = False
         self.place: Place | None = None
@@ -82,10 +82,10 @@ class Style:
         self.full = full
         self.keep_sign = keep_sign
 
-    def in_form(self, form: str) -> Style:
+    def with_format(self, fmt: str) -> Style:
         """Return the same style in another format."""
         style = Style(
-            form, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
+            fmt, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
             keep_sign=self.keep_sign,
         )  # fmt: skip
         style.axes, style.in_camera, style.in_cm, style.screen = self.axes, self.in_camera, self.in_cm, self.screen
@@ -95,11 +95,11 @@ class Style:
 
     def put_at(self, place: Place | None) -> None:
         """Write positions as positions on the Earth; tables have no columns for convergence and scale of UTM."""
-        self.place = place and place.with_grid(gridded=self.form in ("text", "yaml", "json"))
+        self.place = place and place.with_grid(gridded=self.format in ("text", "yaml", "json"))
 
     def in_notations(self, notations: tuple[Notation, ...]) -> Style:
         """Return the same style with other notations."""
-        style = self.in_form(self.form)
+        style = self.with_format(self.format)
         style.notations = notations
         return style
 
@@ -107,7 +107,7 @@ class Style:
         """Format a finite number: the shortest text that reads back to the same bits, or fixed decimals; never -0."""
         if not -INFINITE < value < INFINITE:
             raise ValueInvalid(f"a result is {value}: too large for a double, or not finite to begin with")
-        bits = _nine_digits(value) if self.screen and self.form in SEEN and not self.full else value + 0.0
+        bits = _nine_digits(value) if self.screen and self.format in SEEN and not self.full else value + 0.0
         return repr(bits) if self.precision is None else f"{value:z.{self.precision}f}"
 
     def in_degrees(self, notation: Notation) -> bool:
@@ -238,7 +238,7 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
 
 def _by_xyz(style: Style) -> Style:
     """Return the same style with positions as x, y, z."""
-    plain = style.in_form(style.form)
+    plain = style.with_format(style.format)
     plain.put_at(None)
     return plain
 

@@ -356,7 +356,7 @@ class RecordCopy:
         return self._is_inside(message.log_ns) or message.channel.is_static
 
     def pieces(
-        self, form: str, folder: str, added: Mapping[str, Sequence[AddedEdge]], stamp_ns: int, advance: Advance
+        self, fmt: str, folder: str, added: Mapping[str, Sequence[AddedEdge]], stamp_ns: int, advance: Advance
     ) -> Iterator[bytes]:
         """Yield the bytes of the copy in a format, starting with edges on some topics; stamp_ns: of these.
 
@@ -366,12 +366,12 @@ class RecordCopy:
         for each in self.reader.all:
             if each.schema is None and each.type:
                 self._define(each)
-        file = RecordingFile(form, folder, files[0].compression, head=files[0].head)
+        file = RecordingFile(fmt, folder, files[0].compression, head=files[0].head)
         for topic, edges in added.items():
             channel = self._latched(topic)
             file.begin([channel])
             frames = [(edge.parent, edge.child) for edge in edges]
-            data = serialised(TF_STATIC, form, frames, [stamp_ns] * len(edges), [edge.numbers for edge in edges])
+            data = serialised(TF_STATIC, fmt, frames, [stamp_ns] * len(edges), [edge.numbers for edge in edges])
             file.add(Recorded(channel, self.first_ns or 0, data, self.first_ns or 0))
         file.begin(self.reader.all)
         for message in self._messages(advance):

@@ -61,23 +61,23 @@ def typestore(*, ros1: bool) -> Any:
     return store
 
 
-def check_stamps(stamps_ns: Ints, form: str) -> None:
+def check_stamps(stamps_ns: Ints, fmt: str) -> None:
     """Raise ValueInvalid for a stamp whose seconds a message cannot hold."""
-    first, last = SECONDS.get(form, SECONDS_ROS2)
+    first, last = SECONDS.get(fmt, SECONDS_ROS2)
     seconds = stamps_ns // BILLION
     bad = stamps_ns[(seconds < first) | (seconds > last)]
     if len(bad):
         stamp = format_stamp(int(bad[0]))
-        raise ValueInvalid(f"stamp {stamp} does not fit in {form}, whose seconds are {first} .. {last}")
+        raise ValueInvalid(f"stamp {stamp} does not fit in {fmt}, whose seconds are {first} .. {last}")
 
 
 class MessageTemplate:
     """The bytes of a message about one frame, and the positions of its stamp and numbers."""
 
-    def __init__(self, kind: Kind, form: str, parent: str, child: str = "") -> None:
+    def __init__(self, kind: Kind, fmt: str, parent: str, child: str = "") -> None:
         """Serialise a message with unique numbers to find their positions; ValueInvalid for names that are not text."""
         numbers = [_PROBE * (at + 1) for at in range(kind.numbers)]
-        self.bytes = serialised(kind, form, [(parent, child)], [_PROBE_NS], [numbers])
+        self.bytes = serialised(kind, fmt, [(parent, child)], [_PROBE_NS], [numbers])
         self.stamp_at = self.bytes.index(struct.pack("<II", *divmod(_PROBE_NS, BILLION)))
         self.numbers_at = self.bytes.index(struct.pack(f"<{kind.numbers}d", *numbers))
 
@@ -98,19 +98,19 @@ _PROBE_NS = 1532698752_187654321
 
 
 def serialised(
-    kind: Kind, form: str, frames: Sequence[tuple[str, str]], stamps_ns: Sequence[int],
+    kind: Kind, fmt: str, frames: Sequence[tuple[str, str]], stamps_ns: Sequence[int],
     numbers: Sequence[Sequence[float]],
 ) -> bytes:  # fmt: skip
     """Return one message; frames: (parent, child) of each of its transforms or poses.
 
     Raises ValueInvalid for names that are not text.
     """
-    store = typestore(ros1=form == BAG1)
+    store = typestore(ros1=fmt == BAG1)
     stamps = [divmod(stamp, BILLION) for stamp in stamps_ns]
     stamps = [((second + (1 << 31)) % (1 << 32) - (1 << 31), part) for second, part in stamps]  # of ROS 1, as int32
     message = _message(store.types, kind, frames, stamps, numbers)
     try:
-        return bytes((store.serialize_ros1 if form == BAG1 else store.serialize_cdr)(message, kind.type))
+        return bytes((store.serialize_ros1 if fmt == BAG1 else store.serialize_cdr)(message, kind.type))
     except UnicodeEncodeError as error:
         raise ValueInvalid(f"{shown(error.object)} is not a name that can be written") from None
 
@@ -189,12 +189,12 @@ class MessageTypes:
         found: dict[str, Any] = {}
         digests: set[str] = set()
         for each in self.channels:
-            _, form, definition = each.schema or ("", "", b"")
-            if each.type != kind or form not in ("ros1msg", "ros2msg", "ros2idl", "omgidl"):
+            _, fmt, definition = each.schema or ("", "", b"")
+            if each.type != kind or fmt not in ("ros1msg", "ros2msg", "ros2idl", "omgidl"):
                 continue
             digests |= {each.digest} - {""}
             text = definition.decode()
-            if form.endswith("msg"):
+            if fmt.endswith("msg"):
                 found |= get_types_from_msg(text, kind)
                 continue
             for part in text.split(BETWEEN_IDL)[1:] or [f"\n{text}"]:

@@ -55,7 +55,7 @@ class FirstPiece(bytes):
 class RecordingFile:
     """A recording that is being written, to an unnamed file until `pieces` yields its contents."""
 
-    def __init__(self, form: str, folder: str = "", compression: str = "", *, head: Any = None) -> None:
+    def __init__(self, fmt: str, folder: str = "", compression: str = "", *, head: Any = None) -> None:
         """Open it in a folder for temporary files; raises FileProblem without the extra.
 
         compression: of its chunks, as MCAP files and bags name them; head: profile and library of MCAP
@@ -67,7 +67,7 @@ class RecordingFile:
         except ImportError:
             raise FileProblem(NO_EXTRA) from None
 
-        self.form, self.log_ns = form, 0
+        self.format, self.log_ns = fmt, 0
         self.counts: dict[Channel, int] = {}
         self.span: tuple[int, int] | None = None  # of log times
         self._folder = folder
@@ -76,7 +76,7 @@ class RecordingFile:
             home = Path(mkdtemp(".part", ".frametool.", folder or None))
             place = home / NAME
             self._writer: Any
-            if form == BAG1:
+            if fmt == BAG1:
                 self._writer = Writer1(place)
                 if compression:
                     self._writer.set_compression(Writer1.CompressionFormat[compression.upper()])
@@ -93,7 +93,7 @@ class RecordingFile:
 
     def channel(self, kind: Kind, topic: str = "") -> Channel:
         """Begin a topic, by default the usual one of its kind, and return the argument for `write`."""
-        made = new_channel(kind, topic or kind.topic, ros1=self.form == BAG1)
+        made = new_channel(kind, topic or kind.topic, ros1=self.format == BAG1)
         self.begin([made])
         return made
 
@@ -102,7 +102,7 @@ class RecordingFile:
         for each in channels:
             self.counts.setdefault(each, 0)
             if each.key not in self._numbers:
-                self._numbers[each.key] = self._connection(each) if self.form == BAG1 else self._channel(each)
+                self._numbers[each.key] = self._connection(each) if self.format == BAG1 else self._channel(each)
             self._numbers[each] = self._numbers[each.key]
 
     def _connection(self, channel: Channel) -> Any:
@@ -131,7 +131,7 @@ class RecordingFile:
         channel, log_ns, data, publish_ns, sequence = message
         number = self._numbers[channel]
         try:
-            if self.form == BAG1:
+            if self.format == BAG1:
                 self._writer.write(number, log_ns, data)
             else:
                 self._writer.add_message(number, log_ns, data, publish_ns, sequence)
@@ -155,15 +155,15 @@ class RecordingFile:
         """
         metadata: dict[str, Any] = {}
         with room_in(self._folder):
-            if self.form == BAG1:
+            if self.format == BAG1:
                 self._writer.close()
             else:
                 metadata = self._metadata(before or {})
-                if itself or self.form == BAG2:
+                if itself or self.format == BAG2:
                     self._writer.add_metadata(ITSELF, {SERIALIZED: dump(metadata)})
                 self._writer.finish()
                 self._stream.close()
-        if self.form == BAG2:
+        if self.format == BAG2:
             yield FirstPiece(dump({INFORMATION: metadata}).encode(), METADATA)
             yield FirstPiece(self._file.read(PIECE), f"{NAME}.mcap")
         while piece := self._file.read(PIECE):
@@ -200,25 +200,25 @@ class RecordingFile:
 
 def tree_pieces(tree: Frames, style: Style) -> Iterator[bytes]:
     """Yield the bytes of a recording of a tree: static edges in one message, moving ones in one per stamp."""
-    form, asked = style.form, style.recording
+    fmt, asked = style.format, style.recording
     topics = {"tf_static": any(track.is_static for track in tree.tracks()), "tf": tree.moves}
     if asked.topic and all(topics.values()):
         raise ValueInvalid(f"the tree has static and moving frames, on two topics; {asked.topic} names one")
     if not any(topics.values()):
-        raise ValueInvalid(f"{form} holds transforms, and there is none in the tree")
-    file = RecordingFile(form, asked.folder)
+        raise ValueInvalid(f"{fmt} holds transforms, and there is none in the tree")
+    file = RecordingFile(fmt, asked.folder)
     moving = merge(*(_samples(track, style) for track in tree.tracks() if not track.is_static), key=itemgetter(0))
     messages = ((stamp, [*rows]) for stamp, rows in groupby(moving, itemgetter(0)))
     first = next(messages, None)
     if topics["tf_static"]:
         still = [row for track in tree.tracks() if track.is_static for row in _samples(track, style)]
-        data = serialised(KINDS["tf_static"], form, *_columns(still))
+        data = serialised(KINDS["tf_static"], fmt, *_columns(still))
         file.write(file.channel(KINDS["tf_static"], asked.topic), 0 if first is None else first[0], data)
     if first is not None:
         channel = file.channel(KINDS["tf"], asked.topic)
         for stamp, rows in chain([first], messages):
-            check_stamps(np.array([stamp]), form)
-            file.write(channel, stamp, serialised(KINDS["tf"], form, *_columns(rows)))
+            check_stamps(np.array([stamp]), fmt)
+            file.write(channel, stamp, serialised(KINDS["tf"], fmt, *_columns(rows)))
     yield from file.pieces()
 
 

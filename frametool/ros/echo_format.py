@@ -49,24 +49,24 @@ def write_messages(messages: Iterable[dict[str, Any]], style: Style) -> str:
 
 def message_text(message: dict[str, Any], style: Style) -> str:
     """Return one message and the line that ends it."""
-    message = _respelled(message, style.form)
-    lines = _ros1_lines(message, style, "") if style.form == "ros1" else _ros2_lines(message, style, "")
+    message = _respelled(message, style.format)
+    lines = _ros1_lines(message, style, "") if style.format == "ros1" else _ros2_lines(message, style, "")
     return "".join(f"{line}\n" for line in lines) + "---\n"
 
 
-def _respelled(value: Any, form: str) -> Any:
+def _respelled(value: Any, fmt: str) -> Any:
     """Convert the headers and stamps of a message to the other ROS version."""
     if isinstance(value, list):
-        return [_respelled(each, form) for each in value]
+        return [_respelled(each, fmt) for each in value]
     if not isinstance(value, dict):
         return value
     for seconds, nanoseconds in STAMPS:
         if value.keys() == {seconds, nanoseconds}:
-            return dict(zip(STAMPS[form == "ros1"], (value[seconds], value[nanoseconds]), strict=True))
-    made = {key: _respelled(each, form) for key, each in value.items()}
+            return dict(zip(STAMPS[fmt == "ros1"], (value[seconds], value[nanoseconds]), strict=True))
+    made = {key: _respelled(each, fmt) for key, each in value.items()}
     if "frame_id" in made and "stamp" in made:
         seq = {"seq": made.pop("seq", 0)}
-        return seq | made if form == "ros1" else made
+        return seq | made if fmt == "ros1" else made
     return made
 
 
@@ -86,16 +86,16 @@ def transform_stamped(result: Result, style: Style) -> dict[str, Any]:
 
 def header(frame: str | None, stamp_ns: int | None, style: Style) -> dict[str, Any]:
     """Return a header; ROS 1 numbers its messages."""
-    first = {"seq": 0} if style.form == "ros1" else {}
-    return first | {"stamp": stamp(stamp_ns or 0, style.form), "frame_id": frame or ""}
+    first = {"seq": 0} if style.format == "ros1" else {}
+    return first | {"stamp": stamp(stamp_ns or 0, style.format), "frame_id": frame or ""}
 
 
-def stamp(stamp_ns: int, form: str) -> dict[str, int]:
+def stamp(stamp_ns: int, fmt: str) -> dict[str, int]:
     """Return nanoseconds as a message has them; the second part is never negative."""
-    names = STAMPS[form == "ros1"]
+    names = STAMPS[fmt == "ros1"]
     whole, rest = divmod(stamp_ns, BILLION)
     if problem := stamp_problem(whole, rest, names):
-        raise ValueInvalid(f"stamp {format_stamp(stamp_ns)} does not fit in {form}: {problem}")
+        raise ValueInvalid(f"stamp {format_stamp(stamp_ns)} does not fit in {fmt}: {problem}")
     return dict(zip(names, (whole, rest), strict=True))
 
 

@@ -143,18 +143,18 @@ class TextMessage(NamedTuple):
         return error
 
 
-def read_messages(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def read_messages(stream: BinaryIO, name: str, fmt: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of a recording; an unreadable one is replaced by its error."""
-    if form in {"echo", "jsonl"}:
-        for piece in (documents if form == "echo" else lines)(stream, name):
-            yield from piece_messages(piece, name, form, tally)
+    if fmt in {"echo", "jsonl"}:
+        for piece in (documents if fmt == "echo" else lines)(stream, name):
+            yield from piece_messages(piece, name, fmt, tally)
     else:
-        yield from _csv(stream, name, form, tally)
+        yield from _csv(stream, name, fmt, tally)
 
 
-def piece_messages(piece: Piece, name: str, form: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def piece_messages(piece: Piece, name: str, fmt: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of documents that end in `---`, or of lines."""
-    if form == "jsonl":
+    if fmt == "jsonl":
         for number, text in enumerate(piece.text.split("\n"), piece.line):
             yield from line_messages(text, number, name, tally)
         return
@@ -224,7 +224,7 @@ def _is_data(line: str, number: int, tally: Tally) -> bool:
     return bool(line.strip())
 
 
-def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def _csv(stream: BinaryIO, name: str, fmt: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
     """Read rows; a line that begins with `%time` is the header of those below it."""
     header: list[str] = []
     for number, line in line_texts(stream, name, tally):
@@ -233,11 +233,11 @@ def _csv(stream: BinaryIO, name: str, form: str, tally: Tally) -> Iterator[TextM
             header = cells
             continue
         try:
-            value = message1(cells, header) if form == "csv1" else message2(cells)
+            value = message1(cells, header) if fmt == "csv1" else message2(cells)
         except Misfit as misfit:
             yield FormatError(str(misfit), source=name, line=number)
             continue
-        received = int(cells[0]) if form == "csv1" and cells[0].isdecimal() else None
+        received = int(cells[0]) if fmt == "csv1" and cells[0].isdecimal() else None
         yield TextMessage(value, Source(name, line), number, cells=True, received_ns=received)
 
 
@@ -246,13 +246,13 @@ _HEADER = re.compile(r"\bheader\b")
 
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of every message, in the order of the recording."""
-    if file.form in {"echo", "jsonl"} and (file.form == "echo" or not options.topics.chosen):
-        cut, end = (documents, "---\n") if file.form == "echo" else (lines, "\n")
+    if file.format in {"echo", "jsonl"} and (file.format == "echo" or not options.topics.chosen):
+        cut, end = (documents, "---\n") if file.format == "echo" else (lines, "\n")
         for piece in cut(file.stream, file.name):
             for stretch in _cut(piece, end, sizes.STRETCH):
                 yield from _plain(stretch, end, file, options)
     else:
-        for message in read_messages(file.stream, file.name, file.form, options.tally):
+        for message in read_messages(file.stream, file.name, file.format, options.tally):
             yield from _message_edges(message, options)
 
 
@@ -283,7 +283,7 @@ def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterato
         for half in halves:
             yield from _plain(half, end, file, options)
     else:
-        for message in piece_messages(piece, file.name, file.form, options.tally):
+        for message in piece_messages(piece, file.name, file.format, options.tally):
             yield from _message_edges(message, options)
 
 

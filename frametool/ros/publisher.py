@@ -78,13 +78,13 @@ def _line(pose: Pose, style: Style) -> str:
     if not pose.name or not pose.parent:
         raise ValueInvalid(f"{CALL} needs the names of both frames; give name: and parent:")
     for name in (pose.parent, pose.name):
-        if not name.isprintable() or (style.form == "static1" and any(map(str.isspace, name))):
-            raise ValueInvalid(f"frame {name!r} cannot be written in {style.form}: it could not be read back")
+        if not name.isprintable() or (style.format == "static1" and any(map(str.isspace, name))):
+            raise ValueInvalid(f"frame {name!r} cannot be written in {style.format}: it could not be read back")
     angles = bool(style.notations) and style.notations[0].representation.name == "rpy"
     numbers = rotation_numbers(pose, notation("rpy_rad" if angles else "quaternion"), style)
     position = [style.number(value) for value in pose.components[:3]]
     rotation = [style.number(value) for value in numbers]
-    if style.form == "static1":
+    if style.format == "static1":
         cells = [*position, *(reversed(rotation) if angles else rotation), quote(pose.parent), quote(pose.name)]
         return " ".join(cells)
     cells = [*position, *rotation, quote(pose.parent), quote(pose.name)]

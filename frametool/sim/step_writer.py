@@ -76,13 +76,13 @@ class StepWriter:
 
     def _header(self, emission: Emission) -> str:
         columns = list(emission.cells)
-        if self._style.form == "text":
+        if self._style.format == "text":
             return _aligned([SHORT.get(name, name) for name in columns], map(_step_width, columns))
-        return row(columns, self._style) if self._style.form == "csv" and not emission.ros2_row else ""
+        return row(columns, self._style) if self._style.format == "csv" and not emission.ros2_row else ""
 
     def _record(self, emission: Emission) -> str:
         labels, style = emission.labels, self._style
-        match style.form:
+        match style.format:
             case "yaml":
                 comment = f"# {printable(labels['turtle'])} at {labels['t']} s\n" if self._labelled and labels else ""
                 return comment + message_text(emission.message, style)

@@ -59,7 +59,7 @@ class ColumnsWriter:
     def __init__(self, style: Style, module: Any = None) -> None:
         """Choose the form; module: what creates its writer, where that is not the form's own."""
         self.style = style
-        self.module: Any = module or import_module(FORMATS[style.form].writer)
+        self.module: Any = module or import_module(FORMATS[style.format].writer)
         self.has_nulls: bool = getattr(self.module, "NULLS", False)
         self.waiting: list[tuple[int, Mapping[str, Made]]] = []
         self.columns: list[OutColumn] = []
@@ -87,7 +87,7 @@ class ColumnsWriter:
         yield from self.writer.end()
         for reason in dict.fromkeys(self.left_out.values()):
             names = listing(name for name, why in self.left_out.items() if why == reason)
-            warn(f"{self.style.form}: {names} left out: {reason}")
+            warn(f"{self.style.format}: {names} left out: {reason}")
 
     def _written(self, *, is_all: bool) -> Iterator[bytes]:
         """Yield what is written of the blocks that wait."""
@@ -113,7 +113,7 @@ class ColumnsWriter:
             if column.kind is None and not is_all:
                 column = column._replace(longest=max(SPARE, 2 * column.longest))
             reason = self._misfit(column)
-            as_cells = not (FORMATS[self.style.form].texts or all(map(_is_typed, parts)))  # floats are read everywhere
+            as_cells = not (FORMATS[self.style.format].texts or all(map(_is_typed, parts)))  # read everywhere
             if (reason or as_cells) and _is_exact(column.kind, parts):
                 column = column._replace(kind=DOUBLE)
                 reason = self._misfit(column)
@@ -122,7 +122,7 @@ class ColumnsWriter:
             else:
                 self.columns.append(column)
         if not self.columns:
-            raise ValueInvalid(f"{self.style.form} has no place for any column of these: {listing(self.left_out)}")
+            raise ValueInvalid(f"{self.style.format} has no place for any column of these: {listing(self.left_out)}")
         texts = {name for made in blocks for name in made if isinstance(made[name].values, Spans)}
         if (told := [column for column in self.columns if column.name in texts]) and self.has_nulls:
             types = ", ".join(f"{each.name} {TYPE_NAMES.get(each.kind, each.kind)}" for each in told)
@@ -131,7 +131,7 @@ class ColumnsWriter:
 
     def _misfit(self, column: OutColumn) -> str:
         """Say why a column has no place in the form; "" where it has one."""
-        if column.kind is None and not FORMATS[self.style.form].texts:
+        if column.kind is None and not FORMATS[self.style.format].texts:
             return "it holds numbers"
         reason: str = self.module.misfit(column) if hasattr(self.module, "misfit") else ""
         return reason

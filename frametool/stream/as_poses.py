@@ -68,13 +68,13 @@ class FormatConverter:
         self.tally = Tally()
         self.is_table = FORMATS[form].is_table
         self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
-        self.style = style.in_form(style.form)
+        self.style = style.with_format(style.format)
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
         self.looks_up_places = request.place is not None and not request.poses  # whose TARGET each row was checked for
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
-        self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.form].writes)), "points" in writes
-        if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.form in LEARNED)):
-            raise Misused(f"--on-error null: {style.form} of {form} has no place for a row without a result; give skip")
+        self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.format].writes)), "points" in writes
+        if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.format in LEARNED)):
+            raise Misused(f"--on-error null: {style.format} of {form} cannot hold a row without a result; give skip")
         self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
@@ -111,7 +111,7 @@ class FormatConverter:
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in self.request.extras(self.shape)]
         if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
-            raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.form} out")
+            raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.format} out")
         return writer_for(self.style, kind, extras, placed=self.placed)
 
     def _zones(self, poses: RowPoses) -> list[RowNote]:
@@ -132,7 +132,7 @@ class FormatConverter:
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.poses)
         has_none = is_bare and not plan.targets[0].notations
         if (is_bare and self.request.keeps_position and not has_none) or (has_none and not self.has_points):
-            message = f"no rotation among the columns {columns}: {self.style.form} is written of poses"
+            message = f"no rotation among the columns {columns}: {self.style.format} is written of poses"
             raise FormatError(message, source=self.source, line=line)
         self.shape = shape._replace(kind=POINT) if has_none else shape
 
@@ -170,9 +170,9 @@ class FormatConverter:
 
     def _held(self, stamps_ns: Any, form: Poses) -> Any:
         """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""
-        rows = rows_of(self.style.form)
+        rows = rows_of(self.style.format)
         counts = bool(form.counted) and self.stamps is None
-        has_room = not is_recording(self.style.form) and "stamps" in getattr(rows, "holds", ("stamps",))
+        has_room = not is_recording(self.style.format) and "stamps" in getattr(rows, "holds", ("stamps",))
         return stamps_ns if has_room or not counts else None
 
     # --- columns of numbers ---
@@ -180,7 +180,7 @@ class FormatConverter:
     def _columns(self, stream: BufferedReader) -> Iterator[Step]:
         """Yield the rows of columns of numbers."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
-        file.form = self.form
+        file.format = self.form
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
@@ -196,11 +196,11 @@ class FormatConverter:
             yield Step(poses, rows.outcome(batch))
         if self.without:
             count = f"{self.without} {'row' if self.without == 1 else 'rows'}"
-            warn(f"{self.source}: {count} without numbers left out: {self.style.form} has no place for them")
+            warn(f"{self.source}: {count} without numbers left out: {self.style.format} has no place for them")
 
     def _with_place(self, poses: RowPoses, numbers: Callable[[int], Sequence[Any]]) -> RowPoses:
         """Add to points of the Earth their lat, lon and alt as they were read, where these are written again."""
-        if not (is_recording(self.style.form) or self.style.place) or self.shape.place is None:
+        if not (is_recording(self.style.format) or self.style.place) or self.shape.place is None:
             return poses
         operation = self.request.operation
         read = operation.place_as_read(self.shape, numbers) if operation.keeps_frames else ()
@@ -233,7 +233,7 @@ class FormatConverter:
             good = done.rows.tolist()
             images = [each.images[row] for row in good]
             extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
-            if self.form == self.style.form:
+            if self.form == self.style.format:
                 extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
             lines = np.array(each.lines, np.int64)[done.rows]
             own = each.names[0] is not None

@@ -29,7 +29,7 @@ def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, pl
 
     kind: pose, point, ..; extras: the numbers beside each; placed: whether poses have a position
     """
-    writes = FORMATS[style.form].writes
+    writes = FORMATS[style.format].writes
     if "arrays" in writes:
         from frametool.stream.array_writer import ArrayWriter
 

@@ -548,5 +548,5 @@ class _GridOfForm:
 def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Iterator[Outcome]:
     """Yield what a cloud becomes when a pose moves it, in the form of a style."""
     request = Request(Operation(left=pose, moves=True))
-    into = _GridOfForm(style.form, cloud, pose)
+    into = _GridOfForm(style.format, cloud, pose)
     yield from run_columns(MessageColumns(cloud), request, style, source=source, into=into)

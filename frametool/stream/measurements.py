@@ -155,10 +155,10 @@ def parted(place: str) -> tuple[str, int, int]:
 
 
 def _reader(file: FrameFile) -> Callable[[FrameFile, Request], Iterator[MeasuredRow]]:
-    is_rows = file.form == "jsonl" and not re.search(WRAPPED, file.head())
+    is_rows = file.format == "jsonl" and not re.search(WRAPPED, file.head())
     if is_rows or not file.holds_samples:
         return _of_documents
-    return _of_table if file.form in TABLES else _of_edges
+    return _of_table if file.format in TABLES else _of_edges
 
 
 def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str:
@@ -200,7 +200,7 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
     from frametool.stream.table_stream import TablePoses, begin_table
 
     request = request._replace(operation=MOVED, notations=(notation("quaternion"),), keep_sign=True)
-    begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
+    begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
     rows = TablePoses(begun.table, request, file.name)
     if rows.shape.notation is None and rows.shape.unit is None:
         raise FormatError(f"no pose among the columns {rows.columns}; {LIKE}", source=file.name, line=1)

@@ -111,7 +111,7 @@ def _no_result(record: bytes, form: str, style: Style) -> NoResult:
     except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
         said = None
     kept = said if type(said) is dict else {}
-    return NoResult(Pose(), {key: value for key, value in kept.items() if style.form != "csv" or _says(value)})
+    return NoResult(Pose(), {key: value for key, value in kept.items() if style.format != "csv" or _says(value)})
 
 
 def _says(value: Any) -> bool:

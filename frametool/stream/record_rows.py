@@ -211,7 +211,7 @@ class RecordRows:
             return Target(1.0, ())
         placed = own.unit is not None or own.whole
         forms = tuple((each, self.style.in_degrees(each)) for each in self.style.notations)
-        if self.style.form != "csv" or not forms:
+        if self.style.format != "csv" or not forms:
             return Target(1.0, QUATERNIONS, keep_sign=True)
         whole = placed and any(each.representation.whole for each, _ in forms)
         return Target(1.0 if placed and not whole else None, forms, self.style.keep_sign, whole and len(forms) == 1)
@@ -234,7 +234,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     stamp = None if record.stamp_ns is None else STAMP_NS
     shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
     probe = Answer(shown, parts, mended=False)
-    own_style = style if style.form in MESSAGES else style.in_form("csv")
+    own_style = style if style.format in MESSAGES else style.with_format("csv")
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)
@@ -242,8 +242,8 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     except (FrametoolError, ValueError):
         return None
     numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
-    found = _stamped(value, numbers, is_spelled=style.form in SPELLED)
-    if found is None or style.form != "csv":
+    found = _stamped(value, numbers, is_spelled=style.format in SPELLED)
+    if found is None or style.format != "csv":
         return found
     from frametool.formats.rows.csv import cells_of
 

@@ -244,8 +244,8 @@ def values_of_unit(
     is_list = type(node.value) is list
     is_one = len({each.entry.record.path for each in answers}) < len(answers)  # of several things, as an Imu
     moves = request.operation.moves
-    as_read = (inside and style.form in MESSAGES) or (not is_list and style.form in MESSAGES[:2])
-    if moves and request.poses and ((as_read and (keeps or is_one)) or (is_one and style.form == "text")):
+    as_read = (inside and style.format in MESSAGES) or (not is_list and style.format in MESSAGES[:2])
+    if moves and request.poses and ((as_read and (keeps or is_one)) or (is_one and style.format == "text")):
         yield spliced.at(unit)
         return
     if moves and is_one:
@@ -254,20 +254,20 @@ def values_of_unit(
     for each in answers:
         kind = each.entry.record.shape.kind
         if request.operation.formula is not None:
-            yield _formula_result(node, unit, each, request, style.form)
+            yield _formula_result(node, unit, each, request, style.format)
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif is_list or not _stays(node, kind, style):
-            yield _flat(node, unit, each, request, style.form, spliced.known.source)
+            yield _flat(node, unit, each, request, style.format, spliced.known.source)
         else:
             yield spliced.at(unit)
 
 
 def _stays(node: Node, kind: str, style: Style) -> bool:
     """Tell whether what is no pose is written as the mapping it is: in no table, and as a message only if it is one."""
-    if style.form == "csv" or has_no_text(style.form) or kind in PARTS:
-        return kind in PARTS and style.form != "csv" and not has_no_text(style.form)
-    return style.form != "text" and (style.form not in ("ros1", "ros2") or "header" in (node.value or ()))
+    if style.format == "csv" or has_no_text(style.format) or kind in PARTS:
+        return kind in PARTS and style.format != "csv" and not has_no_text(style.format)
+    return style.format != "text" and (style.format not in ("ros1", "ros2") or "header" in (node.value or ()))
 
 
 def _formula_result(node: Node, unit: Path, made: Answer, request: Request, form: str) -> Value:
@@ -309,10 +309,10 @@ def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: 
     extras = _extras(made, request, 7) | _rest(node, unit, record)
     if record.key == VECTOR and placed and not turned and request.operation.keeps_frames:  # it is at no place
         named = {} if entry.parent is None else {"frame": entry.parent}
-        return named | {VECTOR: [*made.parts[:3]]} | _header_stamp(record) | with_stamp_ns(extras, style.form)
+        return named | {VECTOR: [*made.parts[:3]]} | _header_stamp(record) | with_stamp_ns(extras, style.format)
     if request.operation.similar and isinstance(extras.get(SCALE), float):
         pose = pose._replace(scale=extras.pop(SCALE))
-    return Result(pose, _header_stamp(record) | with_stamp_ns(extras, style.form))
+    return Result(pose, _header_stamp(record) | with_stamp_ns(extras, style.format))
 
 
 def with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:

@@ -45,20 +45,20 @@ class RecordingWriter:
         self.placed = placed
         asked = style.recording
         if kind not in KINDS_OF:
-            raise ValueInvalid(f"{style.form} is not written of rows of a {kind}; write csv, json or yaml")
+            raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
         for name in asked.kinds:
             if name not in KINDS_OF[kind]:
                 raise ValueInvalid(f"--messages {name} is not made of {kind}s; these are {', '.join(KINDS_OF[kind])}")
         if style.place is not None and (style.place.name != LLA or style.place.more):
-            raise ValueInvalid(f"{style.form} holds places by lat lon alt only; leave --to {style.place.name} out")
+            raise ValueInvalid(f"{style.format} holds places by lat lon alt only; leave --to {style.place.name} out")
         if any(each.spec != "quaternion" for each in style.notations):
-            raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
+            raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
         self.kinds = asked.kinds or self._usual()
         if "fix" in self.kinds and len(self.kinds) > 1:
             raise ValueInvalid("--messages fix stands alone: its numbers are lat, lon, alt")
         if asked.topic and len(self.kinds) > 1:
             raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
-        self.file = RecordingFile(style.form, asked.folder)
+        self.file = RecordingFile(style.format, asked.folder)
         self.channels: dict[str, Any] = {}
         self.dropped = dict.fromkeys(extras)
         self.templates: dict[tuple[str, str, str], MessageTemplate] = {}
@@ -79,13 +79,13 @@ class RecordingWriter:
             return b""
         stamps = block.stamps_ns
         if stamps is None:
-            raise ValueInvalid(NO_STAMPS.format(self.style.form))
-        check_stamps(stamps, self.style.form)
+            raise ValueInvalid(NO_STAMPS.format(self.style.format))
+        check_stamps(stamps, self.style.format)
         if not self.kinds:
             self.kinds = ("fix" if {*block.parents} <= {*EARTH_FRAMES} else "point",)
         used = (NAME,) if "fix" in self.kinds else ()
         self.dropped |= dict.fromkeys(name for name in block.extras if name not in used)
-        refuse_scale_in(self.style.form, self.dropped)
+        refuse_scale_in(self.style.format, self.dropped)
         frames = self._frames(block)
         numbers = self._places(block) if "fix" in self.kinds else self._numbers(block)
         messages = [self._messages(name, frames, stamps, numbers) for name in self.kinds if name != "path"]
@@ -104,7 +104,7 @@ class RecordingWriter:
         """Yield the recording, and tell what was left out or made up."""
         if self.path:
             self._write_path()
-        form = self.style.form
+        form = self.style.format
         if not self.is_named:
             warn(f"{form}: nothing names the frame that the rows are seen from; {FRAMES[0]!r} is written")
         if self.lost:
@@ -180,7 +180,7 @@ class RecordingWriter:
     def _template(self, name: str, parent: str, child: str) -> MessageTemplate:
         key = (name, parent, child)
         if key not in self.templates:
-            self.templates[key] = MessageTemplate(KINDS[name], self.style.form, parent, child)
+            self.templates[key] = MessageTemplate(KINDS[name], self.style.format, parent, child)
         return self.templates[key]
 
     def _write_path(self) -> None:
@@ -190,5 +190,5 @@ class RecordingWriter:
             raise ValueInvalid(f"a path is seen from one frame, the poses from {listing(parents)}")
         stamps = [stamp for _, each, _ in self.path for stamp in each.tolist()]
         poses = [pose for _, _, each in self.path for pose in each.tolist()]
-        message = serialised(KINDS["path"], self.style.form, [(parents.pop(), "")] * len(poses), stamps, poses)
+        message = serialised(KINDS["path"], self.style.format, [(parents.pop(), "")] * len(poses), stamps, poses)
         self.file.write(self.channels["path"], stamps[-1], message)

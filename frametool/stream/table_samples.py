@@ -37,11 +37,11 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 
     Raises or reports FormatError with the line of a row that is no pose.
     """
-    form = FORMATS[file.form].poses
+    form = FORMATS[file.format].poses
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
-    begun = begin_table(cast("ByteStream", file.stream), file.form, request, source=file.name)
+    begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
     rows = TablePoses(begun.table, request, file.name)
     _check(rows, form, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None

@@ -203,10 +203,10 @@ def _stamps_of_poses(path: str, form: str, *, is_tree: bool) -> list[int]:
 
 def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, form: str | None = None) -> list[int]:
     """Return the stamps of all that moves in a tree or recording, or of what came by a topic."""
-    recording = FrameFile(path, form=form, topics=topics)
+    recording = FrameFile(path, fmt=form, topics=topics)
     found = {edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None}
     if not found:
-        raise FormatError(f"no stamps in it ({FORMATS[recording.form].summary})", source=path)
+        raise FormatError(f"no stamps in it ({FORMATS[recording.format].summary})", source=path)
     return sorted(found)
 
 
@@ -289,7 +289,7 @@ def _of_tree(
     recording = FrameFile(name, None if file is None else file.stream, form or None, topics, answers)
     tree = cast("TransformBuffer", load_sources(opened_together([recording]), Rules(normalize=normalize)))
     if topics and not recording.topics.counts:
-        raise ValueInvalid(f"{recording.name}: {FORMATS[recording.form].summary}: nothing in it came by a topic")
+        raise ValueInvalid(f"{recording.name}: {FORMATS[recording.format].summary}: nothing in it came by a topic")
     if not tree.moves:
         raise ValueInvalid(f"{recording.name}: nothing moves in it")
     if not frames:

@@ -88,14 +88,14 @@ class TextWriter:
         kind: pose, point or vector; extras: the numbers beside each; placed: whether poses have a position
         Raises ValueInvalid for what the form does not hold, and for notations that it does not have.
         """
-        if kind in SIX and style.form not in LEARNED:
-            raise ValueInvalid(f"{style.form} is not written of rows of a {kind}; write csv, json or yaml")
-        if kind != POSE and "points" not in FORMATS[style.form].writes:
-            raise ValueInvalid(f"{style.form} holds poses; a {kind} has no rotation")
+        if kind in SIX and style.format not in LEARNED:
+            raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
+        if kind != POSE and "points" not in FORMATS[style.format].writes:
+            raise ValueInvalid(f"{style.format} holds poses; a {kind} has no rotation")
         self.style = style
         self.kind = kind
-        module: Any = import_module(FORMATS[style.form].writer)
-        self.fixed = rows_of(style.form)
+        module: Any = import_module(FORMATS[style.format].writer)
+        self.fixed = rows_of(style.format)
         name = "write_poses" if kind == POSE else "write_points"
         self.write: Callable[[Sequence[Any], Style], str] = getattr(module, name, _no_text)
         self.dropped_fields = None if self.fixed is None else DroppedFields(self.fixed, style)
@@ -119,9 +119,9 @@ class TextWriter:
             return b""
         if self.style.place is not None:
             self._settle(self.style.place, block)
-        if self.style.form not in LEARNED:
+        if self.style.format not in LEARNED:
             self.dropped |= dict.fromkeys((*self.extras, *block.extras))
-            refuse_scale_in(self.style.form, self.dropped)
+            refuse_scale_in(self.style.format, self.dropped)
         absent = np.isnan(block.numbers[:, 0])
         cuts = [0, *(np.flatnonzero(np.diff(absent)) + 1).tolist(), len(absent)]
         text = b""
@@ -139,15 +139,15 @@ class TextWriter:
             check_in_ecef(parent, place)
         if self.fixed is not None:
             names = ", ".join(each.name for each in (place, *place.more))
-            raise ValueInvalid(f"{self.style.form} holds x, y, z; leave --to {names} out, or write csv or json")
+            raise ValueInvalid(f"{self.style.format} holds x, y, z; leave --to {names} out, or write csv or json")
         place.settle(*self._own(tuple(block.numbers.T))[:3])
 
     def end(self) -> Iterator[bytes]:
         """Yield what comes behind the last pose, and tell what was left out."""
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
-                warn(f"{self.style.form}: {listing(self.dropped, MOST_NAMED)} left out")
-            if self.style.form == "csv" and not self.count and self.empty is not None:
+                warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
+            if self.style.format == "csv" and not self.count and self.empty is not None:
                 self._learn(self.empty)
                 yield self.rows.head if self.rows is not None else b""
             return
@@ -175,7 +175,7 @@ class TextWriter:
         """Return position and quaternion of a block as the form has them: axes, direction, the sign that is written."""
         tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
-        tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.form].poses.inverse else pose
+        tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
         return (tx, ty, tz, *((x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)))
 
     def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
@@ -187,7 +187,7 @@ class TextWriter:
         if not np.isfinite(values).all():
             raise ValueInvalid("a result is too large for a double")
         numbers = number_spans(
-            np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.form == "yaml"
+            np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.format == "yaml"
         )
         size, first = len(values), 0
         parts = [constant(form.between, size)] if form.between else []
@@ -230,11 +230,11 @@ class TextWriter:
         if what in ("name", "parent"):
             texts: Sequence[str | None] = block.names if what == "name" else block.parents
             texts = list(texts) * (len(block.numbers) if len(texts) == 1 else 1)
-        elif self.style.form != "csv" and not isinstance(cells := list(block.extras.values())[int(what)], Spans):
+        elif self.style.format != "csv" and not isinstance(cells := list(block.extras.values())[int(what)], Spans):
             return spans_of([dump(value).encode() for value in plain_cells(cells)])
         else:
             texts = texts_of(list(block.extras.values())[int(what)])
-        in_csv = self.style.form == "csv"
+        in_csv = self.style.format == "csv"
         known = {text: (quoted(text or "") if in_csv else dump(plain_cell(text or ""))).encode() for text in {*texts}}
         return spans_of([known[text] for text in texts])
 
@@ -271,11 +271,11 @@ class TextWriter:
 
     def _learn(self, block: RowPoses) -> None:
         """See how the form writes a pose whose numbers are all different, and take them for places to fill in."""
-        style = self.style.in_form(self.style.form)
+        style = self.style.with_format(self.style.format)
         style.precision = None
         varies = block.extras or {len(block.names), len(block.parents)} != {1}
         is_worded = self.target.place is not None and bool(self.target.place.words)
-        if style.form not in LEARNED or (style.form == "yaml" and varies) or is_worded:
+        if style.format not in LEARNED or (style.format == "yaml" and varies) or is_worded:
             return
         probe = self._probe(block)
         alone, twice = (self.write([probe] * count, style) for count in (1, 2))
@@ -322,7 +322,7 @@ class TextWriter:
 
     def _probe_extras(self, block: RowPoses) -> dict[str, Any]:
         extras: dict[str, Any] = {name: 0.7310585786300049 + at for at, name in enumerate(self.extras)}
-        if self.style.form != "csv":
+        if self.style.format != "csv":
             extras = with_entries(extras)
         if block.stamps_ns is not None:
             extras["stamp_ns"] = PROBE_NS

@@ -74,7 +74,7 @@ def test_a_file_costs_work_in_proportion_to_its_size(name: str, tmp_path: Path) 
         faults: list[Any] = []
 
         def read(path: Path = path, faults: list[Any] = faults) -> None:
-            assert list(FrameFile(path, form=form, answers=answers).edges(faults.append, tell=False)) or faults
+            assert list(FrameFile(path, fmt=form, answers=answers).edges(faults.append, tell=False)) or faults
 
         work.append(calls_of(read))
         assert len(faults) == (count if "bad" in name else 0)

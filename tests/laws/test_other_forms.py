@@ -185,7 +185,7 @@ def test_a_row_with_too_few_cells_is_left_out_and_counted(run: Run) -> None:
 def test_a_form_without_nulls_refuses_them(run: Run, form: str, into: str) -> None:
     done = run("convert", "-f", into, "--on-error", "null", stdin=given("pose", form))
     assert (done.status, done.out, done.err.count("\n")) == (2, "", 1)
-    assert "has no place for a row without a result; give skip" in done.err
+    assert "cannot hold a row without a result; give skip" in done.err
 
 
 MATRICES = {

@@ -86,7 +86,7 @@ def taken(path: Path, lines: Sequence[str], *topics: str, normalize: bool = Fals
     """Read lines; return the edges, the errors, and what was odd."""
     path.write_text("".join(line + "\n" for line in lines))
     errors: list[FormatError] = []
-    recording = FrameFile(path, form="jsonl", topics=topics)
+    recording = FrameFile(path, fmt="jsonl", topics=topics)
     edges = list(recording.edges(errors.append, tell=False, normalize=normalize))
     said = [(error.line, error.message, error.rule) for error in errors]
     return edges, said, list(recording.tally.told()), recording.topics.counts

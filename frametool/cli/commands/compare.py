@@ -112,11 +112,11 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
     from frametool.fit.numbers import rows as rows_of
     from frametool.view.fit_text import write_comparison, write_table
 
-    form = output.style.form
+    form = output.style.format
     if rows:
         several = len(found) > 1
         records = [{"est": each.names[1]} | row if several else row for each in found for row in rows_of(each, rows)]
-        output.style = output.style.in_form("csv" if form == "text" else form)
+        output.style = output.style.with_format("csv" if form == "text" else form)
         output.report(records)
     elif form in TABLES or (form == "text" and len(every) > 1):
         output.text(write_table(every, form))

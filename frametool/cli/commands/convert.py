@@ -188,7 +188,7 @@ def _say_of_engines(world: str | None, given: Notation | None, output: Output, *
     into, _, out_of = (world or "").partition("_from_")
     if into == IN_CENTIMETRES:
         separate = not any(each.representation.whole for each in output.notations)
-        output.style.in_cm = is_anew and separate and output.style.form in ("text", "yaml", "json")
+        output.style.in_cm = is_anew and separate and output.style.format in ("text", "yaml", "json")
         here = "is written as xyz_cm" if output.style.in_cm else "stays in metres, or in the unit its name says"
         say(f"note: Unreal counts in centimetres: xyz {here}")
     if out_of == IN_CENTIMETRES:

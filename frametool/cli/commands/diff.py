@@ -57,9 +57,9 @@ def command(inputs: Inputs) -> int:
     for note in () if inputs.quiet else comparison.notes:
         say(note)
     differences = [*comparison.differences, *(comparison.unmoved if inputs.everything else ())]
-    if output.style.form == "github":
+    if output.style.format == "github":
         output.text(_annotations(comparison, (of_one, of_other)))
-    elif output.style.form == "text":
+    elif output.style.format == "text":
         from frametool.view.report_text import write_diff
 
         output.text(write_diff(differences))

@@ -54,7 +54,7 @@ def command(inputs: Inputs) -> int:
     refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     out = Output(inputs, "poses", otherwise=None if inputs.output else "text")
     out.check_target(target)
-    if out.style.place is not None and out.style.form == "text":
+    if out.style.place is not None and out.style.format == "text":
         raise click.UsageError(f"--to {out.style.place.name}: tf2_echo's blocks have x, y, z; -f yaml, json or csv")
     frames = load_tree(inputs.tree, inputs.more, rules(inputs))
     target, source = frame_name(target, frames), frame_name(source, frames)
@@ -65,7 +65,7 @@ def command(inputs: Inputs) -> int:
     skipped = Skipped(in_json=out.told == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))
     shown = islice(results, None if limit is None else min(limit, sys.maxsize))
-    if out.style.form == "text":
+    if out.style.format == "text":
         from frametool.view.pose_text import write_blocks
 
         out.pieces(write_blocks(shown, target, source, out.style))

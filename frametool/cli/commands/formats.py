@@ -27,11 +27,11 @@ def command(inputs: Inputs) -> None:
     """
     output, name = Output(inputs, "report", otherwise="text"), inputs.name
     entries = list(map(form_entry, FORMATS if name is None else [name]))
-    if output.style.form == "text":
+    if output.style.format == "text":
         text = write_forms(entries) if name is None else write_form(entries[0])
         show(text, paged=True) if output.path is None else output.text(text)
         return
-    if output.style.form == "csv":  # a list is one cell
+    if output.style.format == "csv":  # a list is one cell
         for entry in entries:
             entry |= {key: " ".join(value) for key, value in entry.items() if isinstance(value, tuple)}
     output.report(entries)

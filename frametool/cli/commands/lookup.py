@@ -104,7 +104,7 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
     if output.style.place is not None:
         name = output.style.place.name
         raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
-    form = output.told if by_row else output.style.form
+    form = output.told if by_row else output.style.format
     if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 

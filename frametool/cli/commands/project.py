@@ -210,8 +210,8 @@ class CameraTask:
             raise click.UsageError("-i FILE and arguments are two inputs; give one")
         else:
             status = 0
-            if output.style.form == "text":
-                output.style = output.style.in_form("yaml")
+            if output.style.format == "text":
+                output.style = output.style.with_format("yaml")
             request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
             output.values(values_of(records, request, output))
         if not self.inputs.quiet and (self.is_stream or seen.lost) and (summary := seen.summary()):

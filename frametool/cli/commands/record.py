@@ -128,7 +128,7 @@ def _form_of(path: str) -> str:
     """Return the form of a recording; raises FormatError for what is none."""
     source = FrameFile(path)
     source.close()
-    if not is_recording(source.form):
+    if not is_recording(source.format):
         hint = "frametool tree, convert and lookup write one: -o NEW.mcap"
-        raise FormatError(f"{FORMATS[source.form].summary}: no recording of messages; {hint}", source=path)
-    return source.form
+        raise FormatError(f"{FORMATS[source.format].summary}: no recording of messages; {hint}", source=path)
+    return source.format

@@ -81,8 +81,8 @@ def command(inputs: Inputs) -> None:
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
     output = Output(inputs, "tree", "trajectory")
-    if points and inputs.scale and output.style.form not in FORMS_OF_SCALE:
-        raise ValueInvalid(f"{output.style.form} has no place for a scale; write json, yaml or csv")
+    if points and inputs.scale and output.style.format not in FORMS_OF_SCALE:
+        raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     from frametool.cli import solving
 
     solve = solving.solved_hand_eye if hand_eye else solving.solved_points if points else solving.solved_tree
@@ -101,13 +101,13 @@ def command(inputs: Inputs) -> None:
 def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
     """Write the result: a tree, or entries where there is a scale; as hand-eye calibration only the camera."""
     entries = [each for each in found.frames if each.parent is not None]
-    if output.style.form == "csv" or found.scale_sigma is not None:
+    if output.style.format == "csv" or found.scale_sigma is not None:
         from frametool.grammar.pose import Pose
         from frametool.grammar.result import Result, uncertain
 
         poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
         output.values([Result(pose, uncertain(each.covariance)) for pose, each in zip(poses, entries, strict=True)])
-    elif output.style.form == "handeye" and found.shape == "hand-eye":
+    elif output.style.format == "handeye" and found.shape == "hand-eye":
         from frametool.formats.trees.handeye import write_mount
 
         camera, target = entries

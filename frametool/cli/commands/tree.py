@@ -33,7 +33,7 @@ def command(inputs: Inputs) -> None:
     names and rates are shown.
     """
     output = Output(inputs, "tree", "trajectory")
-    place, drawn = output.style.place, output.style.form in ("yaml", "json", "text", "dot", "mermaid")
+    place, drawn = output.style.place, output.style.format in ("yaml", "json", "text", "dot", "mermaid")
     if place is not None and (not drawn or place.origin is not None):
         raise click.UsageError(f"--to {place.name}: trees say places by lla or utm, in yaml, json, text and drawings")
     frames = load_tree(inputs.tree, inputs.more, rules(inputs), drawings=True)

@@ -166,7 +166,7 @@ def _solids(tree: str) -> list[Solid]:
     (file,) = opened([tree])
     with closing(file):
         try:
-            solids = read_solids(file, file.form)
+            solids = read_solids(file, file.format)
         except FormatError as error:
             say(f"note: solids not drawn: {str(error).partition(chr(10))[0]}")
             return []

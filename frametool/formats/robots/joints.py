@@ -389,16 +389,16 @@ class JointFile:
     def _settings(self) -> Iterator[JointSample]:
         head = self.file.head()
         name = self.file.name
-        form = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
-        if "joints" in FORMATS[form].reads:
-            yield from import_module(FORMATS[form].reader).read_joints(self.file, self.state)
+        fmt = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
+        if "joints" in FORMATS[fmt].reads:
+            yield from import_module(FORMATS[fmt].reader).read_joints(self.file, self.state)
         elif self.state:
             having = " and ".join(readers("joints"))
             raise FormatError(f"has no states with names; {having} files do", source=name)
         elif head.lstrip().startswith(b"<"):
             raise FormatError("this XML has no values of joints; maps, JointState messages, CSV have", source=name)
-        elif "rows" in FORMATS[form].reads:
-            yield from self._table(form, head.decode("utf-8", "replace"))
+        elif "rows" in FORMATS[fmt].reads:
+            yield from self._table(fmt, head.decode("utf-8", "replace"))
         else:
             yield from self._messages(read_messages(self.file.stream, name, "echo", self.tally))
 
@@ -447,7 +447,7 @@ class JointFile:
         for key in keys:
             yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
 
-    def _table(self, form: str, head: str) -> Iterator[JointSample]:
+    def _table(self, fmt: str, head: str) -> Iterator[JointSample]:
         """Yield the values of a table: one column per joint, or the output of the echo tools."""
         first = next((line for line in head.split("\n") if line.strip()), "")
         name = self.file.name
@@ -459,18 +459,18 @@ class JointFile:
             rows = (TextMessage(text, Source(name, text), line, cells=True) for line, text in texts)
             yield from self._messages(rows, lambda row: messages.of_row(messages.unquoted(row)))
         else:
-            yield from self._columns(form)
+            yield from self._columns(fmt)
 
-    def _cells(self, form: str, line: str) -> list[str]:
-        if form == "csv":
+    def _cells(self, fmt: str, line: str) -> list[str]:
+        if fmt == "csv":
             return [cell.text for cell in split_line(line)]
-        return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(form))]
+        return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(fmt))]
 
-    def _columns(self, form: str) -> Iterator[JointSample]:
+    def _columns(self, fmt: str) -> Iterator[JointSample]:
         """Yield the values of a table whose header names joints."""
         rows = line_texts(self.file.stream, self.file.name, self.tally)
         number, header = next(rows, (1, ""))
-        names = self._cells(form, header.strip("\r\ufeff"))
+        names = self._cells(fmt, header.strip("\r\ufeff"))
         try:
             columns = find_joint_columns(names, self.joints)
             if not columns:
@@ -488,7 +488,7 @@ class JointFile:
         for number, line in rows:
             if line.lstrip().startswith("#"):
                 continue
-            cells = self._cells(form, line.rstrip("\r"))
+            cells = self._cells(fmt, line.rstrip("\r"))
 
             def refuse(problem: str, _below: Path, line: int = number) -> FormatError:
                 return FormatError(problem, source=self.file.name, line=line)

@@ -68,16 +68,16 @@ def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
     if pose.attribute("frame"):
         message = "<pose frame=..> of SDF 1.5 has no meaning and is left out; relative_to has one"
         options.tally.note_each(message, pose.line)
-    degrees, form = pose.attribute("degrees").lower() in TRUE, pose.attribute("rotation_format")
-    if form not in ("", "euler_rpy", "quat_xyzw"):
-        raise pose.error(f"rotation_format {shown(form)}; expected euler_rpy or quat_xyzw", "rotation_format")
-    if degrees and form == "quat_xyzw":
+    degrees, fmt = pose.attribute("degrees").lower() in TRUE, pose.attribute("rotation_format")
+    if fmt not in ("", "euler_rpy", "quat_xyzw"):
+        raise pose.error(f"rotation_format {shown(fmt)}; expected euler_rpy or quat_xyzw", "rotation_format")
+    if degrees and fmt == "quat_xyzw":
         raise pose.error("degrees with quat_xyzw; keep one", "degrees")
     relative_to = pose.attribute("relative_to")
     if not pose.text:
         return IDENTITY, relative_to
-    x, y, z, roll, pitch, yaw = pose.numbers(7 if form == "quat_xyzw" else 6)[:6]
-    if form == "quat_xyzw":
+    x, y, z, roll, pitch, yaw = pose.numbers(7 if fmt == "quat_xyzw" else 6)[:6]
+    if fmt == "quat_xyzw":
         rotation = read_quaternion(pose.xml, pose.element, pose.text.split()[3:], options)
     else:
         rotation = euler.to_quaternion(roll, pitch, yaw, "sxyz", floats, degrees=degrees)

@@ -53,10 +53,10 @@ class Solid(NamedTuple):
     pose: Rigid = IDENTITY
 
 
-def read_solids(file: InputFile, form: str) -> list[Solid]:
+def read_solids(file: InputFile, fmt: str) -> list[Solid]:
     """Return the solids of a file whose frames were read; none of a form without any.  Raises FormatError."""
     readers: dict[str, Callable[[InputFile], Iterator[Solid]]] = {"urdf": _of_urdf, "sdf": _of_sdf, "mjcf": _of_mjcf}
-    return [*readers[form](file)] if form in readers else []
+    return [*readers[fmt](file)] if fmt in readers else []
 
 
 def _seen(

@@ -239,9 +239,9 @@ def load_robot(path: str | PathLike[str]) -> Robot:
 
 def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
     """Return the robot of a file, and its joint values from the file's answers; otherwise as `load_robot`."""
-    if file.form != "urdf":
+    if file.format != "urdf":
         file.close()
-        raise FormatError(f"expected a URDF robot, found {FORMATS[file.form].summary}", source=file.name)
+        raise FormatError(f"expected a URDF robot, found {FORMATS[file.format].summary}", source=file.name)
     options = Options(file.tally, file.topics, answers=file.answers)
     try:
         with paused_collector():

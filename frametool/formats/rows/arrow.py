@@ -191,10 +191,10 @@ class ArrowFile(column_file.ColumnFile):
     gaps = False
     source: Any  # pyarrow's source
 
-    def __init__(self, file: InputFile, form: str) -> None:
+    def __init__(self, file: InputFile, fmt: str) -> None:
         """Read the schema; raises FormatError."""
         self.name = file.name
-        self.form = form
+        self.format = fmt
         with translated(self.name):
             self.schema = self.opened(file)
             self.names: tuple[str, ...] | None = tuple(self.schema.names)
@@ -242,9 +242,9 @@ class ArrowFile(column_file.ColumnFile):
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> GroupWriter:
         """Return a writer with the same schema and compression; the output may be the other Arrow format."""
         del drops
-        form = style.form if style.form in WRITERS else self.form
-        same = WRITERS[form] is WRITERS[self.form]
-        return WRITERS[form](form, columns, self.schema, self.encoding() if same else {})
+        fmt = style.format if style.format in WRITERS else self.format
+        same = WRITERS[fmt] is WRITERS[self.format]
+        return WRITERS[fmt](fmt, columns, self.schema, self.encoding() if same else {})
 
 
 class Collected(BytesIO):
@@ -271,10 +271,10 @@ class Collected(BytesIO):
 class GroupWriter:
     """Collects rows until a group is complete; subclasses define the beginning of a file and the writing of a group."""
 
-    def __init__(self, form: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
+    def __init__(self, fmt: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
         """Store the columns of the result, the schema of the input if it has one, and its encoding."""
         self.pa = require_pyarrow("Arrow")
-        self.form, self.columns, self.how = form, columns, how
+        self.format, self.columns, self.how = fmt, columns, how
         self.sink = Collected()
         self.file = self.pa.PythonFile(self.sink, mode="w")
         fields = [self._field(column, given) for column in columns]
@@ -429,10 +429,10 @@ def _place(message: memoryview, table: int, field: int) -> int:
     return table + offset if offset else 0
 
 
-def _number(message: memoryview, table: int, field: int, form: str) -> int:
+def _number(message: memoryview, table: int, field: int, fmt: str) -> int:
     """Return a number of a table, 0 if it is missing."""
     place = _place(message, table, field)
-    return int(struct.unpack_from(form, message, place)[0]) if place else 0
+    return int(struct.unpack_from(fmt, message, place)[0]) if place else 0
 
 
 def _table(message: memoryview, table: int, field: int) -> int:
@@ -570,13 +570,13 @@ def open_columns(file: InputFile, _options: Options) -> ArrowFile:
     """Open a file of either format; raises FileProblem without pyarrow, FormatError for a broken file."""
     require_pyarrow(file.name)
     head = file.head()
-    form = next((form for begin, form in BEGINNINGS.items() if head.startswith(begin)), "")
-    if not form:
+    fmt = next((fmt for begin, fmt in BEGINNINGS.items() if head.startswith(begin)), "")
+    if not fmt:
         found = f"it begins with {shown(head[:8])}" if head else "it is empty"
         raise FormatError(f"neither Parquet (PAR1) nor Arrow (ARROW1): {found}", source=file.name)
-    return (ParquetFile if form == "parquet" else IpcFile)(file, form)
+    return (ParquetFile if fmt == "parquet" else IpcFile)(file, fmt)
 
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> GroupWriter:
     """Return a writer for new rows."""
-    return WRITERS[style.form](style.form, columns, None, {})
+    return WRITERS[style.format](style.format, columns, None, {})

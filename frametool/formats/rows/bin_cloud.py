@@ -35,12 +35,12 @@ class BinCloud(CloudFile):
 
     def __init__(self, file: InputFile) -> None:
         """Count the points; raises FormatError if the last one is incomplete."""
-        names = FORMATS[file.form].columns
+        names = FORMATS[file.format].columns
         record = record_of([SINGLE] * len(names))
         file.stream = seekable(file, self)
         size = bytes_left(file.stream) or 0
         if size % record.itemsize:
-            others = [name for name, row in FORMATS.items() if row.reader == __name__ and name != file.form]
+            others = [name for name, row in FORMATS.items() if row.reader == __name__ and name != file.format]
             fits = [name for name in others if size % (SINGLE.itemsize * len(FORMATS[name].columns)) == 0]
             hint = f"; --in {fits[0]} fits" if fits else "; is it whole?"
             points = f"points of {record.itemsize} bytes (float32 {' '.join(names)})"
@@ -61,23 +61,23 @@ class BinCloud(CloudFile):
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> CountedWriter:
         """Return a writer for a cloud of either format."""
-        return _writer(style.form, columns, None if drops else self.count)
+        return _writer(style.format, columns, None if drops else self.count)
 
 
 class _Encoder:
     """Convert columns to points; `off` is the largest rounding error of float32."""
 
-    def __init__(self, form: str, columns: Sequence[OutColumn]) -> None:
+    def __init__(self, fmt: str, columns: Sequence[OutColumn]) -> None:
         """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
-        self.form = form
-        self.names = FORMATS[form].columns
+        self.format = fmt
+        self.names = FORMATS[fmt].columns
         self.columns = columns
         self.off = 0.0
         given = [column.name for column in columns if column.kind is not None]
         if missing := [name for name in self.names if name not in given]:
-            raise ValueInvalid(f"{form} holds {' '.join(self.names)}; there is no {listing(missing)}")
+            raise ValueInvalid(f"{fmt} holds {' '.join(self.names)}; there is no {listing(missing)}")
         if others := [column.name for column in columns if column.name not in self.names]:
-            warn(f"{form}: {listing(others)} left out: it holds {' '.join(self.names)} alone")
+            warn(f"{fmt}: {listing(others)} left out: it holds {' '.join(self.names)} alone")
 
     def __call__(self, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Return the bytes of some points."""
@@ -101,12 +101,12 @@ class _Encoder:
     def tell(self) -> Iterator[bytes]:
         """Warn at the end about rounding."""
         if self.off:
-            warn(f"{self.form}: numbers are float32; they were rounded by up to {self.off:.1g}")
+            warn(f"{self.format}: numbers are float32; they were rounded by up to {self.off:.1g}")
         return iter(())
 
 
-def _writer(form: str, columns: Sequence[OutColumn], count: int | None) -> CountedWriter:
-    encoder = _Encoder(form, columns)
+def _writer(fmt: str, columns: Sequence[OutColumn], count: int | None) -> CountedWriter:
+    encoder = _Encoder(fmt, columns)
     return CountedWriter(encoder, lambda _count: b"", count, encoder.tell)
 
 
@@ -117,4 +117,4 @@ def open_columns(file: InputFile, _options: Options) -> BinCloud:
 
 def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
     """Return a writer for new points."""
-    return _writer(style.form, columns, count)
+    return _writer(style.format, columns, count)

@@ -136,10 +136,10 @@ def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] 
     return "" if one_word else "a name is one word without blanks" + f", and not {' or '.join(taken)}" * bool(taken)
 
 
-def type_in(form: str, codes: Mapping[str, Code], column: OutColumn, taken: Collection[str] = ()) -> Code:
+def type_in(fmt: str, codes: Mapping[str, Code], column: OutColumn, taken: Collection[str] = ()) -> Code:
     """Return a format's name for the type of a column; raises ValueInvalid if it has none."""
     if (reason := misfit_of(codes, column, taken)) or column.kind is None:
-        raise ValueInvalid(f"column {shown(column.name)} does not fit in {form}: {reason}")
+        raise ValueInvalid(f"column {shown(column.name)} does not fit in {fmt}: {reason}")
     return codes[column.kind.str[1:]]
 
 

@@ -163,7 +163,7 @@ class LasFile(column_file.ColumnFile):
         del drops  # the library counts
         if [column.name for column in columns] != list(self.names):
             raise ValueInvalid("the dimensions of las stay as they are; -f npy or csv writes others")
-        packed = self.header.are_points_compressed if style.form not in ("las", LAZ) else style.form == LAZ
+        packed = self.header.are_points_compressed if style.format not in ("las", LAZ) else style.format == LAZ
         return LasWriter(deepcopy(self.header), columns, packed=packed, name=self.file.name)
 
 
@@ -273,7 +273,7 @@ def misfit(column: OutColumn) -> str:
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
     """Return a writer for new points: LAS 1.4, columns that are not dimensions of it as extra bytes."""
-    laspy = _laspy(style.form)
+    laspy = _laspy(style.format)
     names = {column.name for column in columns}
     if not names >= set(XYZ):
         raise ValueInvalid("las holds points; there are no x, y, z")
@@ -282,6 +282,6 @@ def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> La
     known = set(header.point_format.dimension_names)
     for column in columns:
         if column.kind is not None and column.name not in known and column.name not in XYZ:
-            with _translated(style.form, REFUSED):
+            with _translated(style.format, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
-    return LasWriter(header, columns, packed=style.form == LAZ)
+    return LasWriter(header, columns, packed=style.format == LAZ)

@@ -91,7 +91,7 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
     """Read a header, up to the data; raises FormatError with line, value and remedy."""
     if (first := stream.readline(64)).strip() != b"ply" or not first.endswith(b"\n"):
         raise FormatError("the first line of a PLY file is `ply`, and it ends in a line feed", source=source, line=1)
-    form, elements, text = "", dict[str, PlyElement](), [first]
+    fmt, elements, text = "", dict[str, PlyElement](), [first]
 
     def fail(message: str) -> FormatError:
         return FormatError(message, source=source, line=len(text))
@@ -103,9 +103,9 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
             case "end_header":
                 break
             case "format":
-                if form or len(words) != 3 or words[1] not in FORMS or words[2] != "1.0":
+                if fmt or len(words) != 3 or words[1] not in FORMS or words[2] != "1.0":
                     raise fail(f"{shown(' '.join(words))}: expected one format: {', '.join(FORMS)}, and 1.0")
-                form = words[1]
+                fmt = words[1]
             case "element":
                 if len(words) != 3:
                     raise fail(f"{shown(' '.join(words))}: expected element NAME COUNT")
@@ -120,9 +120,9 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
             case word:
                 known = "format, element, property, comment, obj_info, end_header"
                 raise fail(f"{shown(word)} is no key of a PLY header; keys: {known}")
-    if not form:
+    if not fmt:
         raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
-    return b"".join(text), FORMS[form], list(elements.values())
+    return b"".join(text), FORMS[fmt], list(elements.values())
 
 
 def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None:

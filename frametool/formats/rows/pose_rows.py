@@ -71,20 +71,20 @@ class RowForm(NamedTuple):
 class DroppedFields:
     """What a format cannot store of the poses that are written: collected, and reported at the end."""
 
-    def __init__(self, form: RowForm, style: Style) -> None:
+    def __init__(self, spec: RowForm, style: Style) -> None:
         """Start empty; raises ValueInvalid for notations that the format does not have."""
-        self.form, self.style = form, style
+        self.format, self.style = spec, style
         self.found: dict[str, None] = {}
         self.counted = False
         self.by_stamp = False
         self.turned = False
         if any(each.spec != "quaternion" for each in style.notations):
-            raise ValueInvalid(f"{style.form} writes rotations in its own way; leave --to out")
+            raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
 
     def record(self, *, frames: bool, stamps: bool, extras: Iterable[str]) -> None:
         """Record fields of poses that the format cannot store."""
         said = {"frames": frames, "stamps": stamps}
-        self.found |= {LOSABLE[what]: None for what, there in said.items() if there and what not in self.form.holds}
+        self.found |= {LOSABLE[what]: None for what, there in said.items() if there and what not in self.format.holds}
         self.found |= dict.fromkeys(extras)  # by name
 
     def tell(self) -> None:
@@ -93,16 +93,16 @@ class DroppedFields:
         if others := self.found.keys() - {*LOSABLE.values()}:
             left.append(listing(others, MOST_NAMED))
         said = [f"{', '.join(left)} left out"] if left else []
-        said += [self.form.beside] * bool(self.form.beside)
+        said += [self.format.beside] * bool(self.format.beside)
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
         said += ["pictures are named by their stamps"] * self.by_stamp
-        axes = FORMATS[self.style.form].poses.axes
+        axes = FORMATS[self.style.format].poses.axes
         if self.turned:
             said.append(f"camera axes turned from {self.style.axes} to {axes}, half a turn about x")
         elif axes and not self.style.axes:
-            said.append(f"the axes of the poses are taken for {axes}, as {self.style.form} has them")
+            said.append(f"the axes of the poses are taken for {axes}, as {self.style.format} has them")
         if said:
-            warn(f"{self.style.form}: {'; '.join(said)}")
+            warn(f"{self.style.format}: {'; '.join(said)}")
 
 
 def turned(style: Style, pose: Components) -> Components:
@@ -116,7 +116,7 @@ def turned(style: Style, pose: Components) -> Components:
 
 def is_turned(style: Style) -> bool:
     """Return True if the axes of a camera differ from those of the format it is written in."""
-    axes = FORMATS[style.form].poses.axes if style.form in FORMATS else ""
+    axes = FORMATS[style.format].poses.axes if style.format in FORMATS else ""
     return bool(axes and style.axes and axes != style.axes)
 
 
@@ -166,10 +166,10 @@ ROWS = {
 }  # fmt: skip
 
 
-def rows_of(form: str) -> RowForm | None:
+def rows_of(spec: str) -> RowForm | None:
     """Return how all poses are written in a format; None if each result has a text of its own."""
-    found = getattr(import_module(FORMATS[form].writer), "ROWS", None)
-    return found[form] if isinstance(found, dict) else found
+    found = getattr(import_module(FORMATS[spec].writer), "ROWS", None)
+    return found[spec] if isinstance(found, dict) else found
 
 
 BLOCK = 1 << 12  # poses
@@ -210,17 +210,17 @@ class PoseBlock(NamedTuple):
     names: Sequence[tuple[str, str] | None]
 
 
-def samples(rows: Iterator[Written], form: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
+def samples(rows: Iterator[Written], spec: Poses, file: InputFile, options: Options) -> Iterator[Samples]:
     """Yield the poses of a file as samples of one frame; assumptions are reported with the file's name."""
-    parent, child = options.answers.names(*form.frames)
-    for block in blocks(rows, form, file, options):
+    parent, child = options.answers.names(*spec.frames)
+    for block in blocks(rows, spec, file, options):
         columns = [part.tolist() for part in block.poses]
         yield Samples(parent, child, block.stamps_ns.tolist(), list(zip(*columns, strict=True)), block.lines)
-    options.tally.axes[child] = options.answers.camera_axes or form.axes
+    options.tally.axes[child] = options.answers.camera_axes or spec.axes
 
 
 def blocks(
-    rows: Iterator[Written], form: Poses, file: InputFile, options: Options, *, named: bool = True
+    rows: Iterator[Written], spec: Poses, file: InputFile, options: Options, *, named: bool = True
 ) -> Iterator[PoseBlock]:
     """Yield the poses of a file, checked, block by block.
 
@@ -230,27 +230,27 @@ def blocks(
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
     count = 0
     while some := list(islice(rows, BLOCK)):
-        good, poses = _checked(some, form, file, options)
+        good, poses = _checked(some, spec, file, options)
         times = [stamps.at(count + at) if stamps else _counted(some[at], file) for at in range(len(some))]
         count += len(some)
         yield _block(some, good, poses, times)
     if stamps:
         stamps.finish(count, file.name)
-    describe(options, form, count, named=named)
+    describe(options, spec, count, named=named)
 
 
-def describe(options: Options, form: Poses, count: int, *, named: bool = True) -> None:
+def describe(options: Options, spec: Poses, count: int, *, named: bool = True) -> None:
     """Record the assumptions about a trajectory, to be reported with the name of its file."""
-    parent, child = options.answers.names(*form.frames)
+    parent, child = options.answers.names(*spec.frames)
     said = []
     if named and not options.answers.frames:
         said.append(f"{count} {'pose' if count == 1 else 'poses'} of {child} in {parent} (--frames)")
-    if form.counted and not options.answers.stamps:
-        said.append(f"seconds are {form.counted} (--stamps)")
+    if spec.counted and not options.answers.stamps:
+        said.append(f"seconds are {spec.counted} (--stamps)")
     options.tally.assumed = ", ".join(said)
 
 
-def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Options) -> tuple[Any, Components]:
+def _checked(some: Sequence[Written], spec: Poses, file: InputFile, options: Options) -> tuple[Any, Components]:
     """Return the valid rows, and the poses of the body in the world."""
     import numpy as np
 
@@ -258,15 +258,15 @@ def _checked(some: Sequence[Written], form: Poses, file: InputFile, options: Opt
     from frametool.geometry.batch_validation import read_rotations
 
     columns = np.array([row.numbers for row in some], np.float64).T
-    found = read_rotations(notation(form.rotation), list(columns[3:]), normalize=options.normalize)
+    found = read_rotations(notation(spec.rotation), list(columns[3:]), normalize=options.normalize)
     for at, reason in sorted(found.reasons.items()):
         options.report(error_at(file, some[at], reason))
-    if form.rotation == "matrix":
+    if spec.rotation == "matrix":
         options.tally.projected = max(options.tally.projected, found.off)
     else:
         options.tally.rough += [some[at].line for at in found.mended.tolist()]
     poses: Components = (*columns[:3], *found.quaternions)
-    if form.inverse:
+    if spec.inverse:
         poses = rigid.inverse(*poses)
     return [at for at in range(len(some)) if at not in found.reasons], poses
 

@@ -44,7 +44,7 @@ def read(file: FrameFile, options: Options) -> Iterator[Edge]:
     frames = options.answers.frames
     naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames, blocks=frames[1:])
     expected, nothing = "blocks of cameras", "a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC"
-    is_sensor = file.form == "euroc-sensor"
+    is_sensor = file.format == "euroc-sensor"
     if is_sensor:
         expected, nothing = "T_BS of a sensor", "the pose of a sensor is T_BS"
         names = options.answers.names("body", sensor_name(file.path))

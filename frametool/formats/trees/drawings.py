@@ -69,7 +69,7 @@ def _about(attributes: str) -> str:
 
 def write_tree(tree: Frames, style: Style) -> str:
     """Return a flowchart of mermaid, or a digraph of graphviz."""
-    if style.form == "mermaid":
+    if style.format == "mermaid":
         return _flowchart(tree, style)
     if tree.moves:
         return _view_frames(tree)

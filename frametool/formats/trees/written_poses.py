@@ -31,7 +31,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     """Return one line per record in JSON, else the records as documents separated by `---`."""
-    if style.form == "json":
+    if style.format == "json":
         from frametool.documents import json
 
         return "".join(f"{json.dump(record, style.number)}\n" for record in records)
@@ -42,7 +42,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 def write_tree(tree: Frames, style: Style) -> str:
     """Return the tree in list form, roots first; JSON on one line."""
-    if style.form == "json":
+    if style.format == "json":
         from frametool.documents import json
 
         return f"{json.dump({'frames': list(tree_entries(tree, style))}, style.number)}\n"
@@ -55,29 +55,29 @@ def write_tree(tree: Frames, style: Style) -> str:
 MOST_DECIMALS = 17
 
 
-def static_edges(tree: Frames, form: str) -> list[tuple[str, str, Rigid]]:
+def static_edges(tree: Frames, fmt: str) -> list[tuple[str, str, Rigid]]:
     """Return parent, child and pose of the edges of a tree; raises ValueInvalid if it moves, or has none."""
     tracks = list(tree.tracks())
     if moving := next((track.child for track in tracks if not track.is_static), None):
-        raise ValueInvalid(f"{form} holds no moving frames, and {shown(moving)} moves; give --at TIME")
+        raise ValueInvalid(f"{fmt} holds no moving frames, and {shown(moving)} moves; give --at TIME")
     if not tracks:
-        raise ValueInvalid(f"{form} holds poses, and the tree has none: {listing(tree.frames)}")
+        raise ValueInvalid(f"{fmt} holds poses, and the tree has none: {listing(tree.frames)}")
     return [(track.parent, track.child, track.components) for track in tracks]
 
 
-def warn_lonely_roots(tree: Frames, form: str) -> None:
+def warn_lonely_roots(tree: Frames, fmt: str) -> None:
     """Warn about frames that a format cannot name because nothing is connected to them."""
     parents = {track.parent for track in tree.tracks()}
     if lonely := [frame for frame in tree.roots if frame not in parents]:
-        warn(f"{form} cannot store frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
+        warn(f"{fmt} cannot store frames without a pose: {', '.join(map(shown, lonely[:5]))} left out")
 
 
 class Precision:
     """The largest difference between the poses and what is read back."""
 
-    def __init__(self, form: str, notation: str) -> None:
+    def __init__(self, fmt: str, notation: str) -> None:
         """Start with nothing written; `notation` is that of the rotations."""
-        self.form, self.notation = form, notation
+        self.format, self.notation = fmt, notation
         self.metres = 0.0
         self.radians = 0.0
 
@@ -94,7 +94,7 @@ class Precision:
             off = " and ".join(
                 f"{value:.1g} {unit}" for value, unit in ((self.metres, "m"), (self.radians, "rad")) if value
             )
-            warn(f"{self.form}: poses are written as {self.notation}; they read back to within {off}")
+            warn(f"{self.format}: poses are written as {self.notation}; they read back to within {off}")
 
 
 def angles_of(rotation: Quaternion) -> tuple[Three[float], Quaternion]:
