@@ -20,12 +20,9 @@ def section(calculator: str = "") -> Section:
 
 
 def _text(question: Question, calculator: str) -> str:
-    parts = []
-    tried = try_it.lines() if calculator else {}
-    for command, output in question.shell:
-        parts.append(fenced(f"$ {command}\n{output}", "console"))
-        if command in tried:
-            parts.append(f'<p class="try"><a href="{calculator}{try_it.link(tried[command])}">Try it</a></p>')
+    parts = [fenced("".join(f"$ {command}\n{output}" for command, output in question.shell), "console")]
+    if calculator and (tried := _tried(question, calculator)):
+        parts.append(f'<p class="try">{" ".join(tried)}</p>')
     if question.prose:
         parts += ["## Why, and what to mind", _linked(question.prose)]
     options = {option.name: option_row(option) for call in question.calls for option in call.options}
@@ -37,6 +34,16 @@ def _text(question: Question, calculator: str) -> str:
         "Forms of files": links("formats", question.forms),
         "Files": links("examples", question.files),
     })])  # fmt: skip
+
+
+def _tried(question: Question, calculator: str) -> list[str]:
+    """Return links that open the calculator with those commands of a question that run there."""
+    found = []
+    for number, (command, _) in enumerate(question.shell, 1):
+        if command in try_it.lines():
+            label = "Try it" if len(question.shell) == 1 else f"Try command {number}"
+            found.append(f'<a href="{calculator}{try_it.link(try_it.lines()[command])}">{label}</a>')
+    return found
 
 
 def _linked(prose: str) -> str:
