@@ -14,7 +14,7 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option,
 from frametool.cli.options import TIME, at_ns, color_option, moving_options, rules
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import say
-from frametool.cli.trees import FRAME, frame_name, load_tree, opened
+from frametool.cli.trees import FRAME, frame_name, load_tree, opened, tree_file
 from frametool.errors import FormatError, listing, shown
 from frametool.frames.stamps import format_stamp
 
@@ -161,7 +161,7 @@ def _solids(tree: str) -> list[Solid]:
     """Return the solids of a robot's file, and say which are not drawn as they are; its frames were read before."""
     from frametool.formats.robots.solids import read_solids
 
-    if not os.path.isfile(tree):
+    if not os.path.isfile(tree_file(tree)):
         return []
     (file,) = opened([tree])
     with closing(file):
