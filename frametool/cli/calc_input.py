@@ -100,7 +100,7 @@ class Expression(Text):
 
 
 def value_texts(terms: Iterable[Term], style: Style) -> Iterator[str]:
-    """Yield the text of each value in the form of a style, what parts it from the one before included.
+    """Yield the text of each value in the format of a style, what parts it from the one before included.
 
     Each is written before the next one is looked at, but for the rows of a table, which share their columns.
     """

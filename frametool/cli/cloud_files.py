@@ -54,8 +54,8 @@ class BagOfClouds:
         self.output = output
         stream.inputs.ask("input_path")
         self.stream = stream
-        if output.path in (None, "-") or not holds_arrays(output.told or ""):
-            raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; forms: {_WRITTEN}")
+        if output.path in (None, "-") or not holds_arrays(output.chosen or ""):
+            raise click.UsageError(f"each cloud of a bag is a file: -o 'scan_{{stamp_ns}}.pcd'; formats: {_WRITTEN}")
         self.pattern = str(output.path)
         for place in {*re.findall(r"\{(\w*)\}", self.pattern)} - {*PLACES}:
             known = ", ".join(f"{{{each}}}" for each in PLACES)
@@ -107,7 +107,7 @@ class BagOfClouds:
             bad.take([Fault.of(cloud.number, "", error)])
             return 0
         name = self._name(cloud)
-        style = self.output.style.with_format(self.output.told or "")
+        style = self.output.style.with_format(self.output.chosen or "")
         with writing(name, force=self.output.force) as write:
             for outcome in moved_cloud(cloud, pose, style, self.path):
                 for fault in outcome.faults:
@@ -139,13 +139,13 @@ class SeveralClouds:
         refuse("-" in self.paths, "-i - among several: standard input holds one cloud; name files")
         if bags := [path for path in self.paths if is_bag(path)]:
             raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
-        forms = inputs().input_forms
+        forms = inputs().input_formats
         told = [form for form in forms if "arrays" in FORMATS[form].reads]
         if len(told) not in (0, 1, len(self.paths)):
             raise click.UsageError(f"--in is given {len(told)} times for {len(self.paths)} clouds; once, or once each")
         self.forms = told * (len(self.paths) if len(told) == 1 else 1) or [""] * len(self.paths)
         self.frames = [name.strip() for text in inputs().named_frames for name in text.split(",")]
-        inputs().leave(input_forms=[form for form in forms if form not in told], named_frames=())
+        inputs().leave(input_formats=[form for form in forms if form not in told], named_frames=())
         if self.frames and len(self.frames) != len(self.paths):
             raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
 
@@ -179,9 +179,9 @@ class SeveralClouds:
                 columns = import_module(FORMATS[form].reader).open_columns(file, reading)
                 request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
                 planned.append((columns, request, path))
-            into = self.output.told or form
+            into = self.output.chosen or form
             refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; forms: {_WRITTEN}")
-            refuse(self.output.path is self.output.told is None, "several clouds become one file: give -o all.ply")
+            refuse(self.output.path is self.output.chosen is None, "several clouds become one file: give -o all.ply")
             merged = MergedClouds(planned, self.output.style.with_format(into))
             status = 0
             with writing(self.output.path, force=self.output.force) as write:
@@ -203,13 +203,13 @@ def clouds_of(stream: Stream, output: Output) -> BagOfClouds | SeveralClouds | N
         return SeveralClouds(output, stream)
     if not stream.path or not is_bag(stream.path):
         return None
-    if not holds_arrays(output.told or "") and stream.messages() is not None:
+    if not holds_arrays(output.chosen or "") and stream.messages() is not None:
         return None
     return BagOfClouds(stream.path, output, stream)
 
 
 def is_bag(path: str) -> bool:
-    """Tell a bag by its first bytes, or as a folder."""
+    """Recognize a bag by its first bytes, or as a folder."""
     if not os.path.isfile(path):
         return of_folder(path) in BAGS
     with open(path, "rb") as file:

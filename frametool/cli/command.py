@@ -31,7 +31,7 @@ EVERYTHING = "frametool.everything"  # a key in a context's `meta`
 INPUTS = "frametool.inputs"  # the key in a context's `meta`
 TOLD = "frametool.told"  # the same: the options on the command line
 # what stands for an option of several values in a command without it
-WITHOUT = {"input_forms": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
+WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options that any way may ignore: they are about what is said, not about what is done
 OF_MESSAGES = ("quiet", "verbose")
 
@@ -39,7 +39,7 @@ OF_MESSAGES = ("quiet", "verbose")
 class Inputs:
     """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
 
-    forms_read: the forms of what was read, each with the options that say what it leaves open
+    formats_read: the formats of what was read, each with the options that say what it leaves open
     reads_trees: whether files of frames are opened: --in is then about these too
     earth: what the options say of places on the Earth, made when first needed
     """
@@ -48,7 +48,7 @@ class Inputs:
         """Keep the values; idle: the options that were given, each as it is called."""
         self._values = {**values}
         self._idle = {} if idle is None else idle
-        self.forms_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
+        self.formats_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
         self.reads_trees = False
         self.earth: Earth | None = None
 
@@ -90,13 +90,13 @@ class Inputs:
 class Option(click.Option):
     """An option with what it says about others of its command, by the names of their parameters, and its place in help.
 
-    excludes: those that cannot stand beside it
+    excludes: those that cannot accompany it
     requires: without any of these it has no meaning
     under: the first word of its heading
     """
 
     def __init__(self, names: Any, excludes: Any = (), requires: Any = (), under: str = "Options", **rest: Any) -> None:
-        """Keep these beside what click keeps."""
+        """Keep these next to what click keeps."""
         super().__init__(names, **rest)
         self.excludes, self.requires, self.under = excludes, requires, under
 
@@ -186,7 +186,7 @@ HEADINGS = (
     "Turtles (help turtles)",
 )  # fmt: skip
 WIDEST = 24  # of the left column
-LONGEST_CHOICE = 14  # of choices beside their option
+LONGEST_CHOICE = 14  # of choices next to their option
 LONGEST_LINE = 62  # of names of common options
 
 
@@ -394,7 +394,7 @@ class Command(WithHelp):
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command on its inputs, then say if --camera-axes was of no use: only a result shows that."""
+        """Run the command on its inputs, then report if --camera-axes was of no use: only a result shows that."""
         idle = {each.name: each.opts[-1] for each in ctx.meta[TOLD] if each.name not in OF_MESSAGES}
         given = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
         try:
@@ -453,10 +453,10 @@ def _with_value(args: list[str], option: str, *values: str) -> list[str]:
 
 
 def _say_not_needed(given: Inputs) -> None:
-    """Say on stderr which options change nothing, where only what was read or is written shows whether they do."""
+    """Report on stderr which options change nothing, where only what was read or is written shows whether they do."""
     for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
-        if chosen and not given.quiet and not any(ask in asks for _, asks in given.forms_read):
-            forms = " and ".join(dict.fromkeys(form for form, _ in given.forms_read if form))
+        if chosen and not given.quiet and not any(ask in asks for _, asks in given.formats_read):
+            forms = " and ".join(dict.fromkeys(form for form, _ in given.formats_read if form))
             why = f": {forms} specifies its {'own frames' if ask == 'frames' else 'camera axes'}" if forms else " here"
             say(f"note: --{ask.replace('_', '-')} has no effect{why}")
 

@@ -121,9 +121,9 @@ def trajectory(
     return found, name, any(bad.count for bad in made)
 
 
-def forms_of(files: int) -> list[str]:
-    """Return the form of each of several files as --in says, the last for the rest; "" where it says none."""
-    forms = list(running().input_forms)
+def formats_of(files: int) -> list[str]:
+    """Return the format of each of several files as --in says, the last for the rest; "" where it says none."""
+    forms = list(running().input_formats)
     refuse(len(forms) > files, f"--in is given {len(forms)} times for {files} files")
     return forms + (forms[-1:] * (files - len(forms)) or [""] * files)
 
@@ -133,7 +133,7 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     from frametool.fit.comparison import compare
 
     refuse([ref, *ests].count("-") > 1, "standard input can be read once; only one trajectory may be -")
-    on_error, forms, chosen = inputs.on_error, forms_of(1 + len(ests)), _settings(inputs)
+    on_error, forms, chosen = inputs.on_error, formats_of(1 + len(ests)), _settings(inputs)
     reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
     found = []
     for argument, form in zip(ests, forms[1:], strict=True):
@@ -186,7 +186,7 @@ def _mount(text: str) -> Any:
 
 
 def write_trajectory(output: Output, found: Trajectory) -> None:
-    """Write poses, or positions, in any form that holds them; frames are named if somebody called them something."""
+    """Write poses, or positions, in any format that holds them; frames are named if somebody called them something."""
     from frametool.frames.trajectory import BODY, WORLD
 
     world, body = (found.world, found.body) if (found.world, found.body) != (WORLD, BODY) else (None, None)

@@ -1,4 +1,4 @@
-"""Completion in bash, zsh and fish: their scripts, and what the scripts are told.
+"""Completion in bash, zsh and fish: their scripts, and what they are passed.
 
 click finds what fits. The scripts, and what passes between them and the tool, are our own: those of click differ with
 its versions, and part words at a colon or a comma.

@@ -89,7 +89,7 @@ class PoseTask:
         """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
         refuse(self.stream.path is not None, "-i FILE and arguments are two inputs; give one")
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
-            self.inputs.ask("input_forms")
+            self.inputs.ask("input_formats")
 
     def answer(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
@@ -113,8 +113,8 @@ class PoseTask:
         """Return how to derive; refuse what a derivation cannot be: a machine format, a stream."""
         from frametool.explain.derive import DerivationStyle
 
-        if self.output.told not in (None, "text"):
-            told = f"{', '.join(FORMS)}, not {self.output.told}"
+        if self.output.chosen not in (None, "text"):
+            told = f"{', '.join(FORMS)}, not {self.output.chosen}"
             raise click.UsageError(f"--explain writes {told}; leave one of them out")
         return DerivationStyle(self.output.style, significant(self.inputs.precision))
 

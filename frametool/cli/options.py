@@ -76,7 +76,7 @@ class Notations(Text):
         return dict.fromkeys((done + comma + name for name in names), "")
 
 
-class Form(Text):
+class FormatName(Text):
     """The name of a format: any, or one of those that a command reads or writes."""
 
     def __init__(self, choices: Collection[str], are: str) -> None:
@@ -194,7 +194,7 @@ _of_files, _of_times, _of_rotations, _of_results, _of_forms = (
 )
 verbose_option = _of_files("-v --verbose", "report the detected format of each input")
 _IN = "format of the input (`frametool formats`), once per file"
-in_option = _of_files("--in FORM", _IN, Form(READ, "read"), name="input_forms", multiple=True)
+in_option = _of_files("--in FORM", _IN, FormatName(READ, "read"), name="input_formats", multiple=True)
 _CAMERA_AXES = _of_forms(
     "--camera-axes", "axes of the cameras in a file; converts nothing  [default: those of its format]",
     CAMERA_AXES,
@@ -233,12 +233,12 @@ def reading_options(
     return together(in_option, *[_TOPIC] * topics, quiet, *_READING, *[_ORDER] * order)
 
 
-def input_forms(*, streams: bool = False) -> tuple[list[str], str]:
-    """Return the forms that --in names for files of frames, in their order, and the form of the stream.
+def input_formats(*, streams: bool = False) -> tuple[list[str], str]:
+    """Return the formats that --in names for files of frames, in their order, and the format of the stream.
 
-    streams: there is a stream; its form is the last one that can be streamed, "" if there is none
+    streams: there is a stream; its format is the last one that can be streamed, "" if there is none
     """
-    forms = list(inputs().input_forms)
+    forms = list(inputs().input_formats)
     streamed = [at for at, form in enumerate(forms) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
     of_stream = forms.pop(streamed[-1]) if streamed else ""
     return forms, of_stream
@@ -285,15 +285,15 @@ def result_options(*what: str) -> Adds:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
     forms = writers(*what)
     recording = [] if set(forms).isdisjoint(writers("recording")) else _RECORDING
-    chosen = option("-f --format FORMAT", "of the result (frametool formats)", Form(("text", *forms), "written here"),
-                    name="format_name")  # fmt: skip
+    kind = FormatName(("text", *forms), "written here")
+    chosen = option("-f --format FORMAT", "of the result (frametool formats)", kind, name="format_name")
     return together(chosen, *_PLACE, _PRECISION, *recording)
 
 
 def list_options(*more: str) -> Adds:
     """Add to a command the options that shape and place a list for people, which is text wherever it goes.
 
-    more: forms beside text and those of reports
+    more: formats besides text and those of reports
     """
     forms = "text", *writers("report"), *more
     return together(option("-f --format", "of the result  [default: text]", forms, name="format_name"), *_PLACE)

@@ -1,6 +1,6 @@
-"""Results: in which form they are written, and where to.
+"""Results: in which format they are written, and where to.
 
-Pictures on their way out: in which form, by the suffix of a file.
+Pictures on their way out: in which format, by the suffix of a file.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class Output:
     _fault: FrametoolError | None = None  # ends a stream behind its good rows
 
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
-        """Choose the form: as told, else by the file's suffix, else text for a terminal and YAML for a pipe.
+        """Choose the format: as chosen, else by the file's suffix, else text for a terminal and YAML for a pipe.
 
-        otherwise: the form that stands in the place of these two
+        otherwise: the format that stands in the place of these two
         """
         self._inputs = inputs
         self.path: str | None = inputs.output
@@ -61,15 +61,15 @@ class Output:
             from frametool.formats.unsupported import refuse_suffix
 
             refuse_suffix(self.path)
-        self.told = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
+        self.chosen = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
         if inputs.peek("origin") is not None or any(each.representation.on_earth for each in notations):
             from frametool.cli.earth import places_of
 
             notations, place = places_of(notations)
         self.notations: tuple[Notation, ...] = notations
-        self._form_is_default = not (self.told or otherwise)
-        form = self.told or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
+        self._form_is_default = not (self.chosen or otherwise)
+        form = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
         self._holds_arrays = table.holds_arrays(form)
         self.is_trajectory = table.is_trajectory(form)  # of the poses of one frame over time
         self._in_blocks = self.is_trajectory or self._holds_arrays or table.is_recording(form)
@@ -82,7 +82,7 @@ class Output:
             form, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
             full=digits is not None, keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
-        self.style.screen = self.told in (None, "text") and self.path is None and sys.stdout.isatty()
+        self.style.screen = self.chosen in (None, "text") and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)
         if table.is_recording(form):
             from frametool.cli.recording import recorded
@@ -96,13 +96,13 @@ class Output:
             raise UsageError(f"--to {self.style.place.name} wants TARGET ecef: {what}")
 
     def take_axes(self, known: str, operation: Operation | None = None) -> None:
-        """Keep the axes of the camera that poses are of: as --camera-axes says, else as their form has them."""
+        """Keep the axes of the camera that poses are of: as --camera-axes says, else as their format has them."""
         stated = self._inputs.peek("camera_axes") or ""
         self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style.in_camera = operation is not None and operation.looks_back
         row = table.FORMATS.get(self.style.format)
         if stated and self.style.axes and row and row.poses.axes:
-            self._inputs.forms_read = (*self._inputs.forms_read, ("", ("camera_axes",)))
+            self._inputs.formats_read = (*self._inputs.formats_read, ("", ("camera_axes",)))
 
     def take_axes_in(self, tree: Frames, source: str) -> None:
         """Keep the axes of a frame of a tree: where none is known to be a camera, --camera-axes is about this one."""
@@ -141,15 +141,15 @@ class Output:
 
             refuse_scale_in(self.style.format, beside)
         self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
-        self._tell_dropped(key for each in poses for key in each.extras)
+        self._warn_dropped(key for each in poses for key in each.extras)
 
     def _shorten(self) -> None:
         """Show poses on a terminal by quaternion and rpy only, where no representation is asked for."""
         if self.style.screen and not self.style.notations:
             self.style.notations = notation("quaternion"), notation("rpy_deg")
 
-    def _tell_dropped(self, keys: Iterable[str]) -> None:
-        """Name what results say besides where the form has no place for it."""
+    def _warn_dropped(self, keys: Iterable[str]) -> None:
+        """Name what results say besides where the format has no place for it."""
         others = {*keys} - {"stamp_ns", "point", "vector", "frame"}
         if others and self.style.format not in ("text", "yaml", "json", "csv"):
             warn(f"{self.style.format}: {listing(others)} left out")
@@ -163,7 +163,7 @@ class Output:
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of some results after the other, short batches first.
 
-        In every form the text of several results begins with that of the first: what follows it is the batch's.
+        In every format the text of several results begins with that of the first: what follows it is the batch's.
         """
         write_poses = self._module("frametool.view.pose_text").write_poses
         size = 2
@@ -249,7 +249,7 @@ class Output:
             between = parting
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
-        """Write a tree; on a terminal in colour, or as `color` says; in a form made of poses with every sample."""
+        """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
         if tree.drawn and self._form_is_default:
             self.style = self.style.with_format("text")
         if tree.drawn and self.style.format != "text":
@@ -277,7 +277,7 @@ class Output:
         else:
             self.text(write_tree(tree, self.style))
 
-    def tell_of_lock(self, poses: Sequence[Pose]) -> None:
+    def report_lock(self, poses: Sequence[Pose]) -> None:
         """Report that the Euler angles of a single result are not unique."""
         if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
             say("note: gimbal lock: the angles are not unique; the third was set to 0")
@@ -291,7 +291,7 @@ class Output:
             self.pieces(self._blocks(_batched(iter(found))))
             return
         placed = [each for each in found if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
-        self._tell_dropped(key for each in placed for key in each)
+        self._warn_dropped(key for each in placed for key in each)
         is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in found)
         text_module = "frametool.view.pose_text" if is_plain else table.FORMATS["yaml"].writer
         self.text(self._module(text_module).write_points(found, self.style))
@@ -325,14 +325,14 @@ class Output:
                 write(in_colour(str(text), self.marks) if for_people and self.style.screen else text)
             if self._fault is not None:
                 raise self._fault
-        self._tell_of_suffix()
+        self._report_suffix()
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
         return opened_place(self.style.format, self.path, force=self.force)
 
-    def _tell_of_suffix(self) -> None:
-        """Say what a file holds whose suffix stands for no form, where none was told."""
+    def _report_suffix(self) -> None:
+        """Report the format of a file whose suffix names none, where none was chosen."""
         suffix = splitext(self.path or "")[1]
         if self._form_is_default and self.path and suffix and not is_special(self.path):
             none = f"no form written here has the suffix {shown(suffix)}"
@@ -373,5 +373,5 @@ def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
 
 
 def opened_place(form: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
-    """Open the place where results of a form go."""
+    """Open the place where results of a format go."""
     return filling(path, force=force) if table.is_folder(form) and path is not None else writing(path, force=force)

@@ -1,6 +1,6 @@
 """Poses from the command line: inline mappings, bare numbers, files, standard input.
 
-Tell what somebody pasted from what has always been a stream of rows or records: arguments and standard input.
+Distinguish what somebody pasted from what has always been a stream of rows or records: arguments and standard input.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*|Transl
 
 
 def is_inline(text: str) -> bool:
-    """Tell a mapping or list written on the command line, or the inverse of one, from a file's name."""
+    """Distinguish a mapping or list written on the command line, or the inverse of one, from a file's name."""
     while found := _inverted(text):
         text = (found[1] or found[2] or "").strip()
     return text.startswith(("{", "["))
 
 
 def is_pasted(text: str, given: Notation | None = None) -> bool:
-    """Tell a text with a pose in it from a file's name; what exists is a file.
+    """Distinguish a text with a pose in it from a file's name; what exists is a file.
 
     Raises FormatError for a text that is known and cannot be taken.
     """
@@ -246,7 +246,7 @@ def inline_misuse() -> Iterator[None]:
 
 
 class ArgumentPoses(NamedTuple):
-    """What an argument holds: its poses, the keys that stand beside any of them, and what was odd in it."""
+    """What an argument holds: its poses, the keys that accompany any of them, and its warnings."""
 
     source: Source
     poses: list[Pose]
@@ -314,7 +314,7 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
     given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
     says_more = [at for at, each in enumerate(given) if each and each.beside]
     at = [0, *says_more, *_several(given)][-1] if stream is None else stream
-    _tell_of_twins(bare, given)
+    _warn_of_twins(bare, given)
     rows, timed = given[at], None
     if rows is not None and len(rows.poses) == 1:
         from frametool.grammar.pose_algebra import shared_stamp
@@ -328,8 +328,8 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
     return Rows(at, rows.source if rows else streamed, before, behind, timed)
 
 
-def _tell_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | None]) -> None:
-    """Say that the same uncertain pose twice counts as two that are independent."""
+def _warn_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | None]) -> None:
+    """Report that the same uncertain pose twice counts as two that are independent."""
     uncertain = [
         argument for argument, each in zip(arguments, given, strict=True)
         if each and any(pose.covariance is not None for pose in each.poses)

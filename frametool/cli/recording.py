@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 def recorded(chosen: Inputs, form: str, output: str | None) -> Recorded:
-    """Return what of results a recording of a form holds, as options say; raises UsageError."""
+    """Return what of results a recording of a format holds, as options say; raises UsageError."""
     place = _place(form, output)
     told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
     frames = tuple(name.strip() for name in told.split(",")) if told else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
     refuse(len({*frames}) < len(frames), f"--frames {told}: no frame is its own parent; give two names")
-    chosen.forms_read = (*chosen.forms_read, *[("", ("frames",))] * bool(chosen.named_frames))
+    chosen.formats_read = (*chosen.formats_read, *[("", ("frames",))] * bool(chosen.named_frames))
     return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 
@@ -51,12 +51,12 @@ def folder_of(place: str) -> str:
 def copied_as(form: str, path: str, output: str | None, told: str | None) -> tuple[str, str]:
     """Return the form that a recording of some form is copied in, and its place; raises UsageError where none can be.
 
-    told: the form, where the name of the place does not say it
+    told: the format, where the name of the place does not say it
     """
     folder = "bag2" if os.path.isdir(path) and output and not os.path.splitext(output)[1] else None
     copy = told or by_name(output, writers("recording")) or folder
     if copy is None:
-        unknown = f"-o {output} names no form; " if output else ""
+        unknown = f"-o {output} names no format; " if output else ""
         raise UsageError(f"{unknown}give {'-o NEW.bag' if form == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")
     place = _place(copy, output)
     if "bag1" in (form, copy) and form != copy:

@@ -1,6 +1,6 @@
 """What the commands of the turtles share: their options, leaders by name, file or standard input, and where a run goes.
 
-Records go to stdout or a file, messages to stderr, beside a drawing in the terminal, a plot and a page.
+Records go to stdout or a file, messages to stderr, next to a drawing in the terminal, a plot and a page.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ def log_events() -> Watch:
 
 
 def style_of(inputs: Inputs) -> Style:
-    """Choose the form: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
+    """Choose the format: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
     output, precision = inputs.output, inputs.precision
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
     form = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")

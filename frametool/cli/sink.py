@@ -220,7 +220,7 @@ def _new_file(mode: int, path: str) -> BinaryIO:
 
 
 def created(place: str, create: Callable[[str], Any]) -> tuple[str, Any]:
-    """Create a part beside a place that nobody else uses, and return its name, cut where the system's is too long."""
+    """Create a part next to a place that nobody else uses, and return its name, cut where the system's is too long."""
     folder, name = os.path.split(place)
     for attempt in count():
         suffix = f".{os.getpid()}{f'-{attempt}' if attempt else ''}.part"

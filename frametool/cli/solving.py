@@ -6,7 +6,7 @@ from math import degrees, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
 from frametool.cli.command import Inputs, refuse
-from frametool.cli.comparing import forms_of, trajectory
+from frametool.cli.comparing import formats_of, trajectory
 from frametool.cli.stderr import say, say_error
 from frametool.cli.trees import answers, load_tree, opened, state
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 NAMES = ("base", "gripper", "camera", "target")
 SHARES = 1000  # of the way, as progress counts it
-UNSURE = 1.2  # times too small: given sigmas of which it is told
+UNSURE = 1.2  # times: given sigmas that are smaller than that are reported
 
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
-    """Solve the tree that the measurements of files mean, beside what is fixed."""
+    """Solve the tree of the measurements in files, with its fixed edges."""
     from frametool.fit.measured_tree import solve_tree
     from frametool.view.progress import ProgressBar
 
@@ -57,14 +57,14 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     if unknown:
         warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
     if (alone := [m.place for m, checked in zip(found.measurements, found.checked, strict=True) if not checked]):
-        _tell_taken(inputs, f"in no loop, cannot be cross-checked: {first_of(alone, 5)}")
+        _report_taken(inputs, f"in no loop, cannot be cross-checked: {first_of(alone, 5)}")
     labels = [(m.place, m.id, m.parent, m.child) for m in found.measurements]
     rows = _rows(found, labels, checked=list(map(bool, found.checked)), fits=found.fits)
     return Solution("tree", found.root, found.dof, found.rms_distance, found.rms_angle, found.sigma, frames, rows)
 
 
-def _tell_taken(inputs: Inputs, *texts: str | None) -> None:
-    """Say how an input was taken, unless --quiet."""
+def _report_taken(inputs: Inputs, *texts: str | None) -> None:
+    """Report how an input was taken, unless --quiet."""
     for text in () if inputs.quiet else filter(None, texts):
         say(text)
 
@@ -92,7 +92,7 @@ def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
         own = [row for row in found if parted(row.place)[0] == each.name]
         first = f": {own[0].parent}<-{own[0].child} .." if own else ""
         rows = f"{len(own)} row{'s' * (len(own) != 1)}"
-        _tell_taken(inputs, f"{each.name}: {rows}, each the pose of child in parent{first}")
+        _report_taken(inputs, f"{each.name}: {rows}, each the pose of child in parent{first}")
     return without(found, inputs.without)
 
 
@@ -126,12 +126,12 @@ def _rows(found: Any, labels: Iterable[tuple[str, str | None, str, str]], **more
 
 
 def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
-    """Solve where a camera is on a hand, or beside a robot: two files of poses, or one of samples."""
+    """Solve where a camera is on a hand, or next to a robot: two files of poses, or one of samples."""
     from frametool.stream.samples import read_samples
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
-        form, columns, normalize = forms_of(1)[0], inputs.columns or (), inputs.normalize
+        form, columns, normalize = formats_of(1)[0], inputs.columns or (), inputs.normalize
         samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, form=form, columns=columns)
     else:
         samples = _paired(inputs, files)
@@ -142,7 +142,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     holder, other = (base, gripper) if eye_to_hand else (gripper, base)
     second, number = f"; {samples.files[1]}:" if len(files) > 1 else ",", len(samples.places)
     taken = f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {number} sample{'s' * (number != 1)}"
-    _tell_taken(inputs, taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
+    _report_taken(inputs, taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
     for each in samples.told:
         say(each)
     from frametool.fit.hand_eye import solve_hand_eye
@@ -167,7 +167,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
     from frametool.fit.alignment import paired_samples
 
-    named, gap = zip(files, forms_of(2), strict=True), inputs.max_gap_ns
+    named, gap = zip(files, formats_of(2), strict=True), inputs.max_gap_ns
     read = [trajectory(file, STOP, form, normalize=inputs.normalize)[:2] for file, form in named]
     (gripper, first), (target, second) = read
     for each, name in read:
@@ -183,14 +183,14 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
     def policy(name: str) -> BadRows:
         return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
 
-    named = zip(files, forms_of(2), strict=True)
+    named = zip(files, formats_of(2), strict=True)
     a, b = (read_points(file, form=form, answers=answers(), policy=policy) for file, form in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
     names = target, source = tuple(inputs.names or found_names)
     pairs = matched(a, b)
     how, ids = "by row" if pairs.ids is None or a.ids is None or b.ids is None else "by id", pairs.ids
     matched_as = f"{len(pairs.places)} matched {how}"
-    _tell_taken(inputs, f"{a.file}: points in {target}; {b.file}: points in {source}; {matched_as}")
+    _report_taken(inputs, f"{a.file}: points in {target}; {b.file}: points in {source}; {matched_as}")
     for each in pairs.told:
         say(each)
     weights, scale = pairs.weights, inputs.scale

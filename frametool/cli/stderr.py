@@ -106,7 +106,7 @@ TROUBLES = (MemoryError, ImportError, OSError)
 
 
 def words_of(trouble: Exception) -> str:
-    """Say what Python or the system could not do."""
+    """Return what Python or the system could not do."""
     if isinstance(trouble, MemoryError):
         return "out of memory"
     if isinstance(trouble, ImportError):  # numpy's tells of missing memory and files in many lines, the cause last

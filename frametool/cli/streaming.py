@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frametool.stream.faults import Outcome
     from frametool.stream.request import Request
 
-    About = Callable[[], str] | None  # what else there is to say of a form
+    About = Callable[[], str] | None  # what else there is to say of a format
 
 BAGS = (".bag", ".mcap", ".db3")
 _STREAMS = ", ".join(readers(*options.STREAMED))
@@ -68,7 +68,7 @@ class Stream:
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None
-        self.within = ""  # the form of the records in a bag
+        self.within = ""  # the format of the records in a bag
         told: Any = inputs.peek("given") or (None,)
         refuse(len(told) > 1, "--from takes one representation")
         self.given: Any = told[0]
@@ -88,13 +88,13 @@ class Stream:
         return self._opened
 
     def _shows_form(self, begin: bytes) -> bool:
-        """Return True if what comes later does not change the form that is found."""
+        """Return True if what comes later does not change the format that is found."""
         if has_record(begin):
             return True
         if not has_line(begin):
             return False
         try:
-            return bool(self.told_form() or self._detected(begin, is_table=self._says_columns(), quiet=True))
+            return bool(self.chosen_format() or self._detected(begin, is_table=self._says_columns(), quiet=True))
         except FormatError:
             return False
 
@@ -120,7 +120,7 @@ class Stream:
     def read_clouds_as_rows(self) -> None:
         """Let the points of a cloud be rows of CSV, which has room for more columns."""
         begin = self.opened().peek()
-        form = "" if self.within else self.told_form() or (_signed(begin, self.name) if begin else "")
+        form = "" if self.within else self.chosen_format() or (_signed(begin, self.name) if begin else "")
         if holds_arrays(form):
             from frametool.text.lines import Pieces
 
@@ -159,15 +159,15 @@ class Stream:
         What can be read once only, as `<(command)`, is streamed whatever it holds.
         """
         once = os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path))
-        is_rows = once or _may_be_bag(path) or (self.told_form() or _form_of(path)) not in ("", *RECORDS)
+        is_rows = once or _may_be_bag(path) or (self.chosen_format() or _form_of(path)) not in ("", *RECORDS)
         if path == "-" or not is_rows:
             return False
         self.path = path
         return True
 
-    def told_form(self) -> str:
-        """Return the form that --in names for the stream, "" if it names none."""
-        others, form = options.input_forms(streams=True)
+    def chosen_format(self) -> str:
+        """Return the format that --in names for the stream, "" if it names none."""
+        others, form = options.input_formats(streams=True)
         if others and not self.inputs.reads_trees:
             both = f"--in {others[0]} and --in {form}: there is one stream"
             raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
@@ -190,11 +190,11 @@ class Stream:
             try:
                 return self._run_opened(given, request, output, tables_only=tables_only)
             except FormatError as error:
-                raise with_hint(error, head, self.name, told=bool(self.told_form())) from None
+                raise with_hint(error, head, self.name, told=bool(self.chosen_format())) from None
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
-        """Run the stream, of whatever form it is."""
-        form = self.within or self.told_form()
+        """Run the stream, of whatever format it is."""
+        form = self.within or self.chosen_format()
         signed = form or _signed(stream.peek(), self.name)
         is_listed = is_trajectory(signed) or holds_arrays(signed)
         if not (form or tables_only or self._says_columns() or is_listed):
@@ -204,12 +204,12 @@ class Stream:
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
-        if form == "kitti" and self.given and not self.told_form():
+        if form == "kitti" and self.given and not self.chosen_format():
             form = "columns"  # --from says what the numbers are, and nothing of pictures
         if request.poses:
             self.inputs.ask("camera_axes", *FORMATS[form].required_options)
-        if output.told is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
-            raise click.UsageError(f"-o {output.path} does not say its form; give -f kitti-bin or nuscenes-bin")
+        if output.chosen is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
+            raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(tables_only and form in RECORDS, f"frames are looked up for the rows of a table, not of {form}")
         request = self._completed(request, output, form)
         if request.offset_ns and form in RECORDS:
@@ -221,12 +221,12 @@ class Stream:
         output.take_axes(FORMATS[form].poses.axes, request.operation)
         if is_trajectory(form) and not output.notations:
             request = request._replace(notations=())  # its rows stay what they are
-        if form in RECORDS and (output.told or form) != form and request.gathered is None:
+        if form in RECORDS and (output.chosen or form) != form and request.gathered is None:
             return self._run_as_values(stream, form, request, output)
         way = self._way(form, request, output)
         keeps = ("camera_axes",) if way == self._as_text else FORMATS[form].required_options
         asked = tuple(ask for ask in FORMATS[form].required_options if ask in keeps)
-        self.inputs.forms_read = (*self.inputs.forms_read, (form, asked))
+        self.inputs.formats_read = (*self.inputs.formats_read, (form, asked))
         outcomes, about = way(stream, form, request, output)
         bad = self.policy(self.name, "row" if holds_arrays(form) else "line")
         if request.gathered is not None:
@@ -237,7 +237,7 @@ class Stream:
         return status
 
     def _detected(self, begin: bytes, *, is_table: bool, quiet: bool = False) -> str:
-        """Find the form of the stream by what it begins with, and by its name."""
+        """Find the format of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
         form, known_by = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
@@ -246,26 +246,26 @@ class Stream:
         return form
 
     def _way(self, form: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
-        """Choose how rows become results: their text edited, as columns of numbers, or as poses in another form."""
+        """Choose how rows become results: their text edited, as columns of numbers, or as poses in another format."""
         from frametool.formats.rows.pose_rows import is_turned
         from frametool.stream.row_layout import POSE, Shape
 
         gathers = request.gathered is not None
-        if holds_arrays(form) and (gathers or output.told is None or holds_arrays(output.told)):
+        if holds_arrays(form) and (gathers or output.chosen is None or holds_arrays(output.chosen)):
             return self._as_columns
         listed = holds_arrays(form) or (is_trajectory(form) and not FORMATS[form].is_table)
-        is_kindred = output.told == "csv" and form in ("tsv", "semicolon")
+        is_kindred = output.chosen == "csv" and form in ("tsv", "semicolon")
         if gathers or form in RECORDS or is_kindred:
             return self._as_poses if gathers and listed else self._as_text
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
         no_room |= output.is_trajectory and output.style.place is not None
         turns = bool(output.style.axes) and not output.notations
-        no_room |= turns and is_turned(output.style.with_format(output.told or form))
-        return self._as_poses if listed or no_room or output.told not in (None, form) else self._as_text
+        no_room |= turns and is_turned(output.style.with_format(output.chosen or form))
+        return self._as_poses if listed or no_room or output.chosen not in (None, form) else self._as_text
 
     def _as_columns(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
-        """Write columns of numbers in the form they came in, or in another that holds such."""
+        """Write columns of numbers in the format they came in, or in another that holds such."""
         from importlib import import_module
 
         from frametool.cli.trees import answers
@@ -280,19 +280,19 @@ class Stream:
         file.format = form
         opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
         into: Any = module
-        if output.told is not None and request.gathered is None:
-            into = import_module(FORMATS[output.told].writer)
-        style = output.style.with_format(output.told or form)
+        if output.chosen is not None and request.gathered is None:
+            into = import_module(FORMATS[output.chosen].writer)
+        style = output.style.with_format(output.chosen or form)
         request = request._replace(by_default=not output.notations)
         return run_columns(opened, request, style, source=self.name, into=None if into is module else into), None
 
     def _as_poses(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
-        """Write the results of rows, or of poses that no table holds, in another form."""
+        """Write the results of rows, or of poses that no table holds, in another format."""
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import FormatConverter
 
         keeps = "poses" in FORMATS[form].writes and not output.notations
-        target = output.told or (form if keeps else "csv")
+        target = output.chosen or (form if keeps else "csv")
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         request = request._replace(by_default=not output.notations)
@@ -330,14 +330,14 @@ class Stream:
         return 0
 
     def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
-        """Write the results of records in another form than theirs."""
+        """Write the results of records in another format than theirs."""
         from frametool.stream.record_results import stream_rows
 
-        if self.inputs.on_error == NULL and output.told not in ("csv", *RECORDS):
-            raise click.UsageError(f"--on-error null: {output.told} cannot hold a row without a result; give skip")
+        if self.inputs.on_error == NULL and output.chosen not in ("csv", *RECORDS):
+            raise click.UsageError(f"--on-error null: {output.chosen} cannot hold a row without a result; give skip")
         bad = self.policy(self.name)
-        request = request._replace(by_default=has_no_text(output.told or "") and not output.notations)
-        if is_recording(output.told or ""):
+        request = request._replace(by_default=has_no_text(output.chosen or "") and not output.notations)
+        if is_recording(output.chosen or ""):
             request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
         output.rows(_then_closed(self.opened(), stream_rows(stream, form, request, output.style, bad)))
         return ROWS_SKIPPED if bad.count else 0
@@ -350,7 +350,7 @@ class Stream:
         """Add what the stream's options say to the request."""
         told = self.inputs
         adds = bool(request.poses) or request.operation.formula is None  # look-ups add by themselves
-        if form not in RECORDS and output.told not in RECORDS and adds and request.gathered is None:
+        if form not in RECORDS and output.chosen not in RECORDS and adds and request.gathered is None:
             request = request._replace(keep=told.keep)
         if (form not in RECORDS or request.operation.only_adds) and request.gathered is None:
             request = request._replace(prefix=told.prefix)
@@ -359,11 +359,11 @@ class Stream:
             request = request._replace(columns=told.columns)
         several = form in RECORDS and "," in ",".join(request.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
-        if not has_no_text(output.told or form):
+        if not has_no_text(output.chosen or form):
             told.ask("precision")
         return request._replace(
             given=request.given or self.given, notations=request.notations or output.notations,
-            place=output.style.with_format(output.told or form).place, given_place=self.given_place,
+            place=output.style.with_format(output.chosen or form).place, given_place=self.given_place,
             precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=told.on_error,
         )  # fmt: skip
 
@@ -390,12 +390,12 @@ def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
 
 
 def _may_be_bag(path: str) -> bool:
-    """Tell a bag by its suffix, or a folder."""
+    """Recognize a bag by its suffix, or a folder."""
     return path.endswith(BAGS) or os.path.isdir(path)
 
 
 def _signed(begin: bytes, name: str) -> str:
-    """Return the form that a stream shows, if it is no single row of a pose, which may have been pasted."""
+    """Return the format that a stream shows, if it is no single row of a pose, which may have been pasted."""
     from frametool.formats.detect import by_sign
 
     form = by_sign(begin, *options.STREAMED, name=name) or ""
@@ -418,7 +418,7 @@ def _opened(path: str | None) -> BufferedReader:
 
 
 def _form_of(path: str) -> str:
-    """Return the form of a file by what is in it; "" where nothing tells, or it cannot be read."""
+    """Return the format of a file by what is in it; "" where nothing tells, or it cannot be read."""
     from frametool.formats.detect import detect
 
     try:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from frametool.cli.command import Text, inputs, refuse
-from frametool.cli.options import input_forms, tree_on_the_line
+from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
 from frametool.documents.source import ReadCache
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
 # field of Answers -> the parameters that say it; what moves is asked whether --time-offset counts
 ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name != "time_offset"}
 ANSWERED |= {"frames": ("named_frames",), "order": ("order", "given")}
-OF_FILES = (*Answers._fields, "named_frames", "given", "input_forms", "topics", "quiet", "verbose")
+OF_FILES = (*Answers._fields, "named_frames", "given", "input_formats", "topics", "quiet", "verbose")
 
 
 def load_tree(
     argument: str, more: Sequence[str] = (), rules: Rules | None = None, *, streams: bool = False,
     drawings: bool = False,
 ) -> FrameTree | TransformBuffer:  # fmt: skip
-    """Read the tree of an argument and merge further files into it; say what files of other forms were taken for.
+    """Read the tree of an argument and merge further files into it; say what files of other formats were taken for.
 
     streams: `--in` is about what is streamed wherever that can be
     drawings: a file without poses is taken too, if it is alone
@@ -94,14 +94,14 @@ def _loaded(
 
 
 def lookups_in(tree: Frames, *, carried: bool) -> Lookups:
-    """Return the look-ups of a command; tell of covariances that are not wanted."""
+    """Return the look-ups of a command; report covariances that are not wanted."""
     if tree.covariances and not carried and not inputs().quiet:
         say(f"sigmas of {bare(tree.name)} not used (--covariance)")
     return Lookups(tree, carried=carried)
 
 
-def tell_granted(lookups: Lookups) -> None:
-    """Say what look-ups have taken for granted."""
+def report_granted(lookups: Lookups) -> None:
+    """Report what look-ups have taken for granted."""
     if (granted := lookups.granted()) and not inputs().quiet:
         say(granted)
 
@@ -125,21 +125,21 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     given = inputs()
     given.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    before, idle = given.forms_read, given.idle()
+    before, idle = given.formats_read, given.idle()
 
     def read_all() -> tuple[Value, Any, Any]:
-        return read(), given.forms_read[len(before) :], idle - given.idle()
+        return read(), given.formats_read[len(before) :], idle - given.idle()
 
     key = tuple(named), f"{options} {[given.peek(name) for name in OF_FILES]}"
     files = [each for each in named if not is_inline(each) and os.path.exists(each)]
     value, forms, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
-    given.forms_read = (*before, *forms)
+    given.formats_read = (*before, *forms)
     given.ask(*asked)
     return value
 
 
 def state(files: Sequence[FrameFile], *, whole: bool = True) -> None:
-    """Say on stderr what files that were read were taken for: those of other forms than the own one, with -v all.
+    """Report on stderr what files that were read were taken for: those of other formats than the own one, with -v all.
 
     whole: these are all; of one of two sides, the other may need an option that this one does not
     """
@@ -169,7 +169,7 @@ def opened(
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
     chosen = inputs()
     chosen.reads_trees = True
-    forms, named = input_forms(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
+    forms, named = input_formats(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
     reads = ("tree", "drawing") if drawings else ("tree",)
     if other := [form for form in forms if {*reads}.isdisjoint(FORMATS[form].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
@@ -201,7 +201,7 @@ def opened(
         file.answers = file.answers._replace(frames=names)
         if file not in lacking and lacking and not chosen.quiet:
             say(f"note: --frames {','.join(names)} has no effect: {file.name} names its own frames")
-    chosen.forms_read = (*chosen.forms_read, *((file.format, file.required_options) for file in found))
+    chosen.formats_read = (*chosen.formats_read, *((file.format, file.required_options) for file in found))
     return found
 
 
@@ -211,7 +211,7 @@ def refuse_two_readers(arguments: Sequence[str]) -> None:
 
 
 def answers() -> Answers:
-    """Return what the options say about all files whose form leaves it open."""
+    """Return what the options say about all files whose format leaves it open."""
     chosen = inputs()
     named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
     given = chosen.peek("given")
@@ -220,7 +220,7 @@ def answers() -> Answers:
 
 
 class SaidAnswers(Answers):
-    """What options say of files whose form leaves it open; each counts as asked for where a reader looks at it."""
+    """What options say of files whose format leaves it open; each counts as asked for where a reader looks at it."""
 
     def __getattribute__(self, name: str) -> Any:
         """Ask for the options of a field."""

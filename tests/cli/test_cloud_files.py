@@ -140,7 +140,7 @@ def test_a_pose_moves_them_all(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
-        (("bag", "map"), 2, "each cloud of a bag is a file: -o 'scan_{stamp_ns}.pcd'; forms: "),
+        (("bag", "map"), 2, "each cloud of a bag is a file: -o 'scan_{stamp_ns}.pcd'; formats: "),
         (("bag", "map", "-o", "x.pcd"), 1, "bag: messages 1 and 2 would both become 'x.pcd'; put {stamp_ns} into its name"),
         (("bag", "map", "-o", "{nope}.pcd"), 2, "{nope} has no meaning; there are {stamp_ns}, {stamp}, {number}, {topic}, {frame}"),
         (("bag", "map", "-o", "{number}.pcd", "--topic", "/pionts"), 1, "bag: no clouds on /pionts; topics with clouds: /points"),

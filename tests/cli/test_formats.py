@@ -114,7 +114,7 @@ def test_python_users_have_the_same_table() -> None:
 
 @pytest.mark.parametrize("arguments", [("convert", "--from", "rpy", "0", "0", "1"), ("tree", "{frames: {a: {b: {xyz: [1, 2, 3]}}}}")])
 def test_a_file_whose_suffix_is_no_form_says_what_it_holds(arguments: tuple[str, ...], run: Run, tmp_path: Path) -> None:
-    note = "no form written here has the suffix '.foo'; it holds yaml, -f says another"
+    note = "no format written here has the suffix '.foo'; it holds yaml, -f says another"
     assert run(*arguments, "-o", "out.foo").err == f"frametool: note: out.foo: {note}\n"
     assert (tmp_path / "out.foo").read_text() == run(*arguments, "-f", "yaml").out
     for quiet in (["-o", "out.yml"], ["-o", "plain"], ["-o", "other.foo", "-f", "yaml"], ["-o", "/dev/null"]):

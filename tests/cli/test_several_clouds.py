@@ -90,7 +90,7 @@ FRAMES = ("--frames", "left,right", "-o", "x.ply")
         (("map", *BOTH, "--frames", "left,rigth", "-o", "x.ply"), 4, "unknown frame 'rigth' in t.yaml; did you mean 'right'?"),
         (("map", "-i", "a.ply", "-i", "no.ply", *FRAMES), 5, "no.ply: no such file or directory"),
         (("map", "-i", "a.ply", "-i", "p.csv", *FRAMES), 1, "p.csv: CSV with a header, no cloud; make one of it: "),
-        (("map", *BOTH, "--frames", "left,right", "-f", "csv"), 2, "several clouds become one cloud: -o all.ply, or -f; forms: "),
+        (("map", *BOTH, "--frames", "left,right", "-f", "csv"), 2, "several clouds become one cloud: -o all.ply, or -f; formats: "),
         (("map", *BOTH, "--frames", "left,right"), 2, "several clouds become one file: give -o all.ply"),
         (("map", *BOTH, *FRAMES, "--keep"), 2, "--keep has no effect here"),
         (("map", *BOTH, *FRAMES, "--columns", "x,y,z"), 2, "--columns has no effect here"),

@@ -89,7 +89,7 @@ def test_what_is_drawn_can_be_chosen(run: Run, arguments: tuple[str, ...], names
         (("--from", "above"), 2, "expected slanted, front, side, top or AZ,EL in degrees, found 'above'"),
         (("--from", "0,100"), 2, "the elevation must be -90 .. 90 degrees"),
         (("--from", "x,1"), 2, "'x' is not a number"),
-        (("-o", "x.gif"), 2, "no form has the suffix '.gif'"),
+        (("-o", "x.gif"), 2, "no format has the suffix '.gif'"),
         (("-o", "taken.svg"), 5, "taken.svg: exists; give --force"),
         (("--overlay",), 2, "--overlay takes two trees"),
         ((ROBOT, "map", "--overlay"), 2, "--overlay takes two trees"),

@@ -124,7 +124,7 @@ def test_a_name_that_ends_in_bin_does_not_choose_what_is_written(run: Run) -> No
     for name in ("a.ply", "a.csv"):
         done = run("convert", "-i", name, "-o", "b.bin", files={"a.ply": cloud, "a.csv": "x,y,z\n1,2,3\n"})
         assert (done.status, done.out) == (2, "")
-        assert "-o b.bin does not say its form; give -f kitti-bin or nuscenes-bin" in done.err
+        assert "-o b.bin does not name its format; give -f kitti-bin or nuscenes-bin" in done.err
 
 
 @pytest.mark.parametrize("form", ["pcd", "ply", "npy"])

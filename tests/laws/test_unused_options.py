@@ -84,7 +84,7 @@ WAYS = (
 )  # fmt: skip
 # parameter -> a value that is not its default
 VALUES = {
-    "input_forms": "csv", "joints": "a=1", "joint_files": "joints.csv", "named_frames": "a,b", "stamps": "walk.tum", "notations": "matrix",
+    "input_formats": "csv", "joints": "a=1", "joint_files": "joints.csv", "named_frames": "a,b", "stamps": "walk.tum", "notations": "matrix",
     "given": "rpy", "columns": "x", "time_column": "t", "origin": "{lat: 48, lon: 11, alt: 5}", "zone": "32N", "recorded_frames": "a,b",
     "topics": "/tf", "messages": "pose", "more": "drive.yaml", "on_error": "skip", "output": "out.json", "find": "1,2,3", "axes": "optical",
     "world": "ned_from_enu", "all_axes": "unity_from_ros", "fixed": "map", "format_name": "json", "input_path": "walk.tum", "form": "json",
@@ -93,7 +93,7 @@ VALUES = {
 # these hold whether or not there is something that they are about: what is said, what is tolerated, how a number is spelt, when it is
 FREE = {
     "quiet", "verbose", "color", "normalize", "on_error", "max_errors", "deg", "keep_sign", "notations", "precision", "scale", "camera_axes",
-    "at", "moving", "cache", "kinds", "unwrap", "format_name", "form", "input_forms", "strict", "each", "fixed", "max_gap_ns",
+    "at", "moving", "cache", "kinds", "unwrap", "format_name", "form", "input_formats", "strict", "each", "fixed", "max_gap_ns",
 }  # fmt: skip
 LEFT_OPEN = {("convert", "stamps"), ("compose", "stamps"), ("mean", "stamps"), ("apply", "stamps"), ("convert", "given"), ("compose", "given"),
              ("mean", "given"), ("convert", "time_offset")}  # of rows that the form says nothing of  # fmt: skip
@@ -121,7 +121,7 @@ def test_what_is_asked_of_inputs_is_a_parameter_of_a_command() -> None:
     asks = r"\b(?:inputs|inputs\(\)|running\(\))\.(?:peek\(\"(\w+)|(\w+)\b(?!\())"
     texts = [path.read_text() for path in (ROOT / "frametool" / "cli").rglob("*.py")]
     asked = {name for text in texts for found in re.findall(asks, text) for name in found if name}
-    methods = {"forms_read", "reads_trees", "earth", "peek", "refuse_idle"}
+    methods = {"formats_read", "reads_trees", "earth", "peek", "refuse_idle"}
     assert {name for name in asked if not name.startswith("_")} - known - methods == set()
 
 

@@ -14,7 +14,7 @@ from frametool.cli.command import Inputs, argument, command_named, option, refus
 from frametool.cli.explaining import EXPLAIN, ONE_RECORD, PoseTask
 from frametool.cli.poses import inline_misuse, is_inline, is_pasted, one_pose, pose_source, values_of
 from frametool.cli.streaming import SEVERAL, stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, tell_granted
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
 from frametool.documents.source import Source
 from frametool.errors import ValueInvalid, shown, warn
 from frametool.geometry.rigid import EXACT, UNCERTAIN
@@ -143,7 +143,7 @@ class Way(NamedTuple):
     tree: FrameTree | TransformBuffer | None = None
 
     def request(self, frame_column: str | None, time_column: str | None) -> Request:
-        """Say how records move: from one frame or each from its own, all alike or each at its own time."""
+        """Return how records move: from one frame or each from its own, all alike or each at its own time."""
         from frametool.stream.request import Operation, Request
         from frametool.stream.stamp_source import Timed
 
@@ -180,7 +180,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
     if not {target, source or target} <= set(tree.frames):
         tree.lookup(target, source or target)  # raises, and names the nearest frames
 
-    plain: dict[str, str] = {}  # so that a leading / is told of once
+    plain: dict[str, str] = {}  # so that a leading / is reported once
 
     def start(own: str | None) -> str:
         if own and own not in plain:
@@ -206,7 +206,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
 
         return ByTree(tree, target, source, options.at_ns(chosen))
 
-    has_source, tell = source is not None, partial(tell_granted, lookups)
+    has_source, tell = source is not None, partial(report_granted, lookups)
     return Way(target, from_frame, in_time, moves, explained, has_source, counters, uncertain, tell, tree), rest
 
 
@@ -242,17 +242,17 @@ def _settled(own: str | None, source: str | None) -> str | None:
 
 
 def is_record(argument: str) -> bool:
-    """Tell a record from a frame's name."""
+    """Distinguish a record from a frame's name."""
     return argument == "-" or is_inline(argument) or "\n" in argument
 
 
 def begins_number(argument: str) -> bool:
-    """Tell what is meant for one number of a point."""
+    """Return True for what is meant as one number of a point."""
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _is_apart(argument: str) -> bool:
-    """Tell what is no number of a point: a record, a text that was pasted, or nothing."""
+    """Return True for what is not a number of a point: a record, a pasted text, or nothing."""
     return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
 
 

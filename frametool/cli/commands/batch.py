@@ -95,7 +95,7 @@ def _lines(stream: BinaryIO, source: str) -> Iterator[tuple[int, str, str]]:
 
 
 KEPT = {"frames", *LISTS, *POINT_KEYS, *ROTATION_KEYS, *PARTS, "x", "y", "z"}  # keys of trees, and of records
-READABLE = ("json", "yaml")  # the same numbers; other forms are for printing
+READABLE = ("json", "yaml")  # the same numbers; other formats are for printing
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
 

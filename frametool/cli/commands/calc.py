@@ -38,7 +38,7 @@ class CalcCommand(Command):
 
 
 def _begins_with_minus(argument: str) -> bool:
-    """Tell an expression with a sign from an option."""
+    """Distinguish an expression with a sign from an option."""
     behind = argument[1:].lstrip("- ")
     name, bracket, _ = behind.partition("(")
     return argument.startswith("-") and (behind[:1] in tuple('([{"') or (bool(bracket) and name in FUNCTIONS))
@@ -137,7 +137,7 @@ def _over_rows(lines: Sequence[Line], flags: Sequence[bool], scope: Scope, outpu
 
 
 def _request(formula: RowExpressions, inputs: Inputs) -> Request:
-    """Say what is asked of the rows."""
+    """Return what is asked of the rows."""
     from frametool.stream.request import Operation, Request
     from frametool.stream.stamp_source import Timed
 

@@ -1,4 +1,4 @@
-"""`frametool check`: what is wrong or odd in trees and recordings."""
+"""`frametool check`: mistakes in trees and recordings."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def command(inputs: Inputs) -> int:
 
 
 def _one_by_one(files: Sequence[str], *, normalize: bool) -> list[Finding]:
-    """Return what is wrong with each file alone; that one holds no frames, or is of an unknown form, is a warning."""
+    """Return what is wrong with each file alone; that one holds no frames, or is of an unknown format, is a warning."""
     findings = []
     for number, file in enumerate(files):
         try:

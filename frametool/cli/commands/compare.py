@@ -28,7 +28,7 @@ REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
 
 
 def _form_of(path: str | None) -> str:
-    """Return the form of a report by its suffix, "" for what is none."""
+    """Return the format of a report by its suffix, "" for anything else."""
     return REPORTS.get(suffix_of(path or ""), "")
 
 

@@ -120,12 +120,12 @@ def command(inputs: Inputs) -> int:
         change = _named_change(axes, world, operation) if values else None
         return task.derive("convert", task.written(sources[0], warned=True), own=found[0], change=change)
     output.values(results)
-    output.tell_of_lock(found)
+    output.report_lock(found)
     return 0
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
-    """Tell bare numbers from mappings and files; one that is alone is a number where --from says of what."""
+    """Distinguish bare numbers from mappings and files; one that is alone is a number where --from says of what."""
     if not values or poses.is_inline(values[0]):
         return False
     if len(values) > 1:
@@ -182,7 +182,7 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
 
 
 def _say_of_engines(world: str | None, given: Notation | None, output: Output, *, is_anew: bool) -> None:
-    """Tell of the units and angles that engines call by the same names, and write what is written anew in theirs."""
+    """Report the units and angles that engines call by the same names, and write what is written anew in theirs."""
     from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES
 
     into, _, out_of = (world or "").partition("_from_")
@@ -199,7 +199,7 @@ def _say_of_engines(world: str | None, given: Notation | None, output: Output, *
 
 
 def _say_other_side(axes: str | None, world: str | None) -> None:
-    """Tell what changes the axes of the other frame of a pose where such conventions come in pairs."""
+    """Report what changes the axes of the other frame of a pose where such conventions come in pairs."""
     from frametool.geometry.conventions import other_side
 
     if axes and world is None and (other := other_side(axes, of_world=False)):

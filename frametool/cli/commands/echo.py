@@ -62,7 +62,7 @@ def command(inputs: Inputs) -> int:
     if frames.covariances:
         warn(LEFT_OUT.format("echo"))
     replayed = frames.replay(target, source, rate_hz=inputs.rate, start_ns=start, stop_ns=stop)
-    skipped = Skipped(in_json=out.told == "json")
+    skipped = Skipped(in_json=out.chosen == "json")
     results = skipped.counted(_results(replayed, target, source, skipped))
     shown = islice(results, None if limit is None else min(limit, sys.maxsize))
     if out.style.format == "text":

@@ -18,7 +18,7 @@ PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
 
 
 def folder() -> str:
-    """Return where the files are: in the installed package, or beside it in its sources."""
+    """Return where the files are: in the installed package, or next to it in its sources."""
     installed = os.path.join(PACKAGE, "examples")
     return installed if os.path.isdir(installed) else os.path.join(os.path.dirname(PACKAGE), "examples")
 

@@ -53,7 +53,7 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     """Write the rows of a stream with their poses; the file is that of the robot."""
     inputs, name = stream.inputs, stream.path or "stdin"
     begin = stream.opened().peek()
-    form = stream.told_form() or detect(begin, *STREAMED, name=stream.path or "")[0]
+    form = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")[0]
     refuse(holds_arrays(form), f"rows of joints are a table of text, records or messages, not {form}")
     names = names_in(begin, form, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))

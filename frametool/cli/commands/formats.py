@@ -1,9 +1,9 @@
-"""`frametool formats`: the forms of files, what they mean, what is read from them and written in them."""
+"""`frametool formats`: the formats of files, what they mean, what is read from them and written in them."""
 
 from __future__ import annotations
 
 from frametool.cli.command import Inputs, argument, command_named
-from frametool.cli.options import Form, list_options
+from frametool.cli.options import FormatName, list_options
 from frametool.cli.output import Output
 from frametool.cli.sink import show
 from frametool.formats.table import FORMATS
@@ -11,7 +11,7 @@ from frametool.view.report_text import form_entry, write_form, write_forms
 
 
 @command_named("formats")
-@argument("name", Form(FORMATS, "known"), required=False)
+@argument("name", FormatName(FORMATS, "known"), required=False)
 @list_options()
 def command(inputs: Inputs) -> None:
     """List the file formats that are read and written: suffixes, meaning of the numbers, required options.

@@ -111,7 +111,7 @@ def _commands(ctx: click.Context) -> dict[str, click.Command]:
 
 
 def _search(ctx: click.Context, name: str) -> str:
-    """Return the topics, commands, forms and questions that hold these words, those about them first."""
+    """Return the topics, commands, formats and questions that hold these words, those about them first."""
     known, asked, holds = topics(), questions(), finder([name])
     for each in known:
         if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same in another number
@@ -128,7 +128,7 @@ def _search(ctx: click.Context, name: str) -> str:
     return _joined({
         f"Topics with {shown(name)} (frametool help TOPIC):\n\n{_listed({each: known[each] for each in about})}": about,
         _wrapped(f"Commands (frametool help COMMAND): {', '.join(calls)}"): calls,
-        _wrapped(f"Forms of files (frametool formats NAME): {', '.join(forms)}"): forms,
+        _wrapped(f"File formats (frametool formats NAME): {', '.join(forms)}"): forms,
         _titles(f"Cookbook (frametool help cookbook {name})", titles): titles,
     })  # fmt: skip
 

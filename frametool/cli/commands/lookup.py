@@ -10,7 +10,7 @@ from frametool.cli import options
 from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, together
 from frametool.cli.explaining import EXPLAIN, PoseTask
 from frametool.cli.streaming import stream_options
-from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, tell_granted
+from frametool.cli.trees import FRAME, frame_name, load_tree, lookups_in, report_granted
 from frametool.errors import NoDataAt, UnknownFrame
 from frametool.formats.table import holds_arrays
 from frametool.geometry.representations import notation
@@ -79,7 +79,7 @@ def command(inputs: Inputs) -> int:
     lookups, at = lookups_in(tree, carried=covariance), options.at_ns(inputs.at)
     if by_row:
         status = _by_row(task, lookups, target, source, window)
-        tell_granted(lookups)
+        report_granted(lookups)
         return status
     target, source = frame_name(target, tree), frame_name(source, tree)
     source_at, fixed = options.at_ns(inputs.source_at), inputs.fixed and frame_name(inputs.fixed, tree)
@@ -95,16 +95,16 @@ def command(inputs: Inputs) -> int:
         output.values([looked_up_across(tree, target, at, source, source_at, fixed)])
     else:
         output.values([lookups.result(target, source, at)])
-    tell_granted(lookups)
+    report_granted(lookups)
     return status
 
 
 def _check_covariance(output: Output, *, by_row: bool) -> None:
-    """Refuse --covariance where it has no meaning, and in forms that have no place for it."""
+    """Refuse --covariance where it has no meaning, and in formats that have no place for it."""
     if output.style.place is not None:
         name = output.style.place.name
         raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
-    form = output.told if by_row else output.style.format
+    form = output.chosen if by_row else output.style.format
     if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
         raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 
@@ -112,7 +112,7 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
 def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tuple[int, int] | None) -> int:
     """Print the results at --times, or at those of all samples; with --on-error skip others are left out, and told."""
     inputs, tree = task.inputs, lookups.tree
-    times, skipped = inputs.times, options.Skipped(in_json=task.output.told == "json")
+    times, skipped = inputs.times, options.Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP
     if times is not None and inputs.on_error == NULL:
         raise click.UsageError("--on-error null is for tables; with --times it is stop or skip")

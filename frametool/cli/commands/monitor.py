@@ -51,7 +51,7 @@ def command(inputs: Inputs) -> int:
     state(files)
     most = MOST_TOLD + (len(clashes) == MOST_TOLD + 1)
     for error in clashes[:most]:
-        say_error(error, in_json=output.told == "json")
+        say_error(error, in_json=output.chosen == "json")
     if len(clashes) > most:
         say(f"{len(clashes) - most} more frames come by two topics")
     if clocks_differ(report):

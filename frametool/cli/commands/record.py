@@ -125,7 +125,7 @@ def _bare(frame: str) -> str:
 
 
 def _form_of(path: str) -> str:
-    """Return the form of a recording; raises FormatError for what is none."""
+    """Return the format of a recording; raises FormatError for anything else."""
     source = FrameFile(path)
     source.close()
     if not is_recording(source.format):

@@ -113,7 +113,7 @@ def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     stream = task.stream
     stream.read_clouds_as_rows()
     begin = stream.opened().peek()
-    form = stream.within or stream.told_form() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")[0]
+    form = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")[0]
     if "records" in FORMATS[form].reads:
         return keys_in(begin, form, stream.name, WANTED)
     from frametool.stream.table import open_table

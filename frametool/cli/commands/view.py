@@ -118,11 +118,11 @@ def command(inputs: Inputs) -> None:
 
 
 def _form(form: str | None, output: str | None, *, opens: bool) -> str:
-    """Choose the form: that of --format, else by the file's suffix, else text; a browser shows pages."""
+    """Choose the format: that of --format, else by the file's suffix, else text; a browser shows pages."""
     suffix = os.path.splitext(output or "")[1].lower()
     chosen = form or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
-        raise click.UsageError(f"no form has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
+        raise click.UsageError(f"no format has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
     refuse(opens and (chosen != "html" or output == "-"), "--open shows a page: give -o FILE.html, or no -o")
     return chosen or "text"
 
@@ -130,7 +130,7 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
 def _content(
     scene: FrameScene, form: str, tree: str, eye: Eye, before: FrameScene | None, before_tree: str, *, sliders: bool,
 ) -> str | bytes:  # fmt: skip
-    """Return the picture in a form, and say what a still one does not show."""
+    """Return the picture in a format, and say what a still one does not show."""
     title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
     if form == "html":
         from frametool.view.exports import write_page
