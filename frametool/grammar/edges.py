@@ -74,12 +74,14 @@ class EdgeColumns(NamedTuple):
     components: Sequence[Rigid]
     lines: Sequence[int]
     topics: Iterable[str] = ()
+    received_ns: Iterable[int | None] = ()
 
     def edges(self) -> Iterator[Edge]:
         """Yield the rows as edges."""
-        parents, children, stamps_ns, components, lines, topics = self
+        parents, children, stamps_ns, components, lines, topics, received_ns = self
         return map(
-            Edge, parents, children, components, stamps_ns, lines, repeat(None), repeat(()), topics or repeat("")
+            Edge, parents, children, components, stamps_ns, lines, received_ns or repeat(None), repeat(()),
+            topics or repeat(""),
         )  # fmt: skip
 
 
@@ -211,11 +213,16 @@ class Topics:
         """Return True if a topic was named; only then are messages read that are poses and not transforms."""
         return topic.strip("/") in self.chosen
 
+    def agrees(self, topic: str, child: str) -> bool:
+        """Return True if a frame came by this namespace before, or by none."""
+        first = self._first.setdefault(child, topic)
+        return first == topic or _source_of(first) == _source_of(topic)
+
     def conflict(self, topic: str, child: str) -> str:
         """Return an error if a frame comes from two namespaces, as with two robots; once for each frame."""
-        first = self._first.setdefault(child, topic)
-        if first == topic or _source_of(first) == _source_of(topic) or (child, topic) in self._told:
+        if self.agrees(topic, child) or (child, topic) in self._told:
             return ""
+        first = self._first[child]
         self._told.add((child, topic))
         return f"frame {child!r} comes by {first} and by {topic}; choose with --topic {first} or --topic {topic}"
 

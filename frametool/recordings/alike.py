@@ -18,6 +18,8 @@ from frametool.text.write import shortest_spans
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from frametool.recordings.made import MessageTypes
 
 CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "uint16": "<u2", "int16": "<i2",
@@ -39,17 +41,22 @@ class BinaryLayout(NamedTuple):
     shared: Sequence[tuple[slice, bytes]]
     texts: Sequence[bytes]
 
-    def lines(self, messages: Sequence[bytes]) -> bytes | None:
-        """Return messages of equal length as lines; None if they differ in more than finite numbers."""
+    def values(self, messages: Sequence[bytes]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the numbers of messages of equal length, (n, k), and which of the messages differ in no more."""
         text = b"".join(messages)
         rows = np.frombuffer(text, np.uint8).reshape(len(messages), -1)
         columns = np.frombuffer(text, self.numbers)
-        if any((rows[:, part] != np.frombuffer(said, np.uint8)).any() for part, said in self.shared):
+        alike = np.ones(len(messages), np.bool_)
+        for part, said in self.shared:
+            alike &= (rows[:, part] == np.frombuffer(said, np.uint8)).all(axis=1)
+        return np.stack([columns[name].astype(np.float64) for name in self.numbers.names or ()], axis=-1), alike
+
+    def lines(self, messages: Sequence[bytes]) -> bytes | None:
+        """Return messages of equal length as lines; None if they differ in more than finite numbers."""
+        numbers, alike = self.values(messages)
+        if not (alike.all() and np.isfinite(numbers).all()):
             return None
         names = self.numbers.names or ()
-        numbers = np.stack([columns[name].astype(np.float64) for name in names], axis=-1)
-        if not np.isfinite(numbers).all():
-            return None
         written = shortest_spans(numbers, b" " * len(names))
         ends = written.ends - np.array([1 + POINT_ZERO * (self.numbers[name].kind != "f") for name in names])
         parts = [_repeated(self.texts[0], len(messages))]
@@ -93,6 +100,11 @@ class _Reader:
             return self.line(what)
         if node == Nodetype.ARRAY and what[1] <= MOST_NUMBERS:
             return f"[{', '.join(self._value(*what[0]) for _ in range(what[1]))}]"
+        if node == Nodetype.SEQUENCE:
+            begin = self._place(4)
+            count = int.from_bytes(self.data[begin : self.at], "little")
+            self.shared.append(slice(begin, self.at))
+            return f"[{', '.join(self._value(*what[0]) for _ in range(min(count, MOST_NUMBERS + 1)))}]"
         if node != Nodetype.BASE or len(self.places) > MOST_NUMBERS:
             raise Varies
         if what[0] in CODES:
@@ -107,7 +119,7 @@ class _Reader:
         return dumps(self.data[begin + 4 : self.at].rstrip(b"\0").decode(), ensure_ascii=False)
 
 
-def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> BinaryLayout | None:
+def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes | None = None) -> BinaryLayout | None:
     """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
     reader = _Reader(types, data)
     if reader.aligned and data[:2] != CDR_LE:
@@ -122,4 +134,4 @@ def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes) -> Binar
     names = [f"f{at}" for at in range(len(codes))]
     numbers: Any = {"names": names, "formats": codes, "offsets": places, "itemsize": len(data)}
     made = BinaryLayout(np.dtype(numbers), [(part, data[part]) for part in reader.shared], texts)
-    return made if made.lines([data]) == line else None
+    return made if line is None or made.lines([data]) == line else None

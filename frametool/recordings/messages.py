@@ -6,6 +6,7 @@ from every topic that has any; those on a topic `tf_static` are static.  Points 
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
@@ -13,6 +14,7 @@ from io import BufferedReader
 from itertools import groupby
 from json import JSONEncoder
 from math import isfinite
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +22,7 @@ import numpy as np
 from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, listing, shown
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
-from frametool.grammar.edges import Edge
+from frametool.grammar.edges import Edge, EdgeColumns
 from frametool.recordings.read import opened_recording
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
 from frametool.ros.plain_messages import unit_components
@@ -186,6 +188,8 @@ def _completed(own: Any, outer: Any, has_stamps: bool) -> Any:  # noqa: FBT001 -
 
 
 MANY = 4000  # messages
+FEW = 16  # messages: fewer are read one by one
+MOST_LAYOUTS = 16  # of messages of one length
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -374,7 +378,7 @@ class RawTransform(NamedTuple):
         return cls(message.header.frame_id, body, numbers, (message.header.stamp.sec, message.header.stamp.nanosec))
 
 
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
+def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of a bag in the order of the recording.
 
     An edge's line is the number of its message among those with transforms.
@@ -407,20 +411,128 @@ def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
     return found
 
 
-def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options: Options) -> Iterator[Edge]:
+def recorded_edges(
+    reader: RecordingReader, channels: Sequence[Channel], options: Options
+) -> Iterator[Edge | EdgeColumns]:
     """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
     number = 0
-    for number, (channel, received_ns, data, *_) in enumerate(reader.messages(channels), 1):
-        try:
-            message = reader.types.read(channel, data)
-        except ValueInvalid as error:
-            raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
-        body = body_of(channel.topic, options.answers)
-        for each in posed_messages(message, channel.type) if channel.type in POSES else message.transforms:
-            if edge := _edge(RawTransform.of(each, body), number, channel.topic, received_ns, reader.path, options):
-                yield edge
+    layouts: dict[Any, list[tuple[BinaryLayout, list[RawTransform]]]] = {}
+    for stretch in _stretches(reader.blocks(channels)):
+        for is_static, part in groupby(stretch, lambda each: each.channel.is_static):
+            messages = [*part]
+            columns = None
+            if len(messages) >= FEW and not is_static:
+                columns = _columns(reader, messages, number, options, layouts)
+            if columns is not None:
+                yield columns
+                number += len(messages)
+                continue
+            for each in messages:
+                number += 1
+                for said in _transforms(reader, each, number, options):
+                    if edge := _edge(said, number, each.channel.topic, each.log_ns, reader.path, options):
+                        yield edge
     if not number:
         raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
+
+
+def _transforms(reader: RecordingReader, message: Recorded, number: int, options: Options) -> list[RawTransform]:
+    """Return the transforms in a message, or the pose; raises FormatError for bytes that are none."""
+    channel = message.channel
+    try:
+        found = reader.types.read(channel, message.data)
+    except ValueInvalid as error:
+        raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
+    parts = posed_messages(found, channel.type) if channel.type in POSES else found.transforms
+    return [RawTransform.of(each, body_of(channel.topic, options.answers)) for each in parts]
+
+
+def _columns(
+    reader: RecordingReader, messages: Sequence[Recorded], number: int, options: Options,
+    layouts: dict[Any, list[tuple[BinaryLayout, list[RawTransform]]]],
+) -> EdgeColumns | None:  # fmt: skip
+    """Return the edges of many messages at once; None where one of them has to be read by itself.
+
+    number: of the message before them; layouts: those learned, by channel and length, with what a message says
+    """
+    groups: dict[Any, list[int]] = {}
+    for at, each in enumerate(messages):
+        groups.setdefault((each.channel, len(each.data)), []).append(at)
+    rough, rows = len(options.tally.rough), list[Any]()
+    for key, group in groups.items():
+        left, known = np.array(group), layouts.setdefault(key, [])
+        if options.topics.chosen and not options.topics.chooses(key[0].topic):
+            return None
+        for tried in range(MOST_LAYOUTS):
+            if not left.size:
+                break
+            if tried == len(known):
+                if (learned := _learned(reader, messages[left[0]], number + 1 + int(left[0]), options)) is None:
+                    break
+                known.append(learned)
+            layout, transforms = known[tried]
+            values, alike = layout.values([messages[at].data for at in left.tolist()])
+            found = _edge_rows(values[alike], left[alike].tolist(), transforms, number, options)
+            if found is None:
+                break
+            rows += found
+            left = left[~alike]
+        if left.size:
+            del options.tally.rough[rough:]
+            return None
+    rows.sort(key=itemgetter(0))
+    lines, parents, children, stamps_ns, components = zip(*rows, strict=True) if rows else [()] * 5
+    sent = [messages[line - number - 1] for line in lines]
+    topics, received = [each.channel.topic for each in sent], [each.log_ns for each in sent]
+    options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
+    options.tally.rough[rough:] = sorted(options.tally.rough[rough:])
+    return EdgeColumns(parents, children, stamps_ns, components, lines, topics, received)
+
+
+def _learned(
+    reader: RecordingReader, message: Recorded, number: int, options: Options
+) -> tuple[BinaryLayout, list[RawTransform]] | None:
+    """Return how a message lies, and its transforms; None where it has to be read by itself."""
+    from frametool.recordings.alike import layout_of
+
+    try:
+        transforms = _transforms(reader, message, number, options)
+    except FormatError:  # raised again in its turn
+        return None
+    channel, bare = message.channel, options.tally.names.bare
+    layout = layout_of(reader.types, channel.type, message.data)
+    if layout is None or not all(
+        each.parent and each.child and options.topics.agrees(channel.topic, bare(each.child)) for each in transforms
+    ):
+        return None
+    numbers, count = layout.values([message.data])[0], len(transforms)
+    if not count or numbers.shape[1] not in (9 * count, 10 * count):  # ROS 1 counts its headers
+        return None
+    said = [(*each.stamp, *each.numbers) for each in transforms]
+    return (layout, transforms) if [*map(tuple, numbers.reshape(count, -1)[:, -9:].tolist())] == said else None
+
+
+def _edge_rows(
+    values: NDArray[np.float64], at: list[int], transforms: list[RawTransform], number: int, options: Options
+) -> list[Any] | None:
+    """Return line, frames, stamp and components of each transform of messages; None where one is refused."""
+    rows, count = values.reshape(len(values) * len(transforms), -1)[:, -9:], len(transforms)
+    stamps = rows[:, :2].astype(np.int64)
+    if not np.isfinite(rows).all():
+        return None
+    if len(rows) and any(stamp_problem(int(a), int(b), STAMPS[0]) for a, b in (stamps.min(0), stamps.max(0))):
+        return None
+    bare = options.tally.names.bare
+    ends = [(bare(each.parent), bare(each.child)) for each in transforms] * len(values)
+    lines = [number + 1 + place for place in at for _ in range(count)]
+    stamps_ns = (stamps[:, 0] * BILLION + stamps[:, 1]).tolist()
+    found = []
+    numbers = map(tuple, rows[:, 2:].tolist())
+    for line, (parent, child), stamp_ns, each in zip(lines, ends, stamps_ns, numbers, strict=True):
+        if (components := unit_components(each, line, options.tally, options.normalize)) is None:
+            return None
+        found.append((line, parent, child, stamp_ns, components))
+    return found
 
 
 def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: str, options: Options) -> Edge | None:

@@ -271,7 +271,8 @@ class TransformsOfCopy(FrameFile):
         options = Options(self.tally, self.topics, report, normalize, self.answers)
         children = {edge.child for edge in self.more}
         found = recorded_edges(self.recording, self.channels, options) if self.channels else ()
-        yield from (edge for edge in found if edge.child not in children)
+        edges = (edge for piece in found for edge in ((piece,) if isinstance(piece, Edge) else piece.edges()))
+        yield from (edge for edge in edges if edge.child not in children)
         yield from (Edge(edge.parent, edge.child, edge.numbers) for edge in self.more)
         self.tell()
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import closing
+from itertools import chain
 from operator import ge
 from typing import TYPE_CHECKING, Any, cast
 
@@ -300,6 +301,11 @@ def _of_tree(
             raise ValueInvalid(f"{recording.name}: {what}; name one: {name}:TARGET:SOURCE")
         frames = moving[0]
     target, source = frames
+    track = tree.track(source)
+    if track is not None and not track.is_static and track.parent == target and not track.varies:
+        times = np.fromiter((stamp_ns for stamp_ns, *_ in track.walk()), np.int64)
+        numbers = np.fromiter(chain.from_iterable(pose for *_, pose in track.walk()), np.float64).reshape(-1, 7)
+        return Trajectory(times, numbers[:, :POSITION].copy(), numbers[:, POSITION:].copy(), target, source)
     stamps = sample_stamps(tree, target, source)
     found = tree.lookup_many(target, source, stamps)
     return Trajectory(np.array(stamps, np.int64), found.xyz, np.stack(found.components[3:], -1), target, source)

@@ -8,7 +8,11 @@ from contextlib import closing
 from sqlite3 import connect
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
+
+from frametool.formats.load import FrameFile
+from frametool.grammar.edges import Edge, EdgeColumns
 
 pytest.importorskip("rosbags")
 import mcap_bytes as mcap
@@ -128,3 +132,40 @@ def test_a_quality_of_service_that_says_nothing_is_in_nobodys_way(form: str, tmp
             opened.execute("UPDATE topics SET offered_qos_profiles = 'so'")
     done = run("lookup", str(path), "map", "base", "-f", "csv")
     assert done.status == 0, done.err
+
+
+def odd(at: int, numbers: list[float], stamp_ns: int) -> tuple[str, str, list[float], int]:
+    """Return a transform with something that not all of its neighbours have."""
+    parent, child = ("/map" if at == 31 else "map", "base" if at % 50 else "tool")
+    if at == 57:
+        numbers = [*numbers[:6], numbers[6] * (1 + 1e-5)]
+    return parent, child, numbers, stamp_ns - (500 if at == 83 else 0)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("count", [1, 3])
+def test_transforms_that_lie_alike_are_the_same_edges_one_by_one(
+    form: str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, random = Maker(form), np.random.default_rng(count)
+    sent = []
+    for at in range(120):
+        turns = random.normal(size=(count, 4))
+        numbers = [[*random.normal(size=3), *(turn / np.linalg.norm(turn))] for turn in turns]
+        edges = [odd(at, [*map(float, each)], START + at * 1000) for each in numbers[:1]]
+        edges += [("base", f"arm{place}", [*map(float, each)], START + at * 1000 + place) for place, each in enumerate(numbers[1:])]
+        sent.append(Sent("/tf", *made.transforms(*edges), START + at * 1000 + 7))
+        if at % 40 == 39:
+            sent.append(Sent("/tf_static", *made.transforms(("map", "odom", STILL, START)), START + at * 1000 + 8))
+    path = str(write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent))
+
+    def edges_and_notes() -> tuple[list[Edge], list[Any], list[str]]:
+        file = FrameFile(path)
+        return [*file.edges(tell=False)], [*file.tally.told()], file.tally.names.slashed
+
+    many = sum(isinstance(each, EdgeColumns) for each in FrameFile(path).pieces(tell=False))
+    at_once = edges_and_notes()
+    monkeypatch.setattr("frametool.recordings.messages._columns", lambda *_: None)
+    assert at_once == edges_and_notes()
+    assert many == 3
+    assert len(at_once[0]) == 120 * count + 3
