@@ -213,7 +213,7 @@ class Output:
         """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
         good = self._before_a_fault(blocks)
         if self.style.format == "csv":
-            from frametool.stream.csv_table import CsvTable
+            from frametool.stream.record_results import CsvTable
 
             self.pieces(CsvTable(self.style).pieces(good))
             return

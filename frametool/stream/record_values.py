@@ -92,7 +92,7 @@ def pose_of(record: Record, request: Request) -> Pose:
     shape = record.shape
     rotation = None
     if shape.multiple:
-        from frametool.stream.carried import of_multiple
+        from frametool.stream.beside import of_multiple
 
         own = record.values[: shape.own_size]
         check = partial(checked_rotation, shape, normalize=request.normalize)

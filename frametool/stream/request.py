@@ -233,7 +233,7 @@ class Operation(NamedTuple):
             return (*MOVERS[shape.kind](*mover, *own), *beside)
         if mover is None:
             return (*own, *beside)
-        from frametool.stream.carried import move
+        from frametool.stream.beside import move
 
         return move(shape, own, beside, mover, mirrors=self.mirrors)
 
@@ -257,11 +257,11 @@ class Operation(NamedTuple):
         """
         own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
         if shape.covariance and shape.place is not None:
-            from frametool.stream.carried import along_ecef
+            from frametool.stream.beside import along_ecef
 
             shape, beside = along_ecef(shape, own, beside)
         if shape.multiple:
-            from frametool.stream.carried import of_multiple
+            from frametool.stream.beside import of_multiple
 
             own = of_multiple(shape, own, rotation, xp)
         elif shape.kind in TURNED:
@@ -273,7 +273,7 @@ class Operation(NamedTuple):
         if shape.kind != POSE:
             return self._with_place(shape, numbers, self.move(shape, own, beside, edge))
         if shape.covariance:
-            from frametool.stream.carried import with_own
+            from frametool.stream.beside import with_own
 
             own, beside = with_own(shape, own, beside, edge or self.left, mirrors=self.mirrors)
         found = self.pose(compared(own), edge, xp)
