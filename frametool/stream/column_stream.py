@@ -479,7 +479,7 @@ def move_along(file: ColumnFile, request: Request) -> None:
     """Let what else has a place among the points of a file move with them."""
     operation, timed = request.operation, request.timed
     if operation.moves and not request.keep and request.gathered is None:
-        by_row = request.pose_of_row_frame is not None or (timed is not None and bool(timed.name))
+        by_row = request.frames or (timed is not None and timed.name)
         file.moved_by(None if by_row else operation.left)
 
 

@@ -428,7 +428,7 @@ def refuse_elsewhere(table: Table, request: Request, source: str) -> None:
     """
     if request.place is None or request.frames or request.operation.formula is not None:
         return  # a look-up looks at each row, an expression at its own frames
-    frame = request.result_frame if request.operation.moves else None
+    frame = request.rename(None, None)[0] if request.operation.moves and request.rename else None
     if frame is None and any(name in PARENT_COLUMNS for name in table.names or ()) and not request.operation.moves:
         return  # each row says its own
     try:

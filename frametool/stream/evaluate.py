@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -120,7 +120,7 @@ class Run:
         numbers = self._read()
         if any(shape.covariance for shape in plan.shapes):
             self._check_covariances(numbers)
-        self.outside = self._outside() if self.request.window and self.count else set[int]()
+        self.outside = self._outside(*self.request.window) if self.request.window and self.count else set[int]()
         movers = self._movers()
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
@@ -308,16 +308,28 @@ class Run:
     def _good(self) -> list[int]:
         return [row for row in range(self.count) if row not in self.reasons and row not in self.outside]
 
-    def _outside(self) -> set[int]:
+    def _outside(self, first: int, last: int) -> set[int]:
         """Return the rows before the first or after the last of the times that are wanted."""
-        times, (first, last) = self._times(0), self.request.window or (0, 0)
+        times = self._times(0)
         return {*np.flatnonzero((times < first) | (times > last)).tolist()} - {*self.reasons}
 
-    def _with_before(self, pose: Rigid, state: State) -> list[Rigid]:
+    def _with_before(self, pose: Rigid, state: State) -> list[Any]:
+        """Return the good row before each row, or the first of all, and the row; the very first row's is itself."""
         if not self.operation.looks_back:
             return [pose]
-        with_before = _with_first if self.operation.of == START else _with_previous
-        return with_before(pose, self._good(), state, self.count)
+        full = [np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose]
+        kept = np.array(self._good(), np.int64)
+        known, first = state.previous, self.operation.of == START
+        if len(kept) and (known is None or not first):
+            state.previous = [float(part[kept[0 if first else -1]]) for part in full]
+        if first and state.previous is not None:
+            return [tuple(np.full(self.count, value) for value in state.previous), tuple(full)]
+        if first or not len(kept):
+            return [pose, pose]
+        earlier = [part[kept[np.maximum(np.searchsorted(kept, np.arange(self.count)) - 1, 0)]] for part in full]
+        for part, value in zip(earlier, known or (), strict=False):
+            part[: kept[0] + 1] = value
+        return [tuple(earlier), tuple(full)]
 
     def _seconds(self, state: State) -> Floats:
         """Return the time since the good row before each; the very first row has no velocity and no result."""
@@ -506,32 +518,6 @@ def _without_result(piece: Piece, null: bytes) -> Piece:
     if isinstance(piece, Word):
         return Const(null)
     return In(piece.part) if isinstance(piece, Instead) else piece
-
-
-def _with_previous(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
-    """Return the good row before each row, and the row; the very first row's is itself."""
-    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
-    if not good:
-        return [pose, pose]
-    kept = np.array(good)
-    before = kept[np.maximum(np.searchsorted(kept, np.arange(count)) - 1, 0)]
-    earlier = [part[before] for part in full]
-    if state.previous is not None:
-        for part, value in zip(earlier, state.previous, strict=True):
-            part[: kept[0] + 1] = value
-    state.previous = [float(part[kept[-1]]) for part in full]
-    return [tuple(earlier), tuple(full)]
-
-
-def _with_first(pose: Rigid, good: Sequence[int], state: State, count: int) -> list[Rigid]:
-    """Return the first good row of the stream for each row, and the row."""
-    full = [np.broadcast_to(np.asarray(part, np.float64), count) for part in pose]
-    if state.previous is None and good:
-        state.previous = [float(part[good[0]]) for part in full]
-    if state.previous is None:
-        return [pose, pose]
-    first = [np.full(count, value) for value in state.previous]
-    return [tuple(first), tuple(full)]  # type: ignore[list-item]
 
 
 def _unwrap(results: Floats, angles: Sequence[tuple[int, float]], state: State) -> None:

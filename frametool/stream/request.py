@@ -365,8 +365,6 @@ class Request(NamedTuple):
     columns: which columns are ours, one entry a pose
     keep, prefix: results stand beside what they come from, under other names
     frames: columns that name a row's frame
-    pose_of_row_frame: the pose that moves a row from the frame it names
-    result_frame: the frame results are in
     pose_from_frame: the pose that moves a record given in a frame
     timed: the poses that do so at the row's own time
     rename: turns a record's (parent, name) into those of its result
@@ -396,11 +394,9 @@ class Request(NamedTuple):
     keep: bool = False
     prefix: str = ""
     frames: tuple[str, ...] = ()
-    pose_of_row_frame: Callable[[str], Rigid] | None = None
     pose_from_frame: Callable[[str | None], Rigid] | None = None
     timed: Timed | None = None
     rename: Callable[[str | None, str | None], tuple[str | None, str | None]] | None = None
-    result_frame: str | None = None
     frame_is_counter: bool = True
     unwrap: bool = False
     extra_column: str | None = None
@@ -493,7 +489,7 @@ class Request(NamedTuple):
     @property
     def by_row(self) -> bool:
         """Tell whether each row has its own pose that moves it."""
-        return self.pose_of_row_frame is not None or self.timed is not None
+        return bool(self.frames) or self.timed is not None
 
     @property
     def shifts(self) -> bool:

@@ -41,39 +41,24 @@ _MOST_UPPER = (1 << 63) // 10**16
 _BELOW_NS = np.uint64(10**7)
 
 
-def parse_stamps(cells: Spans, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-    """Read cells (n,) as nanoseconds: decimal seconds, or whole numbers of so many nanoseconds, or followed by `ns`.
+def read_stamps(cells: tuple[Spans, ...], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
+    """Read one column (n,) as nanoseconds, or two of whole seconds and nanoseconds.
 
-    Gives the stamps, and why a cell is none; what is not plainly written is left to `read_stamp`.
+    in_ns: how many nanoseconds a whole number of one column is; 0 are decimal seconds, and what ends in `ns` is some
+    Gives the stamps, and why a row has none; what is not plainly written is read one by one.
     """
-    starts, ends = trimmed(cells.data, cells.starts, cells.ends)
-    stamps, sure = _parse_plain(cells.data, starts, ends, in_ns=in_ns)
+    parsed = [_parse_plain(each.data, *trimmed(*each), in_ns=in_ns if len(cells) == 1 else 1) for each in cells]
+    stamps, sure = parsed[0]
+    if len(cells) == 2:
+        stamps, sure = stamps * BILLION + parsed[1][0], sure & parsed[1][1] & (stamps < _MOST_SECONDS)
     reasons = {}
     for row in np.flatnonzero(~sure).tolist():
+        texts = [each.text(row).decode("utf-8", "replace") for each in cells]
         try:
-            stamps[row] = read_stamp(cells.text(row).decode("utf-8", "replace"), in_ns=in_ns)
-        except ValueInvalid as error:
-            reasons[row] = str(error)
-    return stamps, reasons
-
-
-def parse_header_stamps(seconds: Spans, nanoseconds: Spans) -> tuple[Ints, dict[int, str]]:
-    """Read the two whole numbers of stamps (n,) as nanoseconds; otherwise as `parse_stamps`."""
-    whole, sure = _parse_plain(seconds.data, *trimmed(*seconds), in_ns=1)
-    below, fine = _parse_plain(nanoseconds.data, *trimmed(*nanoseconds), in_ns=1)
-    stamps = whole * BILLION + below
-    reasons = {}
-    for row in np.flatnonzero(~(sure & fine & (whole < _MOST_SECONDS))).tolist():
-        try:
-            stamps[row] = read_header_stamp(seconds.text(row).decode(), nanoseconds.text(row).decode())
+            stamps[row] = read_header_stamp(*texts) if len(texts) == 2 else read_stamp(texts[0], in_ns=in_ns)
         except (ValueInvalid, OverflowError) as error:
             reasons[row] = str(error)
     return stamps, reasons
-
-
-def read_stamps(cells: tuple[Spans, ...], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-    """Read stamps of one column, or of whole seconds and nanoseconds."""
-    return parse_header_stamps(*cells) if len(cells) == 2 else parse_stamps(*cells, in_ns=in_ns)
 
 
 def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[Ints, Flags]:

@@ -159,7 +159,7 @@ def rename_of(request: Request) -> Rename | None:
     if request.rename is not None:
         return request.rename
     if request.operation.moves:
-        return lambda _parent, name: (request.result_frame, name)
+        return lambda _parent, name: (None, name)
     if request.operation.looks_back:
         return lambda _parent, name: (name, name)
     return (lambda _parent, _name: (None, None)) if request.operation.of == "pair" else None

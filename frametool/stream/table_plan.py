@@ -82,9 +82,8 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
-    edge_of = request.pose_from_frame if on_earth else request.pose_of_row_frame
-    if frames and edge_of is None and request.operation.moves and not on_earth:
-        edge_of = request.pose_from_frame
+    moves_each = on_earth or request.frames or (frames and request.operation.moves)
+    edge_of = request.pose_from_frame if moves_each else None
     asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # an empty cell is none
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})

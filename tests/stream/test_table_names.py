@@ -39,7 +39,7 @@ def way(own: str | None) -> Rigid:
     return QUARTER
 
 
-MOVES = asked(left=QUARTER, moves=True, pose_from_frame=way, result_frame="map", on_error="skip")
+MOVES = asked(left=QUARTER, moves=True, pose_from_frame=way, rename=lambda _, name: ("map", name), on_error="skip")
 
 
 def rows(text: str | bytes) -> list[dict[str, str]]:

@@ -160,7 +160,7 @@ def test_unwrapped_angles_never_jump(size: int) -> None:
 
 def test_each_row_may_name_its_frame() -> None:
     edges = {"a": (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), "b": (2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)}
-    request = asked(moves=True, frames=("",), pose_of_row_frame=edges.__getitem__, result_frame="map")
+    request = asked(moves=True, frames=("",), pose_from_frame=edges.__getitem__, rename=lambda _, name: ("map", name))
     result = flow(b"frame,x,y,z\na,0,0,0\nb,0,0,0\n", request)
     assert result.text == b"frame,x,y,z\nmap,1.0,0.0,0.0\nmap,2.0,0.0,0.0\n"
 

@@ -26,7 +26,7 @@ from frametool.stream.record_stream import run_records
 from frametool.stream.record_values import read_poses, results
 from frametool.stream.request import Operation, Request
 from frametool.stream.splice import target_of
-from frametool.stream.stamp_columns import parse_stamps
+from frametool.stream.stamp_columns import read_stamps
 from frametool.stream.stamp_source import read_stamp
 from frametool.stream.table_stream import run_table
 from frametool.text.spans import MARGIN, Spans, framed
@@ -136,7 +136,7 @@ def stamps_of(cells: list[str], *, in_ns: bool) -> list[int | str]:
     texts = [cell.encode() for cell in cells]
     lengths = np.array([len(text) for text in texts], np.int64)
     ends = np.cumsum(lengths + 1) - 1 + MARGIN
-    stamps, reasons = parse_stamps(Spans(framed(b",".join(texts)), ends - lengths, ends), in_ns=in_ns)
+    stamps, reasons = read_stamps((Spans(framed(b",".join(texts)), ends - lengths, ends),), in_ns=in_ns)
     return [reasons.get(row, stamp) for row, stamp in enumerate(stamps.tolist())]
 
 

@@ -157,8 +157,8 @@ class Way(NamedTuple):
         left = edge_of(None) if has_source and not time_column else None
         return Request(
             Operation(left=left, moves=True, uncertain=self.uncertain), frames=frames,
-            pose_of_row_frame=edge_of if frames else None, pose_from_frame=edge_of, timed=timed,
-            result_frame=self.target, frame_is_counter=self.counters, rename=lambda _parent, name: (self.target, name),
+            pose_from_frame=edge_of, timed=timed, frame_is_counter=self.counters,
+            rename=lambda _parent, name: (self.target, name),
         )  # fmt: skip
 
 

@@ -169,7 +169,7 @@ def _by_row(
     width = UNCERTAIN if lookups.carried else EXACT
     timed = None if inputs.time_column is None else Timed(inputs.time_column, many, edge_of, width=width)
     request = task.request(
-        poses=0, frames=frames, pose_of_row_frame=edge_of, notations=task.output.notations or (notation("quaternion"),),
+        poses=0, frames=frames, pose_from_frame=edge_of, notations=task.output.notations or (notation("quaternion"),),
         operation=Operation(uncertain=lookups.carried), timed=timed, window=window,
     )  # fmt: skip
     return task.stream.run(request, task.output, tables_only=True)
