@@ -263,8 +263,8 @@ class Run:
         for at, (mover, (shape, numbers, rotation)) in enumerate(zip(movers, self._things(columns), strict=False)):
             parts = operation.result(
                 shape, numbers, mover, arrays, rotation=rotation,
-                compared=lambda pose: self._with_before(pose, state), seconds=lambda: self._seconds(state),
-                times_ns=times[at] if times else None,
+                compared=lambda pose: self._with_before(pose, state) if operation.looks_back else [pose],
+                seconds=lambda: self._seconds(state), times_ns=times[at] if times else None,
             )  # fmt: skip
             if operation.formula is not None:  # what an expression makes of no row is that of each
                 parts = tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
@@ -315,8 +315,6 @@ class Run:
 
     def _with_before(self, pose: Rigid, state: State) -> list[Any]:
         """Return the good row before each row, or the first of all, and the row; the very first row's is itself."""
-        if not self.operation.looks_back:
-            return [pose]
         full = [np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose]
         kept = np.array(self._good(), np.int64)
         known, first = state.previous, self.operation.of == START
