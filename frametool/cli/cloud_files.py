@@ -180,7 +180,7 @@ class SeveralClouds:
                 request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
                 planned.append((columns, request, path))
             into = self.output.chosen or form
-            refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; forms: {_WRITTEN}")
+            refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; formats: {_WRITTEN}")
             refuse(self.output.path is self.output.chosen is None, "several clouds become one file: give -o all.ply")
             merged = MergedClouds(planned, self.output.style.with_format(into))
             status = 0

@@ -335,7 +335,7 @@ class Output:
         """Report the format of a file whose suffix names none, where none was chosen."""
         suffix = splitext(self.path or "")[1]
         if self._form_is_default and self.path and suffix and not is_special(self.path):
-            none = f"no form written here has the suffix {shown(suffix)}"
+            none = f"no format written here has the suffix {shown(suffix)}"
             say(f"note: {self.path}: {none}; it holds {self.style.format}, -f says another")
 
     def text(self, text: str) -> None:
