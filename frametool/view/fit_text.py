@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 WIDTH = 80
-NAMED, LONGEST = 9, 18  # characters of a frame beside its numbers
+NAMED, LONGEST = 9, 18  # characters of a frame before its numbers
 PLACED, LONGEST_PLACE = 30, 61  # characters of a place before its numbers
 OF_SIGMAS = 8
 MOST = 50  # frames

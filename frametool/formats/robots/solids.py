@@ -2,8 +2,8 @@
 
     <visual><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.05" length="0.4"/></geometry></visual>
 
-A mesh is known by its name only; where a link has nothing else to show, the simple shapes of its `collision` stand for
-it.  Axes of cylinders and capsules are z, their middle is the origin.
+A mesh is known by its name only; of a link that shows meshes alone, the simple shapes of its `collision` are taken
+instead.  Axes of cylinders and capsules are z, their middle is the origin.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-// Joints with a slider each, as frametool.formats.robots.model has them: a frame stands in its parent at origin * motions *
-// after, or at its inverse, and a joint that follows another one has multiplier * its value + offset.
+// Joints with a slider each, as in frametool.formats.robots.model: the pose of a frame in its parent is
+// origin * motions * after, or its inverse; a joint that follows another one has multiplier * its value + offset.
 
 const JOINTS = head.joints, LINKS = head.links;
 const TURNING = new Set(["revolute", "continuous"]);

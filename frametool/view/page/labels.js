@@ -1,4 +1,4 @@
-// Names beside frames, none over another: the chosen, then those that move, then the nearest.
+// Names next to frames, without overlaps: the chosen ones first, then those that move, then the nearest.
 
 const MOST_NAMES = 160, MOST_FAILED = 60, MANY = 3000, CELL = 64, LINE = 16;
 const DISTANCES = [9, 20, 34, 52, 74];  // pixels from a frame to its name

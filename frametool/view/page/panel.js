@@ -1,4 +1,4 @@
-// The numbers beside the picture, the list of frames, and what is copied from them.
+// The panel: the numbers of a transform, the list of frames, and what is copied.
 
 const MOST_LISTED = 300;
 const $ = (id) => document.getElementById(id);
