@@ -85,17 +85,17 @@ def _found(kernel: Callable[..., Components | None], size: int, parts: Component
     return found
 
 
-def _entries(given: Covariance, size: int) -> Components:
+def _entries(value: Covariance, size: int) -> Components:
     """Return the checked entries of a covariance, or columns of those of many; None for None."""
-    if given is None:
+    if value is None:
         return ()
     side = round(size**0.5)
-    if not _are_many(given, side):
-        return uncertainty.taken(given, size)
+    if not _are_many(value, side):
+        return uncertainty.taken(value, size)
     import numpy as np
 
     try:
-        rows = np.asarray(given, np.float64)
+        rows = np.asarray(value, np.float64)
     except (TypeError, ValueError):
         raise ValueInvalid(f"covariances: expected numbers of shape (..., {side}, {side})") from None
     if rows.shape[-2:] != (side, side):
@@ -109,10 +109,10 @@ def _entries(given: Covariance, size: int) -> Components:
     return tuple(rows[..., i, j] for i in range(side) for j in range(side))
 
 
-def _are_many(given: Any, side: int) -> bool:
+def _are_many(value: Any, side: int) -> bool:
     """Return True for an array or list of covariances, False for the numbers or rows of one."""
-    if hasattr(given, "shape"):
-        return len(given.shape) > 1 and given.shape != (side, side)
-    first = given[0] if isinstance(given, (list, tuple)) and given else None
+    if hasattr(value, "shape"):
+        return len(value.shape) > 1 and value.shape != (side, side)
+    first = value[0] if isinstance(value, (list, tuple)) and value else None
     inner = first[0] if isinstance(first, (list, tuple)) and first else None
     return len(getattr(first, "shape", ())) > 1 or hasattr(inner, "__len__")

@@ -28,12 +28,12 @@ __all__ = ["earth_pose", "ecef_from_lla", "lla_from_ecef", "lla_from_utm", "utm_
 
 def ecef_from_lla(lat: Numbers, lon: Numbers, alt: Numbers = 0.0) -> Any:
     """Return x, y, z in metres: three floats for one position, an array (..., 3) for many."""
-    given = _columns(lat=lat, lon=lon, alt=alt)
-    if validation.single(given):
-        return validation.checked(earth.ecef, 3, given, "place", earth.check_lla)
+    argument = _columns(lat=lat, lon=lon, alt=alt)
+    if validation.single(argument):
+        return validation.checked(earth.ecef, 3, argument, "place", earth.check_lla)
     from frametool.geometry import arrays
 
-    return arrays.rows(validation.watched(earth.ecef, 3, given, "place", earth.check_lla), (3,), given, arrays)
+    return arrays.rows(validation.watched(earth.ecef, 3, argument, "place", earth.check_lla), (3,), argument, arrays)
 
 
 def lla_from_ecef(xyz: Numbers) -> Any:
@@ -49,11 +49,11 @@ def earth_pose(
     axes: `enu` (x east, y north, z up), `ned` (north, east, down), `grid` (along the grid of UTM, z up) or `ecef`
     zone: that of the grid, such as `32N`; by default the standard zone
     """
-    given = _columns(lat=lat, lon=lon, alt=alt)
+    argument = _columns(lat=lat, lon=lon, alt=alt)
     if axes not in earth.AXES:
         raise ValueInvalid(f"unknown axes {shown(axes)}; axes: {', '.join(earth.AXES)}")
     if axes == "grid":
-        zoned = _zone(zone, *given[:2]), *given
+        zoned = _zone(zone, *argument[:2]), *argument
         return Transform.of(*validation.checked(mercator.grid_pose, 7, zoned, "place", mercator.check_utm))
     if zone is not None:
         raise ValueInvalid(f"zone {shown(zone)} is one of a grid; axes {axes!r} have none")
@@ -61,7 +61,7 @@ def earth_pose(
     def kernel(lat: Any, lon: Any, alt: Any, xp: Any) -> Components:
         return earth.pose(lat, lon, alt, axes, xp)
 
-    return Transform.of(*validation.checked(kernel, 7, given, "place", earth.check_lla))
+    return Transform.of(*validation.checked(kernel, 7, argument, "place", earth.check_lla))
 
 
 def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) -> Any:
@@ -71,8 +71,8 @@ def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) 
     exceptions of Norway and Svalbard.  Convergence is the angle of grid north clockwise of true north: yaw in grid =
     yaw in enu + convergence.
     """
-    given = _columns(lat=lat, lon=lon)
-    zoned = _zone(zone, *given), *given
+    argument = _columns(lat=lat, lon=lon)
+    zoned = _zone(zone, *argument), *argument
     found = validation.checked(mercator.utm, 4, zoned, "place", mercator.check_utm)
     if validation.single(found):
         return (mercator.ZONES[int(zoned[0])], *found)
@@ -84,8 +84,8 @@ def utm_from_lla(lat: Numbers, lon: Numbers, zone: Numbers | str | None = None) 
 
 def lla_from_utm(zone: Numbers | str, easting: Numbers, northing: Numbers) -> Any:
     """Return lat, lon of positions in a zone, such as `32N` (`32S` south of the equator), or with a zone each."""
-    given = _zone(zone), *_columns(easting=easting, northing=northing)
-    return validation.checked(mercator.lat_lon, 2, given, "utm", mercator.check_grid)
+    argument = _zone(zone), *_columns(easting=easting, northing=northing)
+    return validation.checked(mercator.lat_lon, 2, argument, "utm", mercator.check_grid)
 
 
 def _columns(**values: Numbers) -> Components:
@@ -93,16 +93,16 @@ def _columns(**values: Numbers) -> Components:
     return tuple(validation.scalars(value, name) for name, value in values.items())
 
 
-def _zone(given: Any, *place: Any) -> Any:
+def _zone(argument: Any, *place: Any) -> Any:
     """Return the number of a zone, or of many; by default that of the position, if it is known."""
-    if given is None and place:
+    if argument is None and place:
         return validation.number(mercator.standard_zone, place)
-    if not isinstance(given, (list, tuple)) and not getattr(given, "shape", ()):
-        return mercator.zone_number(given)
+    if not isinstance(argument, (list, tuple)) and not getattr(argument, "shape", ()):
+        return mercator.zone_number(argument)
     import numpy as np
 
     try:
-        names = np.asarray(given).astype(str)
+        names = np.asarray(argument).astype(str)
     except ValueError:
         raise ValueInvalid("zone: the rows differ in length; expected an array of names such as 32N") from None
     numbers = {name: mercator.zone_number(name) for name in dict.fromkeys(names.ravel().tolist())}

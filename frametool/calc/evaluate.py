@@ -88,21 +88,21 @@ class Scope:
         self.normalize = normalize
         self.earth: Earth | None = None  # options for all positions on the Earth
         self.seen: set[str | None] = {None}
-        self.told: set[str] = set()  # warnings that are emitted once
+        self.warned: set[str] = set()  # warnings that are emitted once
 
     def leave_out(self, covariances: object) -> None:
         """Warn once that expressions ignore covariances, if there are any."""
-        told = LEFT_OUT.format("calc")
-        if covariances and told not in self.told:
-            self.told.add(told)
-            warn(told)
+        message = LEFT_OUT.format("calc")
+        if covariances and message not in self.warned:
+            self.warned.add(message)
+            warn(message)
 
     def with_row(self, row: Type) -> Scope:
         """Return a copy of the scope for rows of a type."""
         scope = Scope(
             tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
         )  # fmt: skip
-        scope.told, scope.earth = self.told, self.earth
+        scope.warned, scope.earth = self.warned, self.earth
         return scope
 
     def reading(self, source: Source) -> Reading:

@@ -124,8 +124,8 @@ def _word(text: str, at: int, before: str) -> Token:
         return Token("name", name[0], at, name.end())
     if first in _OPERATORS:
         return Token("op", first, at, at + 1)
-    if odd := odd_characters(first):
-        raise CalcError(f"unexpected {odd}", at)
+    if strange := odd_characters(first):
+        raise CalcError(f"unexpected {strange}", at)
     raise CalcError(f"unexpected {shown(first)}" + (f"; {HINTS[first]}" if first in HINTS else ""), at)
 
 

@@ -46,7 +46,7 @@ class BagOfClouds:
 
     def __init__(self, path: str, output: Output, stream: Stream) -> None:
         """Open the bag and choose its topics; of --topic, what names no clouds is left to the tree."""
-        from frametool.grammar.edges import Tally
+        from frametool.grammar.edges import Diagnostics
         from frametool.recordings.messages import cloud_topics
         from frametool.recordings.read import opened_recording
 
@@ -60,7 +60,7 @@ class BagOfClouds:
         for place in {*re.findall(r"\{(\w*)\}", self.pattern)} - {*PLACES}:
             known = ", ".join(f"{{{each}}}" for each in PLACES)
             raise click.UsageError(f"-o {self.pattern}: {{{place}}} has no meaning; there are {known}")
-        self.tally = Tally()
+        self.tally = Diagnostics()
         chosen = inputs().topics
         with ExitStack() as opened:
             self.reader = opened.enter_context(opened_recording(path, self.tally))
@@ -87,7 +87,7 @@ class BagOfClouds:
                     bad.take([Fault(cloud.line, "", cloud.message)])
                     continue
                 points += self._write(cloud, way, bad)
-            for told in self.tally.told():
+            for told in self.tally.findings():
                 once(f"{self.path}: {told.message}", told.rule, FrametoolWarning)
         if not count:
             raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
@@ -154,7 +154,7 @@ class SeveralClouds:
         from frametool.cli.trees import answers
         from frametool.documents.source import InputFile
         from frametool.formats.detect import detect
-        from frametool.grammar.edges import Options, Tally, Topics
+        from frametool.grammar.edges import Diagnostics, Options, Topics
         from frametool.stream.column_stream import MergedClouds
         from frametool.stream.faults import run
         from frametool.stream.request import Operation, Request
@@ -175,7 +175,7 @@ class SeveralClouds:
                 if "arrays" not in FORMATS[form].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[form].summary}, no cloud; {hint}", source=path)
-                reading = Options(Tally(), Topics(), answers=answers())
+                reading = Options(Diagnostics(), Topics(), answers=answers())
                 columns = import_module(FORMATS[form].reader).open_columns(file, reading)
                 request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
                 planned.append((columns, request, path))

@@ -109,10 +109,10 @@ class Stream:
 
         if not is_bag(self.path):
             return None
-        from frametool.grammar.edges import Tally
+        from frametool.grammar.edges import Diagnostics
         from frametool.recordings.messages import open_records
 
-        self._opened = open_records(self.path, self.inputs.topics, Tally())
+        self._opened = open_records(self.path, self.inputs.topics, Diagnostics())
         self.within = "json"
         self.inputs.leave(topics=())
         return self._opened
@@ -190,7 +190,7 @@ class Stream:
             try:
                 return self._run_opened(given, request, output, tables_only=tables_only)
             except FormatError as error:
-                raise with_hint(error, head, self.name, told=bool(self.chosen_format())) from None
+                raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever format it is."""
@@ -270,7 +270,7 @@ class Stream:
 
         from frametool.cli.trees import answers
         from frametool.documents.source import InputFile
-        from frametool.grammar.edges import Options, Tally, Topics
+        from frametool.grammar.edges import Diagnostics, Options, Topics
         from frametool.stream.column_stream import run_columns
 
         if output.path is None and request.gathered is None and sys.stdout.isatty():
@@ -278,7 +278,7 @@ class Stream:
         module: Any = import_module(FORMATS[form].reader)
         file = InputFile(self.path or "-", stream)
         file.format = form
-        opened = module.open_columns(file, Options(Tally(), Topics(), answers=answers()))
+        opened = module.open_columns(file, Options(Diagnostics(), Topics(), answers=answers()))
         into: Any = module
         if output.chosen is not None and request.gathered is None:
             into = import_module(FORMATS[output.chosen].writer)

@@ -96,8 +96,8 @@ def explain_scalar(text: str) -> str:
     """Return why a text is found instead of a mapping: no blank after a colon, an invisible character; or ""."""
     if match := re.match(_TIGHT_COLON, text):
         return f"write a blank after '{match[1]}:'"
-    if ":" in text and (odd := odd_characters(text)):
-        return f"it has {odd}; use an ordinary blank"
+    if ":" in text and (strange := odd_characters(text)):
+        return f"it has {strange}; use an ordinary blank"
     if match := re.match(_EQUALS, text):
         return f"write '{match[1]}: ' instead of '='"
     return ""

@@ -218,8 +218,8 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
             noted[name] = states_of(name)
         return open(path, "rb", buffering=HEAD)
     except OSError as error:
-        told = name if 0 < len(name) <= LONGEST_NAME else shown(name)
-        raise FileProblem(f"{told}: {(error.strerror or str(error)).lower()}{_instead_of_a_file(name)}") from None
+        called = name if 0 < len(name) <= LONGEST_NAME else shown(name)
+        raise FileProblem(f"{called}: {(error.strerror or str(error)).lower()}{_instead_of_a_file(name)}") from None
     except ValueError as error:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
@@ -309,8 +309,8 @@ def not_text(data: bytes) -> str:
         return "UTF-32, which is not read; convert it: iconv -f UTF-32 -t UTF-8"
     if head.startswith(UTF16):
         return "UTF-16, which is not read here; convert it: iconv -f UTF-16 -t UTF-8"
-    even, odd = head[::2].count(0), head[1::2].count(0)
-    for zeros, others, encoding in ((odd, even, "UTF-16LE"), (even, odd, "UTF-16BE")):
+    even, odds = head[::2].count(0), head[1::2].count(0)
+    for zeros, others, encoding in ((odds, even, "UTF-16LE"), (even, odds, "UTF-16BE")):
         if zeros > len(head) // 5 and others <= zeros // 20:
             return f"{encoding} without a byte order mark; convert it: iconv -f {encoding} -t UTF-8"
     controls = len(head) - len(head.translate(None, _CONTROLS))
@@ -328,8 +328,8 @@ def check_text(source: Source) -> None:
     try:
         source.text.encode()
     except UnicodeEncodeError as error:
-        odd = ord(source.text[error.start])
-        raise error_at(source, error.start, f"not UTF-8: half a character (U+{odd:04X})") from None
+        odds = ord(source.text[error.start])
+        raise error_at(source, error.start, f"not UTF-8: half a character (U+{odds:04X})") from None
 
 
 def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:

@@ -164,17 +164,17 @@ def translated(source: Source, error: Exception) -> FormatError:
         above = source.text[begin : mark.index].rstrip().count("\n")
         message = _message(error, line_of(source.text, line), mark.column + 1, above)
         return error_at(source, mark.index, message + _suspicion(source, line))
-    if odd := re.search(_UNREADABLE, source.text):
-        code = f"U+{ord(odd[0]):04X}"
-        return error_at(source, odd.start(), f"the character {code} may not stand in YAML or JSON; is this text?")
+    if strange := re.search(_UNREADABLE, source.text):
+        code = f"U+{ord(strange[0]):04X}"
+        return error_at(source, strange.start(), f"the character {code} may not stand in YAML or JSON; is this text?")
     return error_at(source, 0, _one_line(str(error)) or type(error).__name__)
 
 
 def _suspicion(source: Source, line: int) -> str:
     """Return what is hard to see in the line of an error or the previous one: look-alikes, a missing blank, xacro."""
     for text in (line_of(source.text, line), line_of(source.text, line - 1) if line > 1 else ""):
-        if odd := odd_characters(text):
-            return f"; the line has {odd}"
+        if strange := odd_characters(text):
+            return f"; the line has {strange}"
         if "${" in text:
             return "; is this xacro? expand it first"
         if match := re.match(r"\s*(?:- +)*([\w./-]+):(?=[^\s:/])", text):
@@ -316,7 +316,7 @@ class _Builder:
         `current` is the dict or list being filled and `key` the key waiting for its value: None if a key is next, _ITEM
         in a list.  A single function, because two million events pass through it for 100 000 frames.
         """
-        stack, nulls, odd_keys, item, brackets = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside and BRACKETS
+        stack, nulls, refused_keys, item, brackets = self.open, _NULLS, _ODD_KEYS, _ITEM, self.aside and BRACKETS
         current: Any = self.documents
         key: Any = item
         room = MOST_CONTAINERS
@@ -327,7 +327,7 @@ class _Builder:
             if kind is ScalarEvent:
                 value = event.value
                 if key is None:
-                    if value in current or value in odd_keys:
+                    if value in current or value in refused_keys:
                         self._refuse_key(event, current)
                     key = value
                     if event.tag is not None or event.anchor is not None:

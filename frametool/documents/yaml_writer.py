@@ -60,9 +60,9 @@ def quoted(text: str) -> str:
     return f'"{re.sub(_ESCAPED, _escape, text)}"'
 
 
-def _key(key: str, beside: dict[str, Any]) -> str:
+def _key(key: str, siblings: dict[str, Any]) -> str:
     """Write a key; y next to x is the coordinate, which no reader in use takes for a boolean."""
-    return key if key == "y" and "x" in beside else quoted(key)
+    return key if key == "y" and "x" in siblings else quoted(key)
 
 
 def _escape(match: re.Match[str]) -> str:

@@ -114,24 +114,24 @@ def _grid(grid: MatrixLine) -> list[str]:
     sign = ""
     for part in grid.parts:
         if part == ")":
-            groups[-1] = _beside("", groups[-1], " )")
+            groups[-1] = _side_by_side("", groups[-1], " )")
             continue
         if isinstance(part, str):
             sign = f"{part} "
             continue
-        block = _beside(sign, _block(part), f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
+        block = _side_by_side(sign, _block(part), f" {grid.unit}" if grid.unit and part is grid.parts[-1] else "")
         if groups and len(head) + len(groups[-1][0]) + 1 + max(map(len, block)) <= WIDTH:
             groups[-1] = [f"{left} {right}" for left, right in zip(groups[-1], block, strict=True)]
         else:
             groups.append(block)
         sign = ""
     for group in groups:
-        lines += [line.rstrip() for line in _beside(head, group)]
+        lines += [line.rstrip() for line in _side_by_side(head, group)]
         head = " " * len(head)
     return lines
 
 
-def _beside(left: str, block: Sequence[str], right: str = "") -> list[str]:
+def _side_by_side(left: str, block: Sequence[str], right: str = "") -> list[str]:
     """Add words to the left and to the right of the middle row of a block."""
     before, behind, middle = " " * len(left), " " * len(right), len(block) // 2
     return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]

@@ -289,11 +289,11 @@ def paired_samples(
     if not len(kept):
         apart = f"their stamps are {float(off.min()) / 1e9:.3f} s apart at least; one clock? --max-gap"
         raise ValueInvalid(f"no pose of {files[0]} is within {gap} of one of {files[1]}: {apart}")
-    told = []
+    messages = []
     if alone := target.size - len(kept):
-        told = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
+        messages = [f"{files[1]}: {alone} of {target.size} poses have none of {files[0]} within {gap}: unpaired"]
     sides = chosen.at(kept).poses, target.at(kept).poses
-    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", told)
+    return HandEyeSamples(*sides, _places(files[1], target.at(kept), kept.tolist()), tuple(names), files, "", messages)
 
 
 def _places(file: str, each: Trajectory, rows: Sequence[int]) -> list[str]:

@@ -287,8 +287,8 @@ def _residuals(fit: Fit, target: Array, source: Array) -> Array:
     return target - placed
 
 
-def _points(given: Numbers, name: str) -> Array:
-    xyz = np.stack(np.atleast_1d(*validation.columns(given, 3, name)), -1)
+def _points(values: Numbers, name: str) -> Array:
+    xyz = np.stack(np.atleast_1d(*validation.columns(values, 3, name)), -1)
     if xyz.ndim != 2:
         raise ValueInvalid(f"{name}: expected shape (n, 3), got {xyz.shape}")
     validation.all_finite((xyz,), name)
@@ -296,13 +296,13 @@ def _points(given: Numbers, name: str) -> Array:
     return xyz
 
 
-def mean_of_rows(gathered: Gathered, given: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
+def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool) -> tuple[Result, list[str]]:
     """Return the mean of gathered poses, with its spread, and a message for each outlier."""
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain
 
     transforms = gathered.transforms
-    weights = gathered.weights if given is None else given
+    weights = gathered.weights if values is None else values
     extras: dict[str, Any] = {"count": len(transforms)}
     left_out: list[str] = []
     if robust:

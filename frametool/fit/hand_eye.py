@@ -98,10 +98,10 @@ def solve_hand_eye(
         raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
     if (count := len(gripper)) < FEWEST:
         raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
-    given, camera = PoseArrays.of(gripper), PoseArrays.of(target)
-    require_near(given.translations, "gripper")
+    base_hand, camera = PoseArrays.of(gripper), PoseArrays.of(target)
+    require_near(base_hand.translations, "gripper")
     require_near(camera.translations, "target")
-    hand = given.inverse if eye_to_hand else given
+    hand = base_hand.inverse if eye_to_hand else base_hand
     samples, other = _Samples(hand, camera), _Samples(hand.inverse, camera)
     holder = names[0] if eye_to_hand else names[1]
     robust = robust and count >= FEWEST_ROBUST
@@ -347,13 +347,13 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
 
 
 def _warnings(turns: _Turns, count: int, holder: str) -> list[str]:
-    told = []
+    notes = []
     if turns.rms[1] < SLIGHT:
         small = f"{degrees(turns.rms[1]):.1f} deg rms beside {turns.axis} in {holder}"
-        told.append(f"turns about a second axis are small ({small}): turn more")
+        notes.append(f"turns about a second axis are small ({small}): turn more")
     if count < FEWEST_CERTAIN:
-        told.append(f"{count} samples say little of their own noise: the sigmas are rough; take 8 or more")
-    return told
+        notes.append(f"{count} samples say little of their own noise: the sigmas are rough; take 8 or more")
+    return notes
 
 
 def _require_this_way(medians: Array, others: Array, names: tuple[str, str, str, str], *, eye_to_hand: bool) -> None:

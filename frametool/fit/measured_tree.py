@@ -42,7 +42,7 @@ class Uncertainty:
         """Store a fit; nothing is computed yet."""
         self._problem, self._found = problem, found
         self._known = Groups[int]()
-        for row in np.flatnonzero(found.kept & (problem.rows.given | found.estimated)).tolist():
+        for row in np.flatnonzero(found.kept & (problem.rows.stated | found.estimated)).tolist():
             self._known.join(*problem.pairs[row])
 
     def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
@@ -242,11 +242,11 @@ class _Case:
                 pose = self._pose_without(rival, row)
                 words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
             blamed = [each for each, blunder in words.items() if blunder]
-            unsure = self._beside_doubt(row, self.least_information[row])
+            unsure = self._with_doubt(row, self.least_information[row])
             if not blamed and self.errors[row] @ unsure @ self.errors[row] <= 6 * KEPT**2:
                 noise.append(row)
             if not rivals:
-                doubted = self._beside_doubt(row, self.information[row])
+                doubted = self._with_doubt(row, self.information[row])
                 fits[row] = words[row] or best_blunder(self.measurements[row], self.poses.at(row), doubted)
             elif blamed == [row]:
                 fits[row] = words[row]
@@ -256,7 +256,7 @@ class _Case:
                 undecided = undecided or (row, rivals)
         return Verdicts(fits, noise, swaps, undecided)
 
-    def _beside_doubt(self, row: int, information: Array) -> Array:
+    def _with_doubt(self, row: int, information: Array) -> Array:
         """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
         parent, child = self.problem.pairs[row]
         doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
@@ -311,14 +311,14 @@ def solve_tree(
     for row, each in enumerate(measurements):
         if each.parent == each.child:
             raise ValueInvalid(f"{place_of(measurements, row)}: {shown(each.child)} is measured from itself")
-    told = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     bodies = bodies_of(measurements, root, fixed)
     require_connected(bodies, [(bodies.number[each.parent], bodies.number[each.child]) for each in measurements])
     try:
         with np.errstate(over="raise", invalid="raise"):
             problem = TreeProblem(_rows(measurements, bodies), bodies.size)
-            found, fits = judged(problem, measurements, problem.fitted(robust=robust, told=told))
-            told(1.0)
+            found, fits = judged(problem, measurements, problem.fitted(robust=robust, report=report))
+            report(1.0)
             return TreeSolution(measurements, bodies, problem, found, fits)
     except (NotSettled, FloatingPointError):
         far = max(abs(part) for each in measurements for part in each.components[:3])

@@ -59,18 +59,18 @@ def compare(
     """
     if like not in (None, "evo"):
         raise ValueInvalid(f"like {like!r}: only evo is known")
-    given = {"align": align, "mount": mount, **more}
-    if unknown := [name for name in given if name not in Settings._fields]:
+    argument = {"align": align, "mount": mount, **more}
+    if unknown := [name for name in argument if name not in Settings._fields]:
         raise TypeError(f"compare has no {unknown[0]!r}{alternatives(unknown[0], Settings._fields, 'settings')}")
     if offset is not None:
-        given["offset"] = AUTO if offset == AUTO else round(float(offset) * BILLION)
+        argument["offset"] = AUTO if offset == AUTO else round(float(offset) * BILLION)
     if deltas is not None:
-        given["deltas"] = tuple(map(parse_delta, deltas))
-    if isinstance(first := given.get("align_first"), str):
-        given["align_first"] = parse_delta(first, ("m", "s", "frames"))
+        argument["deltas"] = tuple(map(parse_delta, deltas))
+    if isinstance(first := argument.get("align_first"), str):
+        argument["align_first"] = parse_delta(first, ("m", "s", "frames"))
     elif isinstance(first, int):
-        given["align_first"] = Delta(float(first), "frames")
-    chosen = {name: value for name, value in given.items() if value is not None}
+        argument["align_first"] = Delta(float(first), "frames")
+    chosen = {name: value for name, value in argument.items() if value is not None}
     base = EVO if like else Settings()
     names = _name(ref, "ref"), _name(est, "est")
     return compared(_taken(ref, "ref"), _taken(est, "est"), base._replace(**chosen), names)
@@ -90,19 +90,19 @@ def resample(
 
     Times beyond its ends, or in gaps longer than max_gap_ns (default: 3 median intervals), have no pose.
     """
-    given = _taken(trajectory, "trajectory")
-    for hint in given.disorder("trajectory"):
+    argument = _taken(trajectory, "trajectory")
+    for hint in argument.disorder("trajectory"):
         warn(hint)
-    given = given.in_order()
+    argument = argument.in_order()
     if sum(each is not None for each in (rate, at, every)) != 1:
         raise ValueInvalid("give one of rate, at and every")
-    if given.stamps_ns is None:
+    if argument.stamps_ns is None:
         raise ValueInvalid("a trajectory without stamps is not resampled")
     if rate is not None:
-        stamps = stamps_at_rate(given, rate)
+        stamps = stamps_at_rate(argument, rate)
     else:
-        stamps = np.asarray(at, np.int64) if every is None else stamps_every(given, parse_delta(every, ("m", "deg")))
-    return resampled(given, stamps, max_gap_ns)
+        stamps = np.asarray(at, np.int64) if every is None else stamps_every(argument, parse_delta(every, ("m", "deg")))
+    return resampled(argument, stamps, max_gap_ns)
 
 
 def solve(
@@ -139,28 +139,28 @@ def solve(
     return found
 
 
-def _measurements(given: Measured) -> list[Measurement]:
-    if isinstance(given, str | PathLike):
+def _measurements(argument: Measured) -> list[Measurement]:
+    if isinstance(argument, str | PathLike):
         from frametool.formats.load import FrameFile
         from frametool.stream.measurements import read_measurements
 
-        return read_measurements([FrameFile(given)])
-    return [_measurement(each, f"measurement {number}") for number, each in enumerate(given, 1)]
+        return read_measurements([FrameFile(argument)])
+    return [_measurement(each, f"measurement {number}") for number, each in enumerate(argument, 1)]
 
 
-def _measurement(given: Any, place: str) -> Measurement:
+def _measurement(argument: Any, place: str) -> Measurement:
     """Check one measurement passed from Python; raises ValueInvalid that names it."""
-    if isinstance(given, Measurement):
-        return given
-    if not (isinstance(given, tuple | list) and len(given) in (3, 4) and isinstance(given[2], Transform)):
+    if isinstance(argument, Measurement):
+        return argument
+    if not (isinstance(argument, tuple | list) and len(argument) in (3, 4) and isinstance(argument[2], Transform)):
         raise ValueInvalid(f"{place}: expected (parent, child, Transform) or with a covariance behind")
-    parent, child, transform = given[:3]
+    parent, child, transform = argument[:3]
     if wrong := [name for name in (parent, child) if not (isinstance(name, str) and name)]:
         raise ValueInvalid(f"{place}: a frame is named by a text, found {wrong[0]!r}")
     if transform.shape:
         raise ValueInvalid(f"{place}: expected one transform, got shape {transform.shape}")
     try:
-        return Measurement(parent, child, transform.components, taken(given[3] if len(given) > 3 else None))
+        return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
     except ValueInvalid as error:
         raise ValueInvalid(f"{place}: {error}") from None
 
@@ -210,38 +210,38 @@ def solve_mean(poses: Batch, *, weights: Numbers | None = None, robust: bool = T
     return closed_forms.solve_mean(_poses(poses, "poses"), weights=weights, robust=robust)
 
 
-def _poses(given: Any, name: str) -> Transform:
+def _poses(argument: Any, name: str) -> Transform:
     """Convert a batch of transforms, a sequence of single ones, or matrices; raises ValueInvalid with the shape."""
-    if not isinstance(given, Transform) and len(given) and all(isinstance(each, Transform) for each in given):
-        if many := next((each.shape for each in given if each.shape), ()):
+    if not isinstance(argument, Transform) and len(argument) and all(isinstance(each, Transform) for each in argument):
+        if many := next((each.shape for each in argument if each.shape), ()):
             raise ValueInvalid(f"{name}: expected single transforms, got shape {many}")
-        given = Transform.of(*map(np.array, zip(*(each.components for each in given), strict=True)))
-    if not isinstance(given, Transform):
-        matrices = np.asarray(given)
+        argument = Transform.of(*map(np.array, zip(*(each.components for each in argument), strict=True)))
+    if not isinstance(argument, Transform):
+        matrices = np.asarray(argument)
         if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
             raise ValueInvalid(f"{name}: expected matrices of shape (n, 4, 4), got {matrices.shape}")
         return Transform.from_matrix(matrices)
-    if len(given.shape) != 1:
-        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {given.shape}")
-    return given
+    if len(argument.shape) != 1:
+        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {argument.shape}")
+    return argument
 
 
-def _name(given: Given, otherwise: str) -> str:
-    return otherwise if isinstance(given, Trajectory) else fspath(given)
+def _name(argument: Given, otherwise: str) -> str:
+    return otherwise if isinstance(argument, Trajectory) else fspath(argument)
 
 
-def _taken(given: Given, name: str) -> Trajectory:
+def _taken(argument: Given, name: str) -> Trajectory:
     """Read a path; check and convert the arrays of a trajectory."""
-    if not isinstance(given, Trajectory):
-        return load_trajectory(given)
-    xyz = np.asarray(given.xyz, np.float64)
+    if not isinstance(argument, Trajectory):
+        return load_trajectory(argument)
+    xyz = np.asarray(argument.xyz, np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3 or not len(xyz) or not np.isfinite(xyz).all():
         raise ValueInvalid(f"{name}.xyz: finite positions of shape (n, 3) are wanted, found shape {xyz.shape}")
-    xyzw = None if given.xyzw is None else np.stack(Rotation.from_quaternion(given.xyzw).components, -1)
-    stamps = None if given.stamps_ns is None else np.asarray(given.stamps_ns)
+    xyzw = None if argument.xyzw is None else np.stack(Rotation.from_quaternion(argument.xyzw).components, -1)
+    stamps = None if argument.stamps_ns is None else np.asarray(argument.stamps_ns)
     for field, values in (("xyzw", xyzw), ("stamps_ns", stamps)):
         if values is not None and len(values) != len(xyz):
             raise ValueInvalid(f"{name}.{field}: {len(values)} rows for {len(xyz)} positions")
     if stamps is not None and stamps.dtype.kind not in "iu":
         raise ValueInvalid(f"{name}.stamps_ns: integer nanoseconds are wanted, found {stamps.dtype}")
-    return given._replace(xyz=xyz, xyzw=xyzw, stamps_ns=None if stamps is None else stamps.astype(np.int64))
+    return argument._replace(xyz=xyz, xyzw=xyzw, stamps_ns=None if stamps is None else stamps.astype(np.int64))

@@ -65,7 +65,7 @@ class TreeRows(NamedTuple):
     """Measurements as arrays.
 
     parent, child: the bodies; in_parent, in_child: poses of the measured frames in them
-    given: which have a covariance; information: its inverse, (n, 6, 6), zeros for the others
+    stated: which have a covariance; information: its inverse, (n, 6, 6), zeros for the others
     """
 
     parent: Indices
@@ -73,7 +73,7 @@ class TreeRows(NamedTuple):
     in_parent: PoseArrays
     in_child: PoseArrays
     measured: PoseArrays
-    given: Any
+    stated: Any
     information: Array
 
 
@@ -138,7 +138,7 @@ class TreeProblem:
     def information(self, noise: Noise, factor: float = 1.0) -> Array:
         """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
         diagonal = [noise.place**-2] * 3 + [noise.turn**-2] * 3
-        return np.where(self.rows.given[:, None, None], self.rows.information / factor**2, np.diag(diagonal))
+        return np.where(self.rows.stated[:, None, None], self.rows.information / factor**2, np.diag(diagonal))
 
     def u(self, errors: Array, noise: Noise) -> Array:
         """Return the residual of each row in sigmas: the root mean square of its six numbers."""
@@ -255,11 +255,11 @@ class TreeProblem:
         if dof <= 0:
             return Noise()
         errors = self.errors(bodies)
-        free, given = kept & ~self.rows.given, kept & self.rows.given
+        free, stated = kept & ~self.rows.stated, kept & self.rows.stated
         factor = 1.0
-        if given.any():
-            chi2 = 6 * float((self.u(errors, Noise())[given] ** 2).sum())
-            factor = max(1.0, math.sqrt(chi2 / (2 * dof * given.sum() / kept.sum())))
+        if stated.any():
+            chi2 = 6 * float((self.u(errors, Noise())[stated] ** 2).sum())
+            factor = max(1.0, math.sqrt(chi2 / (2 * dof * stated.sum() / kept.sum())))
         if not estimate:
             return Noise(factor=factor)
         squares = [float((part[free] ** 2).sum()) for part in _halves(errors)]
@@ -278,8 +278,8 @@ class TreeProblem:
         """
         information = self.information(noise) * kept[:, None, None]
         covariance = inverse(self.normal_equations(bodies, information)[0])
-        information *= ~self.rows.given[:, None, None]
-        count, found = 3.0 * (kept & ~self.rows.given).sum(), []
+        information *= ~self.rows.stated[:, None, None]
+        count, found = 3.0 * (kept & ~self.rows.stated).sum(), []
         for half in np.kron(np.eye(2), np.ones(3)):
             own = self.normal_equations(bodies, information * np.outer(half, half))[0]
             found.append(count - float((covariance * own).sum()))
@@ -289,13 +289,13 @@ class TreeProblem:
         """Return the noise from the medians of the rows in loops."""
         unknown = self.unknown - (self.size - looped.sum())  # every row in no loop determines one
         share = math.sqrt(max(1 - unknown / looped.sum(), LEAST_SHARE))
-        free, given = looped & ~self.rows.given, looped & self.rows.given
+        free, stated = looped & ~self.rows.stated, looped & self.rows.stated
         noise = Noise()
-        if given.any():
-            factor = float(np.median(_odd(self.u(errors, noise)[given]))) / (MEDIAN_OF_SIX * share)
+        if stated.any():
+            factor = float(np.median(_odd_count(self.u(errors, noise)[stated]))) / (MEDIAN_OF_SIX * share)
             noise = noise._replace(factor=max(1.0, factor))
         if free.any():
-            place, turn = (median_sigma(_odd(length(part[free])), share) for part in _halves(errors))
+            place, turn = (median_sigma(_odd_count(length(part[free])), share) for part in _halves(errors))
             noise = noise._replace(place=place, turn=turn)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
@@ -310,18 +310,18 @@ class TreeProblem:
                 break
         return bodies, noise
 
-    def fitted(self, *, robust: bool, told: Callable[[float], None]) -> Fitted:
+    def fitted(self, *, robust: bool, report: Callable[[float], None]) -> Fitted:
         """Select the rows that agree, or all, and fit them by plain least squares."""
         every = range(self.size)
         bodies, noise = self.start(TREES if robust and self.size > self.unknown else 1), Noise()
-        told(0.3)
+        report(0.3)
         kept = np.ones(self.size, bool)
         looped = kept.copy()
         looped[list(bridges(self.tree(every), self.pairs, every))] = False
         if robust and looped.any():
             bodies, noise = self.weighed_down(bodies, looped)
             kept = self.u(self.errors(bodies), noise) <= KEPT
-        told(0.6)
+        report(0.6)
         return self.selected(bodies, kept, noise, robust=robust)
 
     def selected(self, bodies: PoseArrays, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
@@ -341,7 +341,7 @@ class TreeProblem:
         if (reached & ~kept).any():
             kept, bodies = kept | reached, self.placed([tree]).at(0)
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
-        estimate = bool((kept & ~alone & ~self.rows.given).any()) and kept.sum() > self.unknown
+        estimate = bool((kept & ~alone & ~self.rows.stated).any()) and kept.sum() > self.unknown
         few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
         bodies, noise = self.settled(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
         return Fitted(bodies, kept, noise, estimate, few_loops)
@@ -351,6 +351,6 @@ def _halves(errors: Array) -> tuple[Array, Array]:
     return errors[:, :3], errors[:, 3:]
 
 
-def _odd(values: Array) -> Array:
+def _odd_count(values: Array) -> Array:
     """Return an odd number of values, without the largest if necessary: of two rows that disagree one is wrong."""
     return values if len(values) % 2 else np.sort(values)[:-1]

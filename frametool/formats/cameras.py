@@ -30,7 +30,7 @@ from frametool.formats.detect import of_folder
 from frametool.formats.trees.matrices import TAGS, made_ordinary
 from frametool.formats.trees.tree_reader import CAMERA_KEYS, camera_fields, numbers_of
 from frametool.geometry.camera import CAMERA_MODELS, Camera
-from frametool.grammar.edges import Answers, Options, Tally, Topics
+from frametool.grammar.edges import Answers, Diagnostics, Options, Topics
 from frametool.text.numbers import parse_number
 
 if TYPE_CHECKING:
@@ -130,13 +130,13 @@ def _made(
     source: str, fields: dict[str, Any], *, name: str, model: str | None = None, size: Sequence[int] | None = None
 ) -> Camera:
     """Create a camera from the fields in a file; raises FormatError."""
-    given, line = {"model": None, **fields}, fields.get("line", 0)
+    arguments, line = {"model": None, **fields}, fields.get("line", 0)
     with _placed(source, "" if line else name, line):
         if "colmap" in fields:
-            given |= _of_colmap(fields["colmap"], fields["numbers"], fields.get("size") or size)
+            arguments |= _of_colmap(fields["colmap"], fields["numbers"], fields.get("size") or size)
             warn(f"{source}: the centre of its first pixel is 0.5, 0.5: 0.5 is taken off cx and cy")
-        given = {key: each for key, each in given.items() if key in (*CAMERA_KEYS, "shift")}
-        camera = Camera(**(given if model is None else {**given, "model": model}))
+        arguments = {key: each for key, each in arguments.items() if key in (*CAMERA_KEYS, "shift")}
+        camera = Camera(**(arguments if model is None else {**arguments, "model": model}))
         if "moved" in fields:
             scale, shift = fields["moved"]
             camera = camera.resampled(scale, shift, camera.size)
@@ -247,7 +247,7 @@ def _in_bag(file: InputFile) -> Found:
     """Yield the cameras of a bag by topic and by frame_id, from CameraInfo messages."""
     from frametool.recordings.read import opened_recording
 
-    with opened_recording(file.path, Tally()) as reader:
+    with opened_recording(file.path, Diagnostics()) as reader:
         for channel, _, data, *_ in reader.messages([each for each in reader.channels if each.type == INFO]):
             message = vars(reader.types.read(channel, data))
             plain = {key: each.tolist() if hasattr(each, "tolist") else each for key, each in message.items()}
@@ -349,4 +349,4 @@ def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
 
 def _options(file: InputFile) -> Options:
     """Return the options for reading the poses of a file."""
-    return Options(Tally(), Topics(()), answers=getattr(file, "answers", Answers()))
+    return Options(Diagnostics(), Topics(()), answers=getattr(file, "answers", Answers()))

@@ -38,7 +38,17 @@ from frametool.frames import topology
 from frametool.frames.lookups import FrameTree
 from frametool.geometry.representations import EARTH_FRAMES
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Answers, Edge, EdgeColumns, Options, Samples, Tally, Topics, at_other_times, stop
+from frametool.grammar.edges import (
+    Answers,
+    Diagnostics,
+    Edge,
+    EdgeColumns,
+    Options,
+    Samples,
+    Topics,
+    at_other_times,
+    stop,
+)
 from frametool.grammar.names import NAME_KEYS, PARENT_COLUMNS
 from frametool.grammar.readers import alike, more_like_it
 
@@ -87,7 +97,7 @@ class FrameFile(InputFile):
         except BaseException:
             self.close()
             raise
-        self.tally = Tally()
+        self.tally = Diagnostics()
         self.topics = Topics(topics)
         self.answers = answers
 
@@ -169,7 +179,7 @@ class FrameFile(InputFile):
     def tell(self) -> None:
         """Emit the warnings about the file, once it was read."""
         found: dict[str | Finding, list[Finding]] = {}
-        for told in self.tally.told():
+        for told in self.tally.findings():
             found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
         for first, *others in found.values():
             warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)

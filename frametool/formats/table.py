@@ -447,5 +447,5 @@ def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
 
 def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
     """Return which of several formats has the suffix of a file, if any."""
-    told = os.path.splitext(path or "")[1].lower()
-    return next((name for name in names if told in FORMATS[name].suffixes), None)
+    suffix = os.path.splitext(path or "")[1].lower()
+    return next((name for name in names if suffix in FORMATS[name].suffixes), None)

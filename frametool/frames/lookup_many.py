@@ -63,8 +63,8 @@ def as_stamps(at_ns: Any) -> Stamps:
 def _put_back(out: Floats, order: NDArray[np.intp]) -> Floats:
     """Return columns in the order before sorting."""
     back = np.empty_like(out)
-    for given, in_order in zip(back, out, strict=True):
-        given[order] = in_order
+    for target_column, in_order in zip(back, out, strict=True):
+        target_column[order] = in_order
     return back
 
 

@@ -40,9 +40,9 @@ def read_rotations(
     notation: Notation, numbers: Sequence[Array], *, degrees: bool = False, normalize: bool = False
 ) -> Rotations:
     """Return the quaternions of rows of numbers in column order; invalid rows get the identity."""
-    given = tuple(numbers)
-    quaternions = np.empty((4, int(np.prod(arrays.batch_shape(given)))))
-    off, worst = _convert(notation, given, quaternions, degrees=degrees, normalize=normalize)
+    inputs = tuple(numbers)
+    quaternions = np.empty((4, int(np.prod(arrays.batch_shape(inputs)))))
+    off, worst = _convert(notation, inputs, quaternions, degrees=degrees, normalize=normalize)
     if off is None:
         return Rotations(tuple(quaternions), {}, NONE, worst)
     refused = np.flatnonzero(off == np.inf)
@@ -52,7 +52,7 @@ def read_rotations(
 
 
 def require_rotations(
-    notation: Notation, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
+    notation: Notation, inputs: Components, name: str, *, normalize: bool = False, into: Array | None = None
 ) -> Components:
     """Return the quaternions of columns of any shape; warn once about all rows that were normalised.
 
@@ -61,21 +61,21 @@ def require_rotations(
     Raises:
         ValueInvalid: rows are not rotations; names the first one and how many there are.
     """
-    shape = arrays.batch_shape(given)
+    shape = arrays.batch_shape(inputs)
     made = np.empty((4, *shape)) if into is None else into
-    off, _ = _convert(notation, given, made.reshape(4, -1), degrees=False, normalize=normalize)
+    off, _ = _convert(notation, inputs, made.reshape(4, -1), degrees=False, normalize=normalize)
     if off is not None:
-        _refuse_or_warn(notation, given, name, off.reshape(shape), normalize=normalize)
+        _refuse_or_warn(notation, inputs, name, off.reshape(shape), normalize=normalize)
     return tuple(made)
 
 
 def _convert(
-    notation: Notation, given: Components, quaternions: Array, *, degrees: bool, normalize: bool
+    notation: Notation, inputs: Components, quaternions: Array, *, degrees: bool, normalize: bool
 ) -> tuple[Array | None, float]:
     """Fill quaternions (4, n); return the deviation per row (inf: refused; None: nothing to report) and the worst."""
     off, worst = None, 0.0
     with np.errstate(all="ignore"):
-        for place, block in arrays.cut(given, 4):
+        for place, block in arrays.cut(inputs, 4):
             grades, right, furthest = _repaired(notation.representation.batch, block, normalize=normalize)
             worst = max(worst, furthest)
             results = notation.to_quaternion(right, arrays, degrees=degrees)
@@ -126,16 +126,16 @@ def _reason(notation: Notation, row: Sequence[float], normalize: bool) -> str:  
     return "the numbers are not a rotation"
 
 
-def _refuse_or_warn(notation: Notation, given: Components, name: str, off: Array, *, normalize: bool) -> None:
+def _refuse_or_warn(notation: Notation, inputs: Components, name: str, off: Array, *, normalize: bool) -> None:
     """Raise for the first row that is refused; warn once about those that deviate too much to be silent."""
     rule = notation.representation.batch
-    bad, odd = off == np.inf, off > SILENT
+    bad, rough = off == np.inf, off > SILENT
     if bad.any():
         if rule is None:
-            all_finite(given, name)
+            all_finite(inputs, name)
         count = int(bad.sum())
         more = f" ({count} such rows)" if count > 1 else ""
-        raise ValueInvalid(f"{at_first(name, bad)}: {_reason(notation, first_row(given, bad), normalize)}{more}")
-    if rule is not None and odd.any():
-        share = f"{int(odd.sum())} of {odd.size} {rule.what}"
-        warn(f"{name}: {share} are off by up to {off.max():.2g} (first: {at_first(name, odd)}) and were normalised")
+        raise ValueInvalid(f"{at_first(name, bad)}: {_reason(notation, first_row(inputs, bad), normalize)}{more}")
+    if rule is not None and rough.any():
+        share = f"{int(rough.sum())} of {rough.size} {rule.what}"
+        warn(f"{name}: {share} are off by up to {off.max():.2g} (first: {at_first(name, rough)}) and were normalised")

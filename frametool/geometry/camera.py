@@ -481,8 +481,8 @@ class Camera:
         depth: z in optical axes; range: the distance from the camera.  NaN where there is no direction.
         """
         u, v = _columns(pixels, 2, "pixels")
-        given = (("depth", depth), ("range", range))
-        far = {name: validation.as_numbers(each, name) for name, each in given if each is not None}
+        distances = (("depth", depth), ("range", range))
+        far = {name: validation.as_numbers(each, name) for name, each in distances if each is not None}
         if len(far) > 1:
             raise ValueInvalid("unproject takes depth or range, not both")
         return validation.stacked(self.points_of(u, v, **far) if far else self.rays_of(u, v))

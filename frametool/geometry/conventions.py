@@ -183,9 +183,9 @@ def both_sides(world: str | None, axes: str | None) -> tuple[Rotation | None, bo
     left = identity if world is None else named_change(world, of_world=True)
     right = identity if axes is None else named_change(axes)
     if left.mirrors != right.mirrors:
-        told = world if left.mirrors else axes
+        mirror = world if left.mirrors else axes
         raise ValueInvalid(
-            f"{told} is a mirror, which on one side leaves no rotation; give both: --all-axes unity_from_ros is "
+            f"{mirror} is a mirror, which on one side leaves no rotation; give both: --all-axes unity_from_ros is "
             "--world-axes unity_from_ros --axes ros_from_unity"
         )
     if world and axes and left.mirrors and "," not in world + axes:

@@ -54,17 +54,17 @@ def lla(x: N, y: N, z: N, xp: Functions[N]) -> Three[N]:
     Source: Fukushima 2006, Halley's method on the sine and cosine of the reduced latitude; three steps suffice.
     """
     squared = x * x + y * y
-    beside = xp.sqrt(squared)
-    run, rise = xp.maximum(beside / A, 1e-18), (EC / A) * z
+    axial = xp.sqrt(squared)
+    run, rise = xp.maximum(axial / A, 1e-18), (EC / A) * z
     sine, cosine = rise, EC * run
     for step in range(STEPS):
         if step:
             sine, cosine = _unit(sine, cosine, xp)
         sine, cosine = _halley(run, rise, sine, cosine, xp)
     sine, cosine = _unit(sine, EC * cosine, xp)
-    alt = beside * cosine + z * sine - A * xp.sqrt(1.0 - E2 * sine * sine)
+    alt = axial * cosine + z * sine - A * xp.sqrt(1.0 - E2 * sine * sine)
     alt = with_latitude(x, y, z, alt, xp)
-    lon = bearing(y + 0.0, x + 0.0, xp.maximum(beside, TINY), xp) * RADIAN
+    lon = bearing(y + 0.0, x + 0.0, xp.maximum(axial, TINY), xp) * RADIAN
     return incline(sine, cosine, xp) * RADIAN + 0.0, eastward(lon, xp), alt + 0.0
 
 

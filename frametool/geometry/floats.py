@@ -79,8 +79,8 @@ def half_sincos_deg(angle: N, xp: Functions[N]) -> Two[N]:
     if not xp.some(turns != 0.0):
         return sine, cosine
     turns -= 4.0 * nearest(0.25 * turns)
-    odd, back = abs(turns) == 1.0, (turns == -1.0) | (abs(turns) == 2.0)
-    sine, cosine = xp.where(odd, cosine, sine), xp.where(odd, 0.0 - sine, cosine)
+    swapped, back = abs(turns) == 1.0, (turns == -1.0) | (abs(turns) == 2.0)
+    sine, cosine = xp.where(swapped, cosine, sine), xp.where(swapped, 0.0 - sine, cosine)
     return xp.where(back, 0.0 - sine, sine), xp.where(back, 0.0 - cosine, cosine)
 
 

@@ -32,8 +32,8 @@ def compose(a: Components, b: Components) -> Components:
         return (*rigid.compose(*first, s1 * x, s1 * y, s1 * z, *second[3:]), s1 * s2)
     from frametool.geometry import uncertainty
 
-    beside = uncertainty.propagate_compose(first, covariance_of(a), second, covariance_of(b))
-    return (*rigid.compose(*first, *second), *(beside or ()))
+    entries = uncertainty.propagate_compose(first, covariance_of(a), second, covariance_of(b))
+    return (*rigid.compose(*first, *second), *(entries or ()))
 
 
 def inverse(a: Components) -> Components:
@@ -62,8 +62,8 @@ def relative(a: Components, b: Components) -> Components:
 
     of_a = covariance_of(a)
     of_back = of_a and uncertainty.propagate_inverse(first, of_a)
-    beside = uncertainty.propagate_compose(rigid.inverse(*first), of_back, second, covariance_of(b))
-    return (*pose, *(beside or ()))
+    entries = uncertainty.propagate_compose(rigid.inverse(*first), of_back, second, covariance_of(b))
+    return (*pose, *(entries or ()))
 
 
 def pose_of(a: Components) -> Rigid:

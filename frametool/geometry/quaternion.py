@@ -141,10 +141,10 @@ def toward(
     half_arc = incline(apart, along, xp)  # 0 between equal ends, which are then unchanged at every fraction
     apart = xp.maximum(apart, TINY)
     sign = xp.copysign(1.0, ax * bx + ay * by + az * bz + aw * bw + 0.0)
-    ahead, beside = 0.5 / (apart * along), apart / along
+    ahead, back = 0.5 / (apart * along), apart / along
     return (
-        ahead * (sign * bx - ax) + beside * ax, ahead * (sign * by - ay) + beside * ay,
-        ahead * (sign * bz - az) + beside * az, ahead * (sign * bw - aw) + beside * aw, half_arc,
+        ahead * (sign * bx - ax) + back * ax, ahead * (sign * by - ay) + back * ay,
+        ahead * (sign * bz - az) + back * az, ahead * (sign * bw - aw) + back * aw, half_arc,
     )  # fmt: skip
 
 
@@ -341,9 +341,9 @@ def direction(x: N, y: N, z: N, xp: Functions[N]) -> Four[N]:
 def magnitude(x: N, y: N, z: N, xp: Functions[N]) -> N:
     """Return the length of any vector; only squares out of range take the slower path."""
     squared = x * x + y * y + z * z
-    odd = (squared < 1e-280) | (squared > 1e300)
+    extreme = (squared < 1e-280) | (squared > 1e300)
     plain = xp.sqrt(squared)
-    return xp.where(odd, direction(x, y, z, xp)[3], plain) if xp.some(odd) else plain
+    return xp.where(extreme, direction(x, y, z, xp)[3], plain) if xp.some(extreme) else plain
 
 
 def _scaled(x: N, y: N, z: N, xp: Functions[N]) -> tuple[N, N, N, Any]:

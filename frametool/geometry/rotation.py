@@ -187,8 +187,8 @@ class Rotation(Batched):
     @classmethod
     def from_axis_angle(cls, axis: Numbers, angle: Numbers) -> Rotation:
         """Create from axes of shape (..., 3), non-zero, and angles in radians of shape (...); they broadcast."""
-        given = (*validation.columns(axis, 3, "axis"), validation.scalars(angle, "angle"))
-        return cls.from_columns("axis_angle", given, "axis")
+        inputs = (*validation.columns(axis, 3, "axis"), validation.scalars(angle, "angle"))
+        return cls.from_columns("axis_angle", inputs, "axis")
 
     @classmethod
     def from_euler(cls, axes: str, angles: Numbers) -> Rotation:
@@ -222,15 +222,15 @@ class Rotation(Batched):
 
     @classmethod
     def from_columns(
-        cls, spec: str, given: Components, name: str, *, normalize: bool = False, into: Array | None = None
+        cls, spec: str, inputs: Components, name: str, *, normalize: bool = False, into: Array | None = None
     ) -> Rotation:
         """Check and convert the columns of a notation; errors call them `name`, `into` receives the result of many."""
         rep = _notation(spec)
-        if validation.single(given):
-            return cls.of(*rep.checked_quaternion(given, floats, normalize=normalize))
+        if validation.single(inputs):
+            return cls.of(*rep.checked_quaternion(inputs, floats, normalize=normalize))
         from frametool.geometry.batch_validation import require_rotations
 
-        return cls._of_columns(require_rotations(rep, given, name, normalize=normalize, into=into))
+        return cls._of_columns(require_rotations(rep, inputs, name, normalize=normalize, into=into))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""
@@ -303,9 +303,9 @@ class Rotation(Batched):
 
     def apply(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Rotate vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
-        given = validation.columns(vectors, 3, "vectors")
+        inputs = validation.columns(vectors, 3, "vectors")
         parts = self._components
-        return validation.moved(quaternion.rotate, parts, given, "vectors", flatten=quaternion.to_matrix, out=out)
+        return validation.moved(quaternion.rotate, parts, inputs, "vectors", flatten=quaternion.to_matrix, out=out)
 
     def angle(self) -> Any:
         """Return the angle of rotation in [0, pi] radians."""

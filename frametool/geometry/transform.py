@@ -80,8 +80,8 @@ class Transform(Batched):
             raise ValueInvalid("xyz: the position comes first, the rotation by its name: from_parts(xyz, rotation=..)")
         if len(rotation) > 1:
             raise ValueInvalid(f"from_parts takes one rotation beside xyz, not {' and '.join(rotation)}")
-        (name, given), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
-        turn = given if name == "rotation" else Rotation.from_notation(name, given, normalize=normalize)
+        (name, inputs), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
+        turn = inputs if name == "rotation" else Rotation.from_notation(name, inputs, normalize=normalize)
         shift = validation.columns(xyz, 3, "xyz")
         return cls._of_columns(validation.joined((*shift, *require(turn, "rotation").components), "xyz"))
 
@@ -129,8 +129,8 @@ class Transform(Batched):
 
         Linear part first, as in ROS messages: metres, then radians.
         """
-        given = validation.columns(twist, 6, "twist")
-        return cls._of_columns(validation.checked(rigid.exp, 7, given, "twist", rigid.check_twist))
+        inputs = validation.columns(twist, 6, "twist")
+        return cls._of_columns(validation.checked(rigid.exp, 7, inputs, "twist", rigid.check_twist))
 
     @property
     def xyz(self) -> Array:
@@ -178,8 +178,8 @@ class Transform(Batched):
 
     def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
         """Transform points of shape (..., 3); transforms and points broadcast over the leading axes."""
-        given = validation.columns(points, 3, "points")
-        return validation.moved(rigid.apply, self._components, given, "points", flatten=rigid.to_matrix, out=out)
+        inputs = validation.columns(points, 3, "points")
+        return validation.moved(rigid.apply, self._components, inputs, "points", flatten=rigid.to_matrix, out=out)
 
     def apply_vector(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Rotate vectors of shape (..., 3): directions and velocities, which are not translated."""
@@ -187,13 +187,13 @@ class Transform(Batched):
 
     def apply_twist(self, twists: Numbers, *, out: Array | None = None) -> Array:
         """Transform twists (vx, vy, vz, wx, wy, wz), shape (..., 6): of the same body, at the target's origin."""
-        given = validation.columns(twists, 6, "twists")
-        return validation.moved(rigid.move_twist, self._components, given, "twists", out=out)
+        inputs = validation.columns(twists, 6, "twists")
+        return validation.moved(rigid.move_twist, self._components, inputs, "twists", out=out)
 
     def apply_wrench(self, wrenches: Numbers, *, out: Array | None = None) -> Array:
         """Transform wrenches (fx, fy, fz, mx, my, mz), shape (..., 6), in N and Nm, to the target's origin."""
-        given = validation.columns(wrenches, 6, "wrenches")
-        return validation.moved(rigid.move_wrench, self._components, given, "wrenches", out=out)
+        inputs = validation.columns(wrenches, 6, "wrenches")
+        return validation.moved(rigid.move_wrench, self._components, inputs, "wrenches", out=out)
 
     def interpolate(self, other: Transform, fraction: Numbers) -> Transform:
         """Interpolate: translation linearly, rotation by slerp; fractions 0 and 1 return the ends exactly.

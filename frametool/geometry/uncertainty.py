@@ -63,7 +63,7 @@ def propagate_inverse(pose: Rigid, entries: Entries) -> Components:
     back = quaternion.conjugate(*rotation)
     crossed = [quaternion.rotate(*back, *each) for each in ((x - x, z, -y), (-z, x - x, x), (y, -x, x - x))]
     rows = _rows(*back)
-    upper = [row + list(beside) for row, beside in zip(rows, zip(*crossed, strict=True), strict=True)]
+    upper = [row + list(block) for row, block in zip(rows, zip(*crossed, strict=True), strict=True)]
     return propagate(upper + [[0.0] * 3 + row for row in rows], entries)
 
 
@@ -121,9 +121,9 @@ def symmetric(entries: Entries) -> Components:
 # --- checks: is it a covariance, and is it small enough for the first order? ---
 
 
-def taken(given: Any, size: int = POSE) -> Components:
+def taken(numbers: Any, size: int = POSE) -> Components:
     """Check a covariance passed from Python, numbers or rows of them, and return its entries."""
-    rows, side = given.tolist() if hasattr(given, "tolist") else given, round(size**0.5)
+    rows, side = numbers.tolist() if hasattr(numbers, "tolist") else numbers, round(size**0.5)
     try:
         listed = [row if hasattr(row, "__iter__") else (row,) for row in rows]
         entries = tuple(float(entry) for row in listed for entry in row)
@@ -202,5 +202,5 @@ def doubt(entries: Sequence[float]) -> str:
 
 def warn_if_wide(found: Iterable[Sequence[float]]) -> None:
     """Warn once if a rotation is so uncertain that the first order is off by a few per cent."""
-    if told := doubt(max(found, key=widest_turn, default=())):
-        warn(told, rule=WIDE_RULE)
+    if message := doubt(max(found, key=widest_turn, default=())):
+        warn(message, rule=WIDE_RULE)

@@ -134,28 +134,28 @@ def shown_row(columns: Components, bad: Any) -> str:
     return " ".join(f"{value:g}" for value in first_row(columns, bad))
 
 
-def joined(given: Components, name: str) -> Components:
+def joined(inputs: Components, name: str) -> Components:
     """Broadcast components to one kind and shape, the first three finite; nothing is shared with the caller."""
-    if single(given):
-        return given
+    if single(inputs):
+        return inputs
     import numpy as np
 
     from frametool.geometry import arrays
 
-    out = np.empty((len(given), *arrays.batch_shape(given)))
-    for target, part in zip(out[3:], given[3:], strict=True):
+    out = np.empty((len(inputs), *arrays.batch_shape(inputs)))
+    for target, part in zip(out[3:], inputs[3:], strict=True):
         target[...] = part
-    copy_finite(given[:3], out[:3], name)
+    copy_finite(inputs[:3], out[:3], name)
     return tuple(out)
 
 
-def copy_finite(given: Components, out: Array, name: str) -> None:
+def copy_finite(inputs: Components, out: Array, name: str) -> None:
     """Copy columns into others, to which they broadcast; raise ValueInvalid for the first row that is not finite."""
     import numpy as np
 
     from frametool.geometry import arrays
 
-    columns = tuple(np.broadcast_to(part, out.shape[1:]) if np.shape(part) != out.shape[1:] else part for part in given)
+    columns = tuple(np.broadcast_to(one, out.shape[1:]) if np.shape(one) != out.shape[1:] else one for one in inputs)
     flat = out.reshape(len(columns), -1)
     for place, block in arrays.cut(columns, len(columns)):
         for target, part in zip(flat, block, strict=True):
@@ -203,83 +203,83 @@ def weights(value: Numbers, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def checked(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Components:
+def checked(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> Components:
     """Run a kernel that not every finite input suits; `check` validates one item, and the first row that fails."""
-    if single(given):
-        check(*given)
-        return kernel(*given, floats)
+    if single(inputs):
+        check(*inputs)
+        return kernel(*inputs, floats)
     from frametool.geometry import arrays
 
-    return arrays.run(watched(kernel, count, given, name, check), count, given, arrays)
+    return arrays.run(watched(kernel, count, inputs, name, check), count, inputs, arrays)
 
 
-def watched(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> Kernel:
+def watched(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> Kernel:
     """Return the kernel for arrays in which `check` reports the first row that fails."""
     from frametool.geometry import arrays
 
-    return arrays.guarded(kernel, lambda: _recheck(kernel, count, given, name, check))
+    return arrays.guarded(kernel, lambda: _recheck(kernel, count, inputs, name, check))
 
 
-def _recheck(kernel: Kernel, count: int, given: Components, name: str, check: Callable[..., object]) -> None:
+def _recheck(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> None:
     """Find the first row for which a kernel failed and report the reason."""
     import numpy as np
 
     from frametool.geometry import arrays
 
-    all_finite(given, name)
-    bad = ~np.logical_and.reduce([np.isfinite(part) for part in arrays.run(kernel, count, given, arrays)])
+    all_finite(inputs, name)
+    bad = ~np.logical_and.reduce([np.isfinite(part) for part in arrays.run(kernel, count, inputs, arrays)])
     if bad.any():
         try:
-            check(*first_row(given, bad))
+            check(*first_row(inputs, bad))
         except ValueInvalid as error:
             raise ValueInvalid(f"{at_first(name, bad)}: {error}") from None
 
 
-def run(kernel: Kernel, count: int, given: Components, *, functions: bool = True) -> Components:
+def run(kernel: Kernel, count: int, inputs: Components, *, functions: bool = True) -> Components:
     """Run a kernel on trusted components; a kernel of arithmetic alone takes no namespace of functions."""
-    if single(given):
-        return kernel(*given, floats) if functions else kernel(*given)
+    if single(inputs):
+        return kernel(*inputs, floats) if functions else kernel(*inputs)
     from frametool.geometry import arrays
 
-    return arrays.run(kernel, count, given, arrays) if functions else arrays.run(kernel, count, given)
+    return arrays.run(kernel, count, inputs, arrays) if functions else arrays.run(kernel, count, inputs)
 
 
-def number(kernel: Callable[..., Any], given: Components) -> Any:
+def number(kernel: Callable[..., Any], inputs: Components) -> Any:
     """Run a kernel that returns one number."""
-    return run(lambda *parts: (kernel(*parts),), 1, given)[0]
+    return run(lambda *parts: (kernel(*parts),), 1, inputs)[0]
 
 
 def rows(
-    kernel: Kernel, inner: tuple[int, ...], given: Components, *args: object, out: Array | None = None
+    kernel: Kernel, inner: tuple[int, ...], inputs: Components, *args: object, out: Array | None = None
 ) -> Array:
     """Run a kernel that needs functions; return its components as rows (..., *inner), in `out` if passed."""
-    if single(given):
-        return _one_row(kernel(*given, *args, floats), inner, out)
+    if single(inputs):
+        return _one_row(kernel(*inputs, *args, floats), inner, out)
     from frametool.geometry import arrays
 
-    return arrays.rows(kernel, inner, given, *args, arrays, out=out)
+    return arrays.rows(kernel, inner, inputs, *args, arrays, out=out)
 
 
 def moved(
-    kernel: Kernel, mover: Components, given: Components, name: str, *,
+    kernel: Kernel, mover: Components, inputs: Components, name: str, *,
     flatten: Kernel | None = None, out: Array | None = None,
 ) -> Array:  # fmt: skip
     """Transform vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster.
 
     Vectors that are overwritten are checked first: if one is not finite, all are unchanged.
     """
-    inner = (len(given),)
-    if single(given) and single(mover):
-        return _one_row(kernel(*mover, *given), inner, out)
+    inner = (len(inputs),)
+    if single(inputs) and single(mover):
+        return _one_row(kernel(*mover, *inputs), inner, out)
     from frametool.geometry import arrays
 
-    parts = (*mover, *given)
+    parts = (*mover, *inputs)
     if flatten and single(mover):
-        kernel, parts = _matrix_kernel(flatten(*mover)), given
-    if out is None or not arrays.shares_memory(out, given):
-        kernel = arrays.guarded(kernel, lambda: all_finite(given, name))
-    elif not arrays.finite_throughout(given):
-        all_finite(given, name)
+        kernel, parts = _matrix_kernel(flatten(*mover)), inputs
+    if out is None or not arrays.shares_memory(out, inputs):
+        kernel = arrays.guarded(kernel, lambda: all_finite(inputs, name))
+    elif not arrays.finite_throughout(inputs):
+        all_finite(inputs, name)
     return arrays.rows(kernel, inner, parts, out=out)
 
 

@@ -120,7 +120,7 @@ class Names(dict[str, str]):
         return name[1:]
 
 
-class Tally:
+class Diagnostics:
     """Diagnostics about a file: collected while it is read, emitted at the end."""
 
     __slots__ = (
@@ -166,7 +166,7 @@ class Tally:
         """Record a message about one line, even if the same was recorded for other lines."""
         self.notes.setdefault(f"{line}: {message}", Finding(rule, message, line=line))
 
-    def told(self) -> Iterator[Finding]:
+    def findings(self) -> Iterator[Finding]:
         """Yield one finding for each kind of problem."""
         if self.rough:
             count = "a quaternion was" if len(self.rough) == 1 else f"{len(self.rough)} quaternions were"
@@ -202,7 +202,7 @@ class Topics:
         self.counts: dict[str, int] = {}
         self.seen: set[str] = set()  # topics, also those without transforms
         self._first: dict[str, str] = {}  # child -> the first topic that published it
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
 
     def takes(self, topic: str) -> bool:
         """Count a transform; return True if its topic is read."""
@@ -220,10 +220,10 @@ class Topics:
 
     def conflict(self, topic: str, child: str) -> str:
         """Return an error if a frame comes from two namespaces, as with two robots; once for each frame."""
-        if self.agrees(topic, child) or (child, topic) in self._told:
+        if self.agrees(topic, child) or (child, topic) in self._reported:
             return ""
         first = self._first[child]
-        self._told.add((child, topic))
+        self._reported.add((child, topic))
         return f"frame {child!r} comes by {first} and by {topic}; choose with --topic {first} or --topic {topic}"
 
     def missing(self) -> str:
@@ -267,8 +267,8 @@ class Answers(NamedTuple):
 
     def names(self, *defaults: str) -> tuple[str, ...]:
         """Return the names of a format's frames: those of the option, then the format's defaults."""
-        told = (name[is_slashed(name) :] for name in self.frames[: len(defaults)])
-        return (*told, *defaults[len(self.frames) :])
+        renamed = (name[is_slashed(name) :] for name in self.frames[: len(defaults)])
+        return (*renamed, *defaults[len(self.frames) :])
 
 
 class Options(NamedTuple):
@@ -281,7 +281,7 @@ class Options(NamedTuple):
     answers: options for what the format does not specify
     """
 
-    tally: Tally
+    tally: Diagnostics
     topics: Topics
     report: Report = stop
     normalize: bool = False

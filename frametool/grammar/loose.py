@@ -86,17 +86,17 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
         places[yaw, "yaw"] = places[angle, "angle"]
     for key, parts, least in (("rpy", ("roll", "pitch", "yaw"), {"yaw"}), ("quaternion", "xyzw", set())):
         for spelled in (key, f"{key}_deg", f"{key}_rad"):
-            given = found.get(spelled)
-            if type(given) is dict and given.keys() != {*parts} and given.keys() != least:
-                missing = ", ".join(part for part in parts if part not in given)
-                raise Misfit(f"half a rotation: missing {missing} beside {', '.join(given)}")
+            present = found.get(spelled)
+            if type(present) is dict and present.keys() != {*parts} and present.keys() != least:
+                missing = ", ".join(part for part in parts if part not in present)
+                raise Misfit(f"half a rotation: missing {missing} beside {', '.join(present)}")
     return found
 
 
-def _put(found: dict[str, Any], key: str, value: Any, given: str) -> None:
+def _put(found: dict[str, Any], key: str, value: Any, present: str) -> None:
     """Store a value; raises Misfit for a second position, or for a duplicate."""
     if key in found:
-        raise Misfit(f"{bare(given)} says again what stands beside it; keep one", (given,), key=True)
+        raise Misfit(f"{bare(present)} says again what stands beside it; keep one", (present,), key=True)
     found[key] = value
 
 

@@ -176,12 +176,12 @@ _MOVED = "t|p|T|trans|translation|tvec"
 _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|np\.|array|Rot|{NUMBER})")
 
 
-def named_values(text: str, given: Notation | None = None) -> list[Any] | None:
+def named_values(text: str, default: Notation | None = None) -> list[Any] | None:
     """Return the values of a print of objects, as documents have them; None for any other text.
 
     Raises ValueInvalid for a known print that cannot be read.
     """
-    robots = [_robot(line, given) for line in text.strip().splitlines() if line.strip()]
+    robots = [_robot(line, default) for line in text.strip().splitlines() if line.strip()]
     if robots and None not in robots:
         return [*robots]
     for read in (_algebra, _scalar_first, _members, _lists, _euler, _one_line, _parts):
@@ -194,11 +194,11 @@ ABB = r"\[\s*\[([^\[\]]*)\]\s*,\s*\[([^\[\]]*)\]\s*((?:,\s*\[[^\[\]]*\]\s*){2})?
 _DECLARED = r"(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(?:robtarget|pose)\s+\w+\s*:=\s*"
 
 
-def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
+def _robot(text: str, default: Notation | None) -> dict[str, Any] | None:
     """Read `p[x, y, z, rx, ry, rz]` of Universal Robots, and ABB's [[x, y, z], [q1, q2, q3, q4], ..].
 
     The first has metres and a rotation vector in radians, the second millimetres and w first; a robtarget also has the
-    robot's configuration and external axes, which are not part of the pose.  given: the notation of the numbers
+    robot's configuration and external axes, which are not part of the pose.  default: the notation of the numbers
     Raises ValueInvalid for p[..] with another number of values, and for ABB's two lists alone.
     """
     bare = re.sub(rf"\A(?:{LABEL})?(?={_UR}\[)|\A{_DECLARED}", "", text.strip().rstrip(";").strip())
@@ -207,14 +207,14 @@ def _robot(text: str, given: Notation | None) -> dict[str, Any] | None:
         if len(cells) != 6:
             raise ValueInvalid(f"p[..] of Universal Robots has six numbers (x, y, z, rx, ry, rz); found {len(cells)}")
         return {"xyz": cells[:3], "rotvec_rad": cells[3:]}
-    if (found := re.fullmatch(ABB, bare)) is None or (given is not None and not found[3]):
+    if (found := re.fullmatch(ABB, bare)) is None or (default is not None and not found[3]):
         return None
     xyz, turn = ([cell.strip() for cell in found[at].split(",")] for at in (1, 2))
     if (len(xyz), len(turn)) != (3, 4):
         return None
     if not found[3] and ":=" not in text:
-        told = "{xyz: [..], wxyz: [..]}, of ABB {xyz_mm: [..], wxyz: [..]}, or give --from xyzw or wxyz"
-        raise ValueInvalid(f"two lists state neither unit nor order; write {told}")
+        stated = "{xyz: [..], wxyz: [..]}, of ABB {xyz_mm: [..], wxyz: [..]}, or give --from xyzw or wxyz"
+        raise ValueInvalid(f"two lists state neither unit nor order; write {stated}")
     return {"xyz_mm": xyz, "wxyz": turn}
 
 
@@ -241,8 +241,8 @@ def _algebra(text: str) -> dict[str, Any] | None:
 
 def _scalar_first(text: str) -> dict[str, Any] | None:
     """Read `w << x, y, z >>`, and four numbers after `(x,y,z,w) =`."""
-    if told := re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text):
-        rows = number_rows(text[told.end() :])
+    if stated := re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text):
+        rows = number_rows(text[stated.end() :])
         return {"xyzw": rows[0]} if rows and len(rows) == 1 and len(rows[0]) == 4 else None
     found = re.fullmatch(_SCALAR_FIRST, text)
     return None if found is None else {"wxyz": [found[1], *found.groups()[2:]]}
@@ -356,37 +356,37 @@ def _origin(attributes: str) -> dict[str, Any]:
     return value
 
 
-def pasted_poses(text: str, given: Notation | None = None) -> list[Any] | None:
+def pasted_poses(text: str, default: Notation | None = None) -> list[Any] | None:
     """Return the values of a pasted text, as documents have them; None for any other text.
 
-    given: the notation of numbers that do not state theirs.
+    default: the notation of numbers that do not state theirs.
     Raises ValueInvalid for a known print that cannot be read.
     """
-    if (found := named_values(text, given)) is not None:
+    if (found := named_values(text, default)) is not None:
         return found
-    rows = number_rows(text, any_text=given is not None)
-    return None if rows is None else _meant(rows, given)
+    rows = number_rows(text, any_text=default is not None)
+    return None if rows is None else _meant(rows, default)
 
 
-def _meant(rows: Rows, given: Notation | None) -> list[Any]:
+def _meant(rows: Rows, default: Notation | None) -> list[Any]:
     """Convert rows to values; bare lists if nothing states their notation."""
-    rep = given or notation("matrix")
+    rep = default or notation("matrix")
     if rep.representation.whole:
-        if (value := matrix_pose(rows, rep, told=given is not None)) is not None:
+        if (value := matrix_pose(rows, rep, stated=default is not None)) is not None:
             return [value]
     elif (found := _spelled_rows(rows, rep)) is not None:
         return found
-    if given is not None:
+    if default is not None:
         counts = " and ".join(map(str, dict.fromkeys(map(len, rows))))
         several = f"{len(rows)} rows of " * (len(rows) > 1)
         raise ValueInvalid(f"{rep.counted}; found {several}{counts}")
     return [rows[0] if len(rows) == 1 else rows]
 
 
-def matrix_pose(rows: Rows, rep: Notation, *, told: bool = False) -> dict[str, Any] | None:
+def matrix_pose(rows: Rows, rep: Notation, *, stated: bool = False) -> dict[str, Any] | None:
     """Return a 3x3, a 3x4 or a 4x4 matrix, or its numbers row by row, as a mapping; None for another size.
 
-    told: the user stated `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
+    stated: the user stated `matrix`; then 12 numbers in one row may also be x y z and nine numbers.
     """
     key = rep.spec
     sizes = {len(row) for row in rows}
@@ -400,7 +400,7 @@ def matrix_pose(rows: Rows, rep: Notation, *, told: bool = False) -> dict[str, A
         return {key: [cells[at : at + size] for at in range(0, len(cells), size)]}
     as_rows = cells[3::4], [cells[at : at + 3] for at in (0, 4, 8)]
     behind = cells[:3], [cells[at : at + 3] for at in (3, 6, 9)]
-    fitting = [each for each in (behind, as_rows) if is_rotation(each[1])] if told and len(rows) == 1 else [as_rows]
+    fitting = [each for each in (behind, as_rows) if is_rotation(each[1])] if stated and len(rows) == 1 else [as_rows]
     if len(fitting) > 1:
         hint = "write {xyz: [..], matrix: [..]}"
         raise ValueInvalid(f"12 numbers may be x y z and a matrix, or the rows of a 3x4 pose; {hint}")
@@ -447,7 +447,7 @@ def _entry(cells: Sequence[str], rep: Notation) -> dict[str, Any]:
     return {"xyz": list(cells[:-size]), **entry} if len(cells) > size else entry
 
 
-def begins_freely(head: str, given: Notation | None, *, moves: bool, alone: bool) -> bool | None:
+def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bool) -> bool | None:
     """Return True if a text begins with a pasted print, False for a stream of rows or records, None if undecided.
 
     moves: the rows are points
@@ -456,7 +456,7 @@ def begins_freely(head: str, given: Notation | None, *, moves: bool, alone: bool
     lines = [line.strip() for line in head.splitlines() if line.strip()]
     first = lines[0]
     if first[0] in "[({" and re.match(r"[\[\s]*[-+.\d]\S*\s*,", first):
-        return not moves and (given is not None or _is_long(head) or bool(re.search(_NO_JSON, head)))
+        return not moves and (default is not None or _is_long(head) or bool(re.search(_NO_JSON, head)))
     cells = first.split()
     if not all(re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", cell) for cell in cells):
         return True
@@ -464,9 +464,9 @@ def begins_freely(head: str, given: Notation | None, *, moves: bool, alone: bool
         return False
     if _is_counted([line.split() for line in lines[:2]]):
         return True
-    matrix = given is None or given.representation.whole is not None
+    matrix = default is None or default.representation.whole is not None
     if (len(cells), len(lines)) == (3, 3) and matrix:
-        return given is not None or alone or (None if is_rotation([line.split() for line in lines]) else False)
+        return default is not None or alone or (None if is_rotation([line.split() for line in lines]) else False)
     if matrix:
         return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file with one pose
     return len(cells) == 1 and len(lines) > 1

@@ -89,9 +89,9 @@ class Pose(NamedTuple):
     @classmethod
     def of(cls, components: Sequence[float], name: str | None = None, parent: str | None = None) -> Pose:
         """Return a pose of tx, ty, tz, x, y, z, w, and of its covariance or scale as in `placed`."""
-        tx, ty, tz, x, y, z, w, *beside = components
-        covariance = tuple(beside) if len(beside) > 1 else None
-        return cls((tx, ty, tz), (x, y, z, w), name, parent, None, covariance, beside[0] if len(beside) == 1 else 1.0)
+        tx, ty, tz, x, y, z, w, *extras = components
+        covariance = tuple(extras) if len(extras) > 1 else None
+        return cls((tx, ty, tz), (x, y, z, w), name, parent, None, covariance, extras[0] if len(extras) == 1 else 1.0)
 
     @property
     def components(self) -> Rigid:
@@ -263,8 +263,8 @@ def length_reader(parts: float) -> Callable[[Any], float]:
     return read
 
 
-def _only_position(given: Vector | None, moved: Vector) -> Vector:
-    if given is not None:
+def _only_position(default: Vector | None, moved: Vector) -> Vector:
+    if default is not None:
         raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation")
     return moved
 
@@ -309,17 +309,17 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
 _ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 
 
-def pose_of_numbers(texts: Sequence[str], given: Notation | None, reading: Reading) -> Pose:
+def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Reading) -> Pose:
     """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
 
     Raises NotARotation for an invalid rotation, ValueInvalid for a list that is not such numbers.
     """
-    rep = _notation_of(texts, given)
+    rep = _notation_of(texts, default)
     whole, size = rep.representation.whole, len(rep.representation.columns)
     if whole and len(texts) == _ROWS_OF_A_POSE:
         from frametool.grammar.pasted import matrix_pose
 
-        return read_pose(matrix_pose([list(texts)], rep, told=given is not None) or {}, reading)
+        return read_pose(matrix_pose([list(texts)], rep, stated=default is not None) or {}, reading)
     if whole and len(texts) == len(whole.columns):
         return Pose(*read_spelled(rep, texts, INDICES, reading))
     if len(texts) not in rep.counts:
@@ -329,12 +329,12 @@ def pose_of_numbers(texts: Sequence[str], given: Notation | None, reading: Readi
     return Pose((x, y, z) if len(texts) > size else None, rotation)
 
 
-def mapping_of_numbers(texts: Sequence[str], given: Notation | None) -> str:
+def mapping_of_numbers(texts: Sequence[str], default: Notation | None) -> str:
     """Return the mapping with the same meaning as bare numbers that `pose_of_numbers` has read."""
     from frametool.documents.json import dump
     from frametool.documents.source import Verbatim
 
-    rep = _notation_of(texts, given)
+    rep = _notation_of(texts, default)
     whole = rep.representation.whole
     size = len(texts) if whole and len(texts) == len(whole.columns) else len(rep.representation.columns)
     unit = "" if rep.degrees is None else "_deg" if rep.degrees else "_rad"
@@ -344,10 +344,10 @@ def mapping_of_numbers(texts: Sequence[str], given: Notation | None) -> str:
     return dump(mapping)
 
 
-def _notation_of(texts: Sequence[str], given: Notation | None) -> Notation:
+def _notation_of(texts: Sequence[str], default: Notation | None) -> Notation:
     """Return the notation of bare numbers; only a matrix is known by their number."""
-    if given is not None:
-        return given
+    if default is not None:
+        return default
     if len(texts) in (9, _ROWS_OF_A_POSE, 16):
         return notation("matrix")
     choices = ", ".join(REPRESENTATIONS)

@@ -231,7 +231,7 @@ class Lookups:
     def many(self, target: str, source: str, times_ns: Any) -> Components:
         """Return the same at times, as columns; nan where there are no data."""
         found = self.tree.lookup_many(target, source, times_ns, missing="nan").components
-        return self._beside(found, target, source, times_ns) if self.carried else found
+        return self._with_covariance(found, target, source, times_ns) if self.carried else found
 
     def noted(self, result: Result) -> Result:
         """Take a result of a lookup in."""
@@ -247,7 +247,7 @@ class Lookups:
                 self.widest, self.width = each, width
         return result
 
-    def _beside(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
+    def _with_covariance(self, poses: Components, target: str, source: str, times_ns: Any) -> Components:
         """Return columns of poses with those of their covariance."""
         import numpy as np
 

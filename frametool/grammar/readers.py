@@ -119,9 +119,9 @@ def tell(source: Source, notes: list[Finding], most: int = 10) -> None:
     for note in notes:
         firsts.setdefault(alike(note), note)
     counts = Counter(map(alike, notes))
-    told = list(firsts.values())[: most + (len(firsts) == most + 1)]
-    places = locate_many(source.text, [note.path for note in told])
-    for (line, column), note in zip(places, told, strict=True):
+    shown_notes = list(firsts.values())[: most + (len(firsts) == most + 1)]
+    places = locate_many(source.text, [note.path for note in shown_notes])
+    for (line, column), note in zip(places, shown_notes, strict=True):
         place = ":".join(map(str, (source.name, *(() if isinstance(source, Pasted) else source.place(line, column)))))
         warn(f"{place}: {note.message}{more_like_it(counts.pop(alike(note)))}", rule=note.rule)
     if counts:

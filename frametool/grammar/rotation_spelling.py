@@ -179,12 +179,12 @@ def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path]
 def _checked(notation: Notation, numbers: Sequence[float], reading: Reading, *, degrees: bool = False) -> Quaternion:
     """Return the quaternion of numbers that are a rotation; record warnings."""
     try:
-        rotation, odd = overheard(
+        rotation, warnings = overheard(
             notation.checked_quaternion, numbers, floats, degrees=degrees, normalize=reading.normalize
         )
     except ValueInvalid as error:
         raise NotARotation(str(error), rule=error.rule) from None
-    for rule, message in odd:
+    for rule, message in warnings:
         reading.note(message, rule=rule)
     return rotation
 
@@ -259,10 +259,10 @@ def _unit_for(unit: str | None, text: str, notation: Notation) -> str | None:
 
 def _one_unit(numbers: list[float], angles: Sequence[int], units: Sequence[str | None], bare: str) -> bool:
     """Convert the angles of one rotation to one unit, in place: degrees if all non-zero ones have it, else radians."""
-    given = [unit or bare for unit in units]
-    if all(unit == "deg" or numbers[index] == 0.0 for index, unit in zip(angles, given, strict=True)):
+    own_units = [unit or bare for unit in units]
+    if all(unit == "deg" or numbers[index] == 0.0 for index, unit in zip(angles, own_units, strict=True)):
         return True
-    for index, unit in zip(angles, given, strict=True):
+    for index, unit in zip(angles, own_units, strict=True):
         if unit == "deg":
             numbers[index] = math.radians(numbers[index])
     return False

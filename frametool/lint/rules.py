@@ -87,7 +87,7 @@ def _read_recording(recording: FrameFile, find: Find, *, normalize: bool) -> Ite
     if counts := recording.topics.counts:
         listed = ", ".join(f"{topic} ({count})" for topic, count in counts.items())
         find(Finding("topics", f"transforms on {listed}", recording.name, 1, 1))
-    for note in recording.tally.told():
+    for note in recording.tally.findings():
         find(note._replace(source=recording.name, column=1))
 
 
@@ -220,7 +220,7 @@ class Child:
         self.newest = first
         self.since = (number, first)  # the first with the newest parent
         self.log = EdgeLog(first.child)
-        self.stands: Statement | None = None
+        self.static: Statement | None = None
         self.changes: list[Statement] = []
         self.stamps: dict[int, tuple[int, int]] = {}  # stamp -> hash of the sample, its line
         self.other_parent: Statement | None = None
@@ -232,7 +232,7 @@ class Child:
     def add(self, seen: Statement, number: int) -> None:
         """Add one more."""
         if seen.stamp_ns is None:
-            self.stands = self.stands or seen
+            self.static = self.static or seen
         else:
             fresh = (hash((seen.parent, seen.components)), seen.line)
             known = self.stamps.setdefault(seen.stamp_ns, fresh)
@@ -274,10 +274,10 @@ def _child(child: Child) -> Iterator[Finding]:
     """Apply the rules about one frame."""
     first, frame = child.first, f"frame {shown(child.first.child)}"
     moves = len(child.stamps) > 1
-    if child.stands is not None and moves:
+    if child.static is not None and moves:
         moving = next(each for each in (first, child.newest) if each.stamp_ns is not None)
-        told = f" moves, but is static in {_at(child.stands)}"
-        yield moving.broken(topology.static_and_moving(first.child, told))
+        details = f" moves, but is static in {_at(child.static)}"
+        yield moving.broken(topology.static_and_moving(first.child, details))
     elif moves:
         yield from _moving(child, frame)
         yield from _steps(child)

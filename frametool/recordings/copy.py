@@ -16,7 +16,7 @@ from frametool.errors import BadTopology, ValueInvalid, bare, first_of, shown
 from frametool.frames.stamps import BILLION
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
-from frametool.grammar.edges import Names, Tally, Topics
+from frametool.grammar.edges import Diagnostics, Names, Topics
 from frametool.recordings.made import KINDS, serialised, typestore
 from frametool.recordings.messages import POSE_ARRAY, posed_messages
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
@@ -169,13 +169,13 @@ class RecordedEdges:
 
     def _others(self, edges: list[AddedEdge], tree: str) -> str:
         """Return which edges have other values, and the differences."""
-        told = []
+        differing = []
         for edge in edges:
             known = self.known[edge.child]
             metres, radians = rigid.distance(*known.numbers, *edge.numbers, xp=floats)
             off = f"{metres:.3g} m and {radians * floats.RADIAN:.3g} deg off"
-            told.append(f"{edge} on {first_of([*known.topics], MOST_NAMED)} ({off})")
-        what = first_of(told, MOST_NAMED)
+            differing.append(f"{edge} on {first_of([*known.topics], MOST_NAMED)} ({off})")
+        what = first_of(differing, MOST_NAMED)
         return f"{self.name}: other values than in {bare(tree)}: {what}; --replace uses those of {bare(tree)}"
 
 
@@ -238,7 +238,7 @@ class MessageMover:
         """
         frames.require(into)
         self.frames, self.into, self.types, self.normalize = frames, frames.resolve_name(into), types, normalize
-        self.tally = Tally()  # names with a leading slash, and quaternions that are not unit
+        self.tally = Diagnostics()  # names with a leading slash, and quaternions that are not unit
         self.header: MessageHeader | None = None  # of the last message, as far as it was read
         self._last: tuple[MessageHeader, Rigid] | None = None
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Options, Tally
+    from frametool.grammar.edges import Diagnostics, Options
     from frametool.recordings.alike import BinaryLayout
     from frametool.recordings.made import MessageTypes
     from frametool.recordings.read import Channel, Recorded, RecordingReader
@@ -87,7 +87,7 @@ def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
     return there
 
 
-def read_clouds(reader: Any, topics: Sequence[str], path: str, tally: Tally) -> Iterator[PointCloud | FormatError]:
+def read_clouds(reader: Any, topics: list[str], path: str, tally: Diagnostics) -> Iterator[PointCloud | FormatError]:
     """Yield the clouds of some topics in the order of the recording; an invalid one is replaced by its error."""
     channels = [each for each in reader.channels if each.topic in topics and each.type == CLOUD]
     for number, (channel, _, data, *_) in enumerate(reader.messages(channels), 1):
@@ -97,7 +97,7 @@ def read_clouds(reader: Any, topics: Sequence[str], path: str, tally: Tally) -> 
             yield FormatError(str(error), source=path, line=number)
 
 
-def _cloud(message: Any, number: int, topic: str, tally: Tally) -> PointCloud:
+def _cloud(message: Any, number: int, topic: str, tally: Diagnostics) -> PointCloud:
     """Parse a message; raises ValueInvalid if it contradicts itself."""
     stamp = message.header.stamp
     if problem := stamp_problem(stamp.sec, stamp.nanosec, STAMPS[0]):
@@ -214,7 +214,7 @@ def record_channels(reader: RecordingReader, chosen: Collection[str]) -> list[Ch
     return [each for each in there if not wanted or each.topic.strip("/") in wanted]
 
 
-def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedReader | None:
+def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> BufferedReader | None:
     """Open the messages of a bag as JSON lines; None if the chosen topics have clouds.
 
     Raises FileProblem when the extra is missing, FormatError for a bag that is broken or has neither.
@@ -237,7 +237,7 @@ def open_records(path: str, chosen: Collection[str], tally: Tally) -> BufferedRe
     raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
 
 
-def open_trajectory(path: str, chosen: Collection[str], tally: Tally) -> tuple[BufferedReader, str] | None:
+def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:
     """Open the poses of the chosen topic, or of the only moving one, as JSON lines; return the topic too.
 
     None for other topics, and if none was chosen and there are transforms too.

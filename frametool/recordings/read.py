@@ -24,7 +24,7 @@ from frametool.frames.stamps import BILLION
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from frametool.grammar.edges import Tally
+    from frametool.grammar.edges import Diagnostics
 
 BAG1, BAG2, MCAP = "bag1", "bag2", "mcap"
 CDR = "cdr"
@@ -97,7 +97,7 @@ class _Bounded(BufferedReader):
 class McapFile:
     """An MCAP file; compression: of its chunks."""
 
-    def __init__(self, path: Path, opened: ExitStack, tally: Tally) -> None:
+    def __init__(self, path: Path, opened: ExitStack, tally: Diagnostics) -> None:
         """Read its summary, or the whole file if the summary is incomplete."""
         from mcap.reader import SeekingReader
 
@@ -247,7 +247,7 @@ class DatabaseFile:
 
     head, compression = None, ""
 
-    def __init__(self, path: Path, opened: ExitStack, _tally: Tally) -> None:
+    def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Let sqlite3 check its pages, because rows on a broken one would be missing silently, and read its topics."""
         from sqlite3 import Row, connect
 
@@ -290,7 +290,7 @@ class Bag1File:
 
     head = None
 
-    def __init__(self, path: Path, opened: ExitStack, _tally: Tally) -> None:
+    def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Read what the end of the file says of its connections and chunks."""
         from rosbags.rosbag1.reader import Reader, decompressors
 
@@ -361,7 +361,7 @@ class RecordingReader:
     metadata: of a folder, every value as text; head: profile and library of MCAP
     """
 
-    def __init__(self, path: str, opened: ExitStack, tally: Tally) -> None:
+    def __init__(self, path: str, opened: ExitStack, tally: Diagnostics) -> None:
         """Open its files; the stack closes them."""
         from frametool.recordings.made import MessageTypes
 
@@ -376,9 +376,9 @@ class RecordingReader:
         known: dict[tuple[Any, ...], Channel] = {}
         for each in self.files:
             each.channels |= {number: known.setdefault(one.key, one) for number, one in each.channels.items()}
-        told = {(each["name"], each["type"]): each.get("type_description_hash", "") for each in self._topics()}
+        hashes = {(each["name"], each["type"]): each.get("type_description_hash", "") for each in self._topics()}
         for channel in known.values():
-            channel.digest = channel.digest or told.get((channel.topic, channel.type)) or ""
+            channel.digest = channel.digest or hashes.get((channel.topic, channel.type)) or ""
         encoding = "ros1" if self.is_ros1 else CDR
         self.all = [*known.values()]
         self.channels = [each for each in self.all if each.encoding == encoding]
@@ -469,7 +469,7 @@ def _files_of(folder: Path, metadata: dict[str, Any], opened: ExitStack) -> list
 
 
 @contextmanager
-def opened_recording(path: str, tally: Tally) -> Iterator[RecordingReader]:
+def opened_recording(path: str, tally: Diagnostics) -> Iterator[RecordingReader]:
     """Open a recording; any exception of the libraries for a broken one becomes one error.
 
     Raises FileProblem without the extra.

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import EdgeColumns, Options, Tally
+    from frametool.grammar.edges import Diagnostics, EdgeColumns, Options
     from frametool.grammar.readers import Path
 
 
@@ -143,7 +143,7 @@ class TextMessage(NamedTuple):
         return error
 
 
-def read_messages(stream: BinaryIO, name: str, fmt: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def read_messages(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of a recording; an unreadable one is replaced by its error."""
     if fmt in {"echo", "jsonl"}:
         for piece in (documents if fmt == "echo" else lines)(stream, name):
@@ -152,7 +152,7 @@ def read_messages(stream: BinaryIO, name: str, fmt: str, tally: Tally) -> Iterat
         yield from _csv(stream, name, fmt, tally)
 
 
-def piece_messages(piece: Piece, name: str, fmt: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of documents that end in `---`, or of lines."""
     if fmt == "jsonl":
         for number, text in enumerate(piece.text.split("\n"), piece.line):
@@ -168,7 +168,7 @@ def piece_messages(piece: Piece, name: str, fmt: str, tally: Tally) -> Iterator[
         at = end
 
 
-def without_noise(text: str, line: int, tally: Tally) -> str:
+def without_noise(text: str, line: int, tally: Diagnostics) -> str:
     """Blank the lines that are known not to be data; the others keep their numbers."""
     if _ODD_START.search(text) is None:
         return text
@@ -192,7 +192,7 @@ def _parsed(text: str, line: int, name: str) -> Iterator[TextMessage | FormatErr
         yield TextMessage(document.value, Source(name, text), line, document.index)
 
 
-def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def line_messages(text: str, line: int, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Yield the messages on a line that must be JSON, unless it is blank or noise."""
     if not _is_data(text, line, tally):
         return
@@ -208,7 +208,7 @@ def line_messages(text: str, line: int, name: str, tally: Tally) -> Iterator[Tex
         yield TextMessage(value, source, line, index)
 
 
-def line_texts(stream: BinaryIO, name: str, tally: Tally) -> Iterator[tuple[int, str]]:
+def line_texts(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[tuple[int, str]]:
     """Yield the lines that are neither blank nor noise, with their numbers."""
     for piece in lines(stream, name):
         for number, line in enumerate(piece.text.split("\n"), piece.line):
@@ -216,7 +216,7 @@ def line_texts(stream: BinaryIO, name: str, tally: Tally) -> Iterator[tuple[int,
                 yield number, line
 
 
-def _is_data(line: str, number: int, tally: Tally) -> bool:
+def _is_data(line: str, number: int, tally: Diagnostics) -> bool:
     """Return True if a line is neither blank nor noise; count noise."""
     if NOISE(line):
         tally.noise.append((number, line.strip()))
@@ -224,7 +224,7 @@ def _is_data(line: str, number: int, tally: Tally) -> bool:
     return bool(line.strip())
 
 
-def _csv(stream: BinaryIO, name: str, fmt: str, tally: Tally) -> Iterator[TextMessage | FormatError]:
+def _csv(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Read rows; a line that begins with `%time` is the header of those below it."""
     header: list[str] = []
     for number, line in line_texts(stream, name, tally):

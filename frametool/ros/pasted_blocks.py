@@ -73,11 +73,11 @@ def may_be_pasted(text: str) -> bool:
 
 
 def in_grammar(
-    source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+    source: Source, default: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a pasted text as text of the grammar, one value per line; None if it is not one, or grammar already.
 
-    given: the notation of numbers that do not state theirs; normalize: accept any non-zero quaternion
+    default: the notation of numbers that do not state theirs; normalize: accept any non-zero quaternion
     points: three numbers are a point
     Raises FormatError for a known print that cannot be read.
     """
@@ -87,7 +87,7 @@ def in_grammar(
     values: list[Any] | None
     try:
         values = _blocks(text) or _gazebo(text) or _published(source, normalize=normalize)
-        values = values or _unless_grammar(source, given, points=points)
+        values = values or _unless_grammar(source, default, points=points)
     except ValueInvalid as error:
         raise FormatError(str(error), source=source.name) from error
     if values is not None:
@@ -95,14 +95,14 @@ def in_grammar(
     return Source(source.name, mended) if (mended := _mended(text)) != text else None
 
 
-def _unless_grammar(source: Source, given: Notation | None, *, points: bool) -> list[Any] | None:
+def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -> list[Any] | None:
     """Return the values of pasted numbers; of JSON only what the grammar would refuse."""
     read = parse_json(source) if looks_like_json(source.text) else None
     has_matrix = read is not None and not {*map(_size, read)}.isdisjoint({(3, 3), (4, 4)})
-    if (points and read is not None) or (has_matrix and given is None):
+    if (points and read is not None) or (has_matrix and default is None):
         return None
     try:
-        return pasted_poses(source.text, given)
+        return pasted_poses(source.text, default)
     except ValueInvalid:
         if has_matrix:
             return None

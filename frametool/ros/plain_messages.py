@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.grammar.edges import Tally
+    from frametool.grammar.edges import Diagnostics
 
 INFINITE = float("inf")
 LATEST = 1 << 32  # seconds that no message can hold
@@ -135,7 +135,7 @@ ROS1_BEGINS = "  ", '{"header": {"seq"', '{"header":{"seq"'
 EACH = 12  # items that `split` returns per transform: text, two parts of the stamp, two names, seven numbers
 
 
-def plain_columns(text: str, line: int, tally: Tally, *, normalize: bool = False) -> EdgeColumns | None:
+def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool = False) -> EdgeColumns | None:
     """Return the edges of a text that begins on a line; None, and no warnings, if not every message is plain.
 
     A single `split` finds all transforms, and the remaining text shows whether there is anything else.
@@ -170,7 +170,7 @@ def plain_columns(text: str, line: int, tally: Tally, *, normalize: bool = False
 
 
 def _components(
-    columns: Sequence[Sequence[str]], lines: Sequence[int], tally: Tally, *, normalize: bool
+    columns: Sequence[Sequence[str]], lines: Sequence[int], tally: Diagnostics, *, normalize: bool
 ) -> list[Rigid] | None:
     """Read tx, ty, tz, x, y, z, w of each row; None, and no warnings, if one of them is refused."""
     rough = len(tally.rough)
@@ -186,7 +186,7 @@ def _components(
     return None
 
 
-def unit_components(numbers: Rigid, line: int, tally: Tally, normalize: bool) -> Rigid | None:  # noqa: FBT001 - fast
+def unit_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid | None:  # noqa: FBT001 - fast
     """Return tx, ty, tz, x, y, z, w with a unit quaternion; None for numbers that every reader refuses.
 
     normalize: accept any non-zero quaternion.  The tally records the line of one that was off.

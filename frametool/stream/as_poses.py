@@ -17,7 +17,7 @@ from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, d
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
-from frametool.grammar.edges import Options, Tally, Topics, stop
+from frametool.grammar.edges import Diagnostics, Options, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.stream.block_writer import writer_for
 from frametool.stream.column_stream import ColumnRows, move_along
@@ -65,7 +65,7 @@ class FormatConverter:
         self.form = form
         self.source = source
         self.answers = answers
-        self.tally = Tally()
+        self.tally = Diagnostics()
         self.is_table = FORMATS[form].is_table
         self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
         self.style = style.with_format(style.format)
@@ -96,7 +96,7 @@ class FormatConverter:
             raise FormatError("nothing in it", source=self.source)
         if writer is not None:
             yield from map(Outcome, writer.end())
-        for told in self.tally.told():
+        for told in self.tally.findings():
             warn(f"{self.source}:{told.line}: {told.message}")
 
     def steps(self, stream: BufferedReader, *, header: bool = True) -> Iterator[Step]:

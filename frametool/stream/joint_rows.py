@@ -25,7 +25,7 @@ from frametool.formats.robots.joints import find_joint_columns
 from frametool.formats.robots.model import TURNING, JointValue
 from frametool.formats.table import FORMATS
 from frametool.geometry import floats
-from frametool.grammar.edges import Tally
+from frametool.grammar.edges import Diagnostics
 from frametool.grammar.pose import Pose
 from frametool.grammar.readers import Misfit
 from frametool.grammar.result import Result
@@ -70,7 +70,7 @@ class JointRows:
         self.tip = tip
         if posture.moving:
             raise BadAnswer(f"--joints: {listing(posture.moving)} moves over time; stream that file with -i")
-        self.constants = {name: posture.still[name] for name in posture.given}
+        self.constants = {name: posture.still[name] for name in posture.named}
         self.columns: tuple[str, ...] = ()
         self._read: tuple[tuple[str, bool, float], ...] = ()
         self._beyond: set[str] = set()
@@ -235,8 +235,8 @@ def joint_poses(stream: BinaryIO, rows: JointRows, bad: BadRows, *, numbered: bo
 
 def _messages(stream: BinaryIO, name: str, *, numbered: bool) -> Iterator[TextMessage | FormatError]:
     if numbered:
-        return read_messages(stream, name, "csv1", Tally())
-    return (TextMessage(text, Source(name, text), line, cells=True) for line, text in line_texts(stream, name, Tally()))
+        return read_messages(stream, name, "csv1", Diagnostics())
+    return (TextMessage(row, Source(name, row), at, cells=True) for at, row in line_texts(stream, name, Diagnostics()))
 
 
 def _pose(state: dict[str, Any], rows: JointRows) -> Any:

@@ -240,7 +240,7 @@ class RecordRun:
     def remarks(self) -> Iterator[Finding]:
         """Yield what was odd in messages that were moved."""
         if self.mover is not None:
-            yield from self.mover.tally.told()
+            yield from self.mover.tally.findings()
 
     def finish(self) -> int:
         """Report how many messages were left out; return the exit status."""

@@ -21,7 +21,7 @@ from frametool.formats.load import FrameFile, Rules, load_sources, opened_togeth
 from frametool.formats.table import BAG, FORMATS, by_suffix
 from frametool.frames.stamps import FURTHEST_NS
 from frametool.frames.trajectory import BODY, WORLD, Trajectory
-from frametool.grammar.edges import Answers, Names, Tally
+from frametool.grammar.edges import Answers, Diagnostics, Names
 from frametool.grammar.names import in_nanoseconds, stamp_column, stamp_places
 from frametool.grammar.pose_algebra import sample_stamps
 from frametool.grammar.result import Result, Style
@@ -94,7 +94,7 @@ def read_trajectory(
     if not inside and (form or by_suffix(name, RECORDINGS) or of_folder(name)) in RECORDINGS:
         from frametool.recordings.messages import open_trajectory
 
-        if (found := open_trajectory(name, topics, Tally())) is not None:
+        if (found := open_trajectory(name, topics, Diagnostics())) is not None:
             bad = policy(name)
             asked = Request(normalize=normalize, on_error=bad.on_error)
             with closing(InputFile(name, found[0])) as file:

@@ -194,8 +194,8 @@ _ANGLE = "is an angle with a unit where a bare number is expected"
 
 def _reason(text: str) -> str:
     """Return the first known mistake in a text that is not a number."""
-    if odd := odd_characters(text):
-        return f"has {odd}"
+    if bad := odd_characters(text):
+        return f"has {bad}"
     return next((reason for pattern, reason in _MISTAKES if re.fullmatch(pattern, text, _LOOSELY)), _UNKNOWN)
 
 
@@ -226,10 +226,10 @@ def odd_characters(text: str) -> str:
 
     Returns "" if there is none.
     """
-    odd = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not c.isprintable())), None)
-    if odd is None:
+    bad = next((c for c in text if ord(c) > 126 and (c in _ODD_MINUS or c.isdigit() or not c.isprintable())), None)
+    if bad is None:
         return ""
     from unicodedata import name
 
-    kind = "a look-alike of '-'" if odd in _ODD_MINUS else "a digit of another script" if odd.isdigit() else "invisible"
-    return f"{name(odd, 'a control character').lower()} (U+{ord(odd):04X}), {kind}"
+    kind = "a look-alike of '-'" if bad in _ODD_MINUS else "a digit of another script" if bad.isdigit() else "invisible"
+    return f"{name(bad, 'a control character').lower()} (U+{ord(bad):04X}), {kind}"

@@ -156,8 +156,8 @@ def rounded_to_single(values: Floats) -> Floats:
         usual, wanted, exponents = usual[~same], wanted[~same], exponents[~same]
         if not usual.size:
             break
-    odd = np.flatnonzero(np.isfinite(exact) & (size > 0) & ((size < _LEAST) | (size >= _GREATEST)))
-    found[odd] = [float(str(value)) for value in single.ravel()[odd]]
+    unusual = np.flatnonzero(np.isfinite(exact) & (size > 0) & ((size < _LEAST) | (size >= _GREATEST)))
+    found[unusual] = [float(str(value)) for value in single.ravel()[unusual]]
     return found.reshape(values.shape)
 
 

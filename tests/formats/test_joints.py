@@ -11,7 +11,7 @@ import frametool
 from frametool.errors import BadAnswer, FormatError, FrametoolError, FrametoolWarning, ValueInvalid
 from frametool.formats.robots.joints import JointState, find_joint_columns, stamp_column
 from frametool.formats.robots.model import Joint, JointValue, Mimic, motion, read_value
-from frametool.grammar.edges import Answers, Options, Tally, Topics
+from frametool.grammar.edges import Answers, Diagnostics, Options, Topics
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -131,7 +131,7 @@ def test_only_its_own_name_overrides_a_mimic(arm: Callable[..., Any]) -> None:
 
 def test_a_quarter_turn_in_degrees_is_exact_and_so_is_what_follows_it() -> None:
     joints = [TURN, Joint("other", "continuous", (0.0, 0.0, 1.0), mimic=Mimic("pan", -2.0))]
-    options = Options(Tally(), Topics(), answers=Answers(joints={"pan": "90deg"}))
+    options = Options(Diagnostics(), Topics(), answers=Answers(joints={"pan": "90deg"}))
     found = JointState(joints, options, lambda *_: FormatError(""))
     assert motion(joints[0], found.still["pan"])[5:] == (0.7071067811865476, 0.7071067811865476)
     assert motion(joints[1], found.still["other"])[5:] == (-1.0, 0.0)
@@ -320,7 +320,7 @@ def test_a_step_of_half_a_turn_is_told_because_poses_between_go_the_other_way(ar
 
 def test_joints_that_move_together_are_interpolated_at_each_others_times() -> None:
     series = {"a": {0: 0.0, 10: 1.0}, "b": {5: 0.5, 15: 2.5}}
-    options = Options(Tally(), Topics())
+    options = Options(Diagnostics(), Topics())
     joints = [Joint(name, "prismatic") for name in "ab"]
     found = JointState(joints, options, lambda *_: FormatError(""))
     for name, values in series.items():

@@ -18,7 +18,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from frametool.grammar.edges import Tally
+from frametool.grammar.edges import Diagnostics
 from frametool.recordings.made import MessageTypes
 from frametool.recordings.messages import RECORDS, open_records
 
@@ -145,7 +145,7 @@ def test_a_recording_is_read_in_pieces_of_many_messages(form: str, tmp_path: Pat
     made = Maker(form)
     sent = [Sent("/pose", *made.pose("map", START + at, numbers), START + at) for at, numbers in enumerate(POSES)]
     path = write(tmp_path / ("run.bag" if form == "bag" else "run"), form, sent)
-    stream = open_records(str(path), (), Tally())
+    stream = open_records(str(path), (), Diagnostics())
     assert stream is not None
     with stream:
         assert stream.read1(1 << 19).count(b"\n") == len(POSES)
@@ -244,7 +244,7 @@ def test_messages_that_lie_alike_become_the_same_lines_at_once(
 
     def lines(some: list[Sent]) -> bytes:
         bag = write(tmp_path / f"run{random.random()}.{form}", form, some)
-        stream = open_records(str(bag), (), Tally())
+        stream = open_records(str(bag), (), Diagnostics())
         assert stream is not None
         return stream.read()
 

@@ -11,7 +11,7 @@ import pytest
 
 from frametool.errors import FormatError
 from frametool.formats.load import FrameFile, load
-from frametool.grammar.edges import Tally
+from frametool.grammar.edges import Diagnostics
 from frametool.grammar.result import Style
 from frametool.ros.echo_format import message_text
 from frametool.ros.plain_messages import plain_columns
@@ -89,7 +89,7 @@ def taken(path: Path, lines: Sequence[str], *topics: str, normalize: bool = Fals
     recording = FrameFile(path, fmt="jsonl", topics=topics)
     edges = list(recording.edges(errors.append, tell=False, normalize=normalize))
     said = [(error.line, error.message, error.rule) for error in errors]
-    return edges, said, list(recording.tally.told()), recording.topics.counts
+    return edges, said, list(recording.tally.findings()), recording.topics.counts
 
 
 def in_full(line: str) -> str:
@@ -99,13 +99,13 @@ def in_full(line: str) -> str:
 
 @pytest.mark.parametrize("line", PLAIN)
 def test_plain_lines_take_the_fast_way(line: str) -> None:
-    assert plain_columns(line + "\n", 1, Tally()) is not None
-    assert plain_columns(in_full(line) + "\n", 1, Tally()) is None
+    assert plain_columns(line + "\n", 1, Diagnostics()) is not None
+    assert plain_columns(in_full(line) + "\n", 1, Diagnostics()) is None
 
 
 @pytest.mark.parametrize("line", OTHER)
 def test_other_lines_are_left_alone(line: str) -> None:
-    tally = Tally()
+    tally = Diagnostics()
     assert plain_columns(line + "\n", 1, tally) is None
     assert not tally.rough
 
@@ -199,6 +199,6 @@ def test_echoed_stretches_give_what_the_full_reader_gives(ros: str, odd: int | N
     edges = [list(FrameFile(path).edges(tell=False)) for path in (plain, full)]
     assert edges[0] == edges[1]
     assert len(edges[0]) == 200
-    found = plain_columns("".join(messages), 1, Tally())
+    found = plain_columns("".join(messages), 1, Diagnostics())
     assert (found is None) == (odd is not None)
     assert found is None or list(found.edges()) == edges[0]

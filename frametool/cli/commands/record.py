@@ -16,7 +16,7 @@ from frametool.errors import BadAnswer, FileProblem, FormatError, ValueInvalid, 
 from frametool.formats.load import FrameFile, Rules
 from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.frames.stamps import parse_time
-from frametool.grammar.edges import Tally
+from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import is_slashed
 from frametool.stream.faults import ON_ERROR, STOP
 from frametool.view.progress import ProgressBar
@@ -83,7 +83,7 @@ def command(inputs: Inputs) -> int:
     form = _form_of(path)
     copy, place = copied_as(form, path, inputs.output, inputs.format_name)
     refuse_input(place, (path, *map(tree_file, more)))
-    tally, edges = Tally(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
+    tally, edges = Diagnostics(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")
     if edges is not None and edges.covariances:
@@ -103,7 +103,7 @@ def command(inputs: Inputs) -> int:
             run.look(progress.advance)
             for piece in run.pieces(copy, folder_of(place), progress.advance):
                 write(piece)
-    for remark in (*tally.told(), *run.remarks()):
+    for remark in (*tally.findings(), *run.remarks()):
         warn(f"{path}: {remark.message}", rule=remark.rule)
     for sentence in () if quiet else run.summary():
         say(f"{path}: {sentence}")

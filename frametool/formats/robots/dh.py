@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from frametool.documents.source import InputFile
-    from frametool.grammar.edges import Edge, Options, Tally
+    from frametool.grammar.edges import Diagnostics, Edge, Options
     from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
@@ -115,7 +115,7 @@ class DhRow(NamedTuple):
     line: int = 0
 
 
-def rows_of(file: InputFile, tally: Tally) -> list[DhRow]:
+def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
     """Return the rows of a table, and note its other contents; raises FormatError with the place."""
     text = file.text
     is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
@@ -206,7 +206,7 @@ def _length(text: str, unit: str) -> Amount:
     return Amount(parse_number(text) / LENGTHS[unit] if is_bare else parse_length(text))
 
 
-def _tell_others(names: Iterable[str], line: int, tally: Tally) -> None:
+def _tell_others(names: Iterable[str], line: int, tally: Diagnostics) -> None:
     """Note the columns or keys that are not used."""
     if others := [name for name in dict.fromkeys(names) if column_of(name) is None]:
         tally.note_each(f"left out, about something else: {listing(others)}", line)
@@ -218,7 +218,7 @@ def _misspelt(name: str) -> str:
     return did_you_mean(name.strip().lower(), known, cutoff=0.75)
 
 
-def _of_lines(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
+def _of_lines(file: InputFile, tally: Diagnostics) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
     """Yield the rows of a text with one row per line, below a header."""
     lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
     begin = next((at for at, (_, line) in enumerate(lines) if _columns(line)), None)
@@ -265,7 +265,7 @@ def _split(line: str) -> list[LineCell]:
     return found[:: 2 if mark and line.count(mark) + 1 < len(found) else 1]
 
 
-def _of_documents(file: InputFile, tally: Tally) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
+def _of_documents(file: InputFile, tally: Diagnostics) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
     """Yield the rows of YAML or JSON."""
     source = file.source
     for document in parse_documents(source.text, source.name):

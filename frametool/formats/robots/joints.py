@@ -37,7 +37,7 @@ from frametool.formats.table import FORMATS, readers
 from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
-from frametool.grammar.edges import Edge, Options, Tally
+from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import messages
 from frametool.ros.message_stream import TextMessage, line_texts, read_messages
@@ -62,7 +62,7 @@ class JointState:
     """The values of all joints of a robot: one each, or samples over time.
 
     still, moving: values by name, or by name and stamp
-    given: names of the joints with a value; the others follow them, or are at rest
+    named: names of the joints with a value; the others follow them, or are at rest
 
     """
 
@@ -84,10 +84,10 @@ class JointState:
         self._take_files()
         self._take_options()
         self._tell_limits()
-        self.given = frozenset((*self.still, *self.moving))
-        self.told = set(self.given)
+        self.named = frozenset((*self.still, *self.moving))
+        self.known = set(self.named)
         self._follow(fail)
-        options.tally.robot = self.still, [], [name for name in self.joints if name not in self.told]
+        options.tally.robot = self.still, [], [name for name in self.joints if name not in self.known]
         options.tally.assumed = options.tally.assumed or self._about()
 
     @classmethod
@@ -100,7 +100,7 @@ class JointState:
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
         """Yield one edge per link: static, or a sample at each time at which one of its joints has a value."""
         links = [*links]
-        self._options.tally.robot = self.still, links, [name for name in self.joints if name not in self.told]
+        self._options.tally.robot = self.still, links, [name for name in self.joints if name not in self.known]
         for link in links:
             for stamp_ns, values in self.values(*(joint.name for joint in link.joints)):
                 yield Edge(link.parent, link.child, link.pose(values), stamp_ns, link.line)
@@ -227,8 +227,8 @@ class JointState:
             self.still[name] = followed(joint, self.still[leader])
         else:
             self.still[name] = followed(joint, JointValue(0.0)) if mimic else joint.start
-        if leader in self.told:
-            self.told.add(name)
+        if leader in self.known:
+            self.known.add(name)
 
     def _tell_limits(self) -> None:
         """Record values beyond limits, and steps that a pose cannot follow."""
@@ -247,7 +247,7 @@ class JointState:
 
     def _about(self) -> str:
         """Return how many joints are at rest because no value was set."""
-        free = [joint for joint in self.joints.values() if joint.name not in self.told]
+        free = [joint for joint in self.joints.values() if joint.name not in self.known]
         if not free:
             return ""
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
@@ -371,7 +371,7 @@ class JointFile:
         has_state = colon and file and not os.path.exists(path) and os.path.exists(file)
         self.path, self.state = (file, state) if has_state else (path, "")
         self.joints = joints
-        self.tally = Tally()
+        self.tally = Diagnostics()
         self.file = InputFile(self.path)
 
     def settings(self) -> Iterator[JointSample]:
@@ -383,8 +383,8 @@ class JointFile:
             yield from self._settings()
         finally:
             self.file.close()
-        for told in self.tally.told():
-            warn(f"{self.file.name}:{told.line}: {told.message}")
+        for note in self.tally.findings():
+            warn(f"{self.file.name}:{note.line}: {note.message}")
 
     def _settings(self) -> Iterator[JointSample]:
         head = self.file.head()

@@ -28,7 +28,7 @@ from frametool.geometry import floats, matrix, quaternion, rigid, vectors
 from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
 from frametool.geometry.quaternion import cross, unit_vector
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Edge, Options, Tally, Topics
+from frametool.grammar.edges import Diagnostics, Edge, Options, Topics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -206,7 +206,7 @@ def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:
     """
     xml = XmlFile(file)
     root = read_nodes(xml, HELD)
-    links = MjcfModel(root, Options(Tally(), Topics())).links.values()
+    links = MjcfModel(root, Options(Diagnostics(), Topics())).links.values()
     joints = [joint for link in links for joint in link.joints]  # a body's before those of its children
     key = _key(root, state)
     if not key.attribute("qpos"):
@@ -385,10 +385,10 @@ class PoseReader:
         return 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), *_turning_z(*along)
 
     def _orientation(self, attributes: Attributes) -> Quaternion:
-        given = [name for name in ORIENTATIONS if name in attributes]
-        if len(given) > 1:
-            raise attributes[given[1]].error(f"{' and '.join(given)} in one element; keep one")
-        return getattr(self, f"_{given[0]}")(attributes) if given else (0.0, 0.0, 0.0, 1.0)
+        present = [name for name in ORIENTATIONS if name in attributes]
+        if len(present) > 1:
+            raise attributes[present[1]].error(f"{' and '.join(present)} in one element; keep one")
+        return getattr(self, f"_{present[0]}")(attributes) if present else (0.0, 0.0, 0.0, 1.0)
 
     def _quat(self, attributes: Attributes) -> Quaternion:
         """Read a quaternion, w first, of any length but zero."""

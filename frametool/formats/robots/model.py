@@ -346,18 +346,18 @@ class Chain:
         """Return True if a joint moves anything on the path, by itself or through joints that mimic it."""
         return any(joint in self._followed(name, ()) for name in self._between)
 
-    def missing(self, told: Collection[str]) -> list[str]:
+    def missing(self, valued: Collection[str]) -> list[str]:
         """Return the joints without a value, neither set nor by mimicking."""
-        return [name for name in self._deciding(told) if name not in told]
+        return [name for name in self._deciding(valued) if name not in valued]
 
-    def _deciding(self, told: Collection[str]) -> tuple[str, ...]:
+    def _deciding(self, valued: Collection[str]) -> tuple[str, ...]:
         """Return the joints that are needed: those with a value, and those that mimic no other."""
-        return tuple(dict.fromkeys(self._followed(name, told)[-1] for name in self._between))
+        return tuple(dict.fromkeys(self._followed(name, valued)[-1] for name in self._between))
 
-    def _followed(self, name: str, told: Collection[str]) -> list[str]:
+    def _followed(self, name: str, valued: Collection[str]) -> list[str]:
         """Return a joint and those it mimics, up to one that has a value or mimics none."""
         line = [name]
-        while line[-1] not in told:
+        while line[-1] not in valued:
             mimic = self._joints[line[-1]].mimic
             if mimic is None or mimic.joint not in self._joints:
                 break

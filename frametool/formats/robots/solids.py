@@ -15,7 +15,7 @@ from frametool.documents.xml import XmlFile, read_nodes
 from frametool.formats.robots import mjcf, sdf
 from frametool.geometry import euler, floats, rigid
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Options, Tally, Topics
+from frametool.grammar.edges import Diagnostics, Options, Topics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -93,7 +93,7 @@ def _of_urdf(file: InputFile) -> Iterator[Solid]:
 
 
 def _of_sdf(file: InputFile) -> Iterator[Solid]:
-    frames = sdf.SdfFrames(read_nodes(XmlFile(file), SDF_HELD), Options(Tally(), Topics()))
+    frames = sdf.SdfFrames(read_nodes(XmlFile(file), SDF_HELD), Options(Diagnostics(), Topics()))
 
     def numbers(shape: XmlNode) -> Iterator[float]:
         for part in shape.children:
@@ -109,7 +109,7 @@ class _Geoms(mjcf.MjcfModel):
 
     def __init__(self, root: XmlNode) -> None:
         self.solids: list[Solid] = []
-        super().__init__(root, Options(Tally(), Topics()))
+        super().__init__(root, Options(Diagnostics(), Topics()))
 
     def _take(self, node: XmlNode, inside: _Inside) -> _Inside | None:
         if node.tag != "geom":

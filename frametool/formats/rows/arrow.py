@@ -271,14 +271,14 @@ class Collected(BytesIO):
 class GroupWriter:
     """Collects rows until a group is complete; subclasses define the beginning of a file and the writing of a group."""
 
-    def __init__(self, fmt: str, columns: Sequence[OutColumn], given: Any | None, how: dict[str, Any]) -> None:
+    def __init__(self, fmt: str, columns: Sequence[OutColumn], of_input: Any | None, how: dict[str, Any]) -> None:
         """Store the columns of the result, the schema of the input if it has one, and its encoding."""
         self.pa = require_pyarrow("Arrow")
         self.format, self.columns, self.how = fmt, columns, how
         self.sink = Collected()
         self.file = self.pa.PythonFile(self.sink, mode="w")
-        fields = [self._field(column, given) for column in columns]
-        self.schema = self.pa.schema(fields, metadata=None if given is None else given.metadata)
+        fields = [self._field(column, of_input) for column in columns]
+        self.schema = self.pa.schema(fields, metadata=None if of_input is None else of_input.metadata)
         self.writer: Any = None
         self.waiting: list[Any] = []
         self.size = self.count = self.read = 0
@@ -310,12 +310,12 @@ class GroupWriter:
         self.writer.close()
         yield self.sink.taken()
 
-    def _field(self, column: OutColumn, given: Any | None) -> Any:
+    def _field(self, column: OutColumn, of_input: Any | None) -> Any:
         """Return the field of a column: that of the input if it is unchanged or replaced."""
-        if given is not None:
-            replaced = given.get_all_field_indices(column.name) if column.passed is None else [column.passed]
+        if of_input is not None:
+            replaced = of_input.get_all_field_indices(column.name) if column.passed is None else [column.passed]
             if replaced:
-                return given.field(replaced[0])
+                return of_input.field(replaced[0])
         kind = self.pa.string() if column.kind is None else self.pa.from_numpy_dtype(column.kind)
         return self.pa.field(column.name, kind, metadata=IS_JSON if column.is_json else None)
 

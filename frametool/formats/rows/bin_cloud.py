@@ -73,8 +73,8 @@ class _Encoder:
         self.names = FORMATS[fmt].columns
         self.columns = columns
         self.off = 0.0
-        given = [column.name for column in columns if column.kind is not None]
-        if missing := [name for name in self.names if name not in given]:
+        at_input = [column.name for column in columns if column.kind is not None]
+        if missing := [name for name in self.names if name not in at_input]:
             raise ValueInvalid(f"{fmt} holds {' '.join(self.names)}; there is no {listing(missing)}")
         if others := [column.name for column in columns if column.name not in self.names]:
             warn(f"{fmt}: {listing(others)} left out: it holds {' '.join(self.names)} alone")

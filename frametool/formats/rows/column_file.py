@@ -359,11 +359,11 @@ def encode_records(
 
     kind: of the records, with a field for each column.  If none is new they are changed in place.
     """
-    given = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
-    if given is not None and given.rows.dtype == kind:
-        records = given.rows
+    of_input = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
+    if of_input is not None and of_input.rows.dtype == kind:
+        records = of_input.rows
     else:
-        records = np.zeros(len(made[0].values) if given is None else given.size, kind)
+        records = np.zeros(len(made[0].values) if of_input is None else of_input.size, kind)
     new = iter(made)
     for name, column in zip(kind.names or (), columns, strict=True):
         if column.passed is None:
@@ -374,6 +374,6 @@ def encode_records(
                     found = f"{shown(longest)} has {len(longest)}"
                     raise ValueInvalid(f"column {column.name} holds {most} characters, {found}")
             records[name] = values
-        elif given is not None and records is not given.rows:
-            records[name] = given.column(column.passed)
+        elif of_input is not None and records is not of_input.rows:
+            records[name] = of_input.column(column.passed)
     return memoryview(records.view(np.uint8)) if records.size else b""  # type: ignore[arg-type]

@@ -121,13 +121,13 @@ class NpyFile(column_file.ColumnFile):
 
 
 def _writer(
-    columns: Sequence[OutColumn], given: Kind, count: int | None, shape: tuple[int, ...] | None
+    columns: Sequence[OutColumn], of_input: Kind, count: int | None, shape: tuple[int, ...] | None
 ) -> column_file.CountedWriter:
     """Return a writer for an array: without fields if the input had none and all columns are of one type.
 
-    given: the type of the input's records; shape: of a row without fields
+    of_input: the type of the input's records; shape: of a row without fields
     """
-    record = _record_type(columns, given)
+    record = _record_type(columns, of_input)
     kinds = {record[place] for place in range(len(columns))}
     element, row_shape = record, tuple[int, ...]()
     if shape is not None and len(kinds) == 1:
@@ -146,15 +146,15 @@ def _writer(
     return column_file.CountedWriter(partial(column_file.encode_records, columns, record), head, count)
 
 
-def _record_type(columns: Sequence[OutColumn], given: Kind) -> Kind:
+def _record_type(columns: Sequence[OutColumn], of_input: Kind) -> Kind:
     """Return the type of the records of an output; that of the input, padding included, if its fields are unchanged."""
     made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
     fields = [
-        (column.name or f"{at}", kind if column.passed is None else given[column.passed])
+        (column.name or f"{at}", kind if column.passed is None else of_input[column.passed])
         for at, (column, kind) in enumerate(zip(columns, made, strict=True))
     ]
-    same = given.names is not None and fields == [(name, given[name]) for name in given.names]
-    return given if same else np.dtype(fields)
+    same = of_input.names is not None and fields == [(name, of_input[name]) for name in of_input.names]
+    return of_input if same else np.dtype(fields)
 
 
 def open_columns(file: InputFile, _options: Options) -> NpyFile:

@@ -42,13 +42,13 @@ _CAMERA = r"cam([0-9]+)"
 def read(file: FrameFile, options: Options) -> Iterator[Edge]:
     """Yield one edge per camera, and check duplicates; of a sensor.yaml the only edge."""
     frames = options.answers.frames
-    naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames, blocks=frames[1:])
+    naming = FrameNames(base=frames[0] if frames else "", alone="cam", names_set=frames, blocks=frames[1:])
     expected, nothing = "blocks of cameras", "a camera has T_cam_imu, T_imu_cam, T_cn_cnm1 or T_SC"
     is_sensor = file.format == "euroc-sensor"
     if is_sensor:
         expected, nothing = "T_BS of a sensor", "the pose of a sensor is T_BS"
         names = options.answers.names("body", sensor_name(file.path))
-        naming = FrameNames(base=names[0], alone=names[1], told=names)
+        naming = FrameNames(base=names[0], alone=names[1], names_set=names)
 
     def take(value: Any, reading: Reading) -> list[Edge]:
         matrices = Matrices(as_mapping(value, expected), naming, options.answers, reading)

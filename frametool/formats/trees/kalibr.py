@@ -98,8 +98,8 @@ def _named(edges: list[Edge], options: Options, lines: dict[str, int]) -> Iterat
     """Yield edges with the names of --frames: of the IMUs, then of the cameras, by their numbers."""
     found = {name: None for each in edges for name in (each.parent or "", each.child)}
     frames = sorted(found, key=lambda name: (name[:3] == "cam", len(name), name))
-    if len(told := options.answers.frames) > len(frames):
-        raise BadAnswer(f"--frames names {len(told)} frames, there are {len(frames)}: {', '.join(frames)}")
+    if len(chosen := options.answers.frames) > len(frames):
+        raise BadAnswer(f"--frames names {len(chosen)} frames, there are {len(frames)}: {', '.join(frames)}")
     names = dict(zip(frames, options.answers.names(*frames), strict=True))
     for each in edges:
         line = lines[str(each.path[0])]

@@ -143,10 +143,10 @@ class Calibration:
         for name, other in (("R", "T"), ("T", "R")):
             if name not in self.fields:
                 raise FormatError(f"missing {name}: beside {other}:", source=self.file.name)
-        told = self.options.answers.frames
+        chosen = self.options.answers.frames
         base = os.path.basename(self.file.name)
-        if len(told) == 2:
-            parent, child = told
+        if len(chosen) == 2:
+            parent, child = chosen
         elif "velo_to_cam" in base or "delta_f" in self.fields:
             parent, child = "cam0", "velo"
             rect = "R_rect_00 of calib_cam_to_cam turns it to cam0_rect"

@@ -23,7 +23,7 @@ from frametool.frames.lookups import FrameTree
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import notation
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Answers, Edge, Tally
+from frametool.grammar.edges import Answers, Diagnostics, Edge
 from frametool.grammar.readers import Misfit, Reading, Unclear, kind, read_numbers, within
 from frametool.grammar.rotation_spelling import AGREEMENT, read_spelled, rotation_of
 
@@ -120,9 +120,9 @@ def _ways(pattern: str, key: str, frames: Sequence[str]) -> list[tuple[str, str]
     """Return the pairs of names that a pattern finds in a key, those set by the user if they fit."""
     if "<" not in pattern:
         return [("", "")] if key == pattern else []
-    told = [(a, b) for a in frames for b in frames if re.fullmatch(_filled(pattern, re.escape(a), re.escape(b)), key)]
-    if told:
-        return told[:1]
+    fits = [(a, b) for a in frames for b in frames if re.fullmatch(_filled(pattern, re.escape(a), re.escape(b)), key)]
+    if fits:
+        return fits[:1]
     found: dict[tuple[str, str], None] = {}
     for name in (r"[A-Za-z]\w*?", r"[A-Za-z]\w*"):  # the shortest first name, then the longest
         if match := re.fullmatch(_filled(pattern, name, r"[A-Za-z]\w*"), key):
@@ -367,7 +367,7 @@ class FrameNames(NamedTuple):
 
     base: str
     alone: str
-    told: tuple[str, ...] = ()
+    names_set: tuple[str, ...] = ()
     blocks: tuple[str, ...] = ()
 
 
@@ -395,7 +395,7 @@ class Matrices:
         self.bodies = [each for each in self.blocks if "T_BS" in each.entries][:2]
         self.poses = [pose for block in self.blocks for pose in self._of_block(block)]
 
-    def edges(self, tally: Tally, nothing: str) -> list[Edge]:
+    def edges(self, tally: Diagnostics, nothing: str) -> list[Edge]:
         """Return the edges of the poses, and record how many there are and what was omitted.
 
         Raises Misfit if they contradict each other, and with `nothing` if there are none.
@@ -426,7 +426,7 @@ class Matrices:
     def _single(self, block: MatrixBlock, key: str, value: Any, grid: Grid | None) -> Stated | None:
         """Return the pose under one key, if it is one."""
         path = (*block.path, key)
-        meaning = meaning_of(key, self._known(block), self.naming.told)
+        meaning = meaning_of(key, self._known(block), self.naming.names_set)
         says = isinstance(meaning, Meaning) and meaning.said
         whole = whole_pose(grid, twelve=says)
         if says and whole is None and (grid is not None or type(value) is not str):
@@ -477,9 +477,9 @@ class Matrices:
         if ends is not None:
             parent, child = ends.target, ends.source
         else:
-            told = self.naming.told[1:]
+            names_set = self.naming.names_set[1:]
             parent = self.naming.base or ("imu" if block.name else "body")
-            child = block.name or (told[self.asked] if self.asked < len(told) else key.rpartition(".")[2])
+            child = block.name or (names_set[self.asked] if self.asked < len(names_set) else key.rpartition(".")[2])
             self.asked += 1
         return directed(dotted(path), path, parent, child, self.answers)
 
@@ -507,12 +507,12 @@ class Matrices:
 
 def _before(blocks: Sequence[MatrixBlock]) -> dict[Path, str]:
     """Return the camera before each block by its path: cam0 of cam1; else the block before it; "" if there is none."""
-    beside: dict[Path, dict[str | int, str]] = {}
+    siblings: dict[Path, dict[str | int, str]] = {}
     for each in blocks:
         if each.path:
-            beside.setdefault(each.path[:-1], {})[each.path[-1]] = each.name
+            siblings.setdefault(each.path[:-1], {})[each.path[-1]] = each.name
     found: dict[Path, str] = {(): ""}
-    for around, names in beside.items():
+    for around, names in siblings.items():
         earlier = ""
         for own, name in names.items():
             number = re.fullmatch(r"(.*?)([0-9]{1,9})", str(own))
@@ -530,8 +530,8 @@ def _renamed(blocks: Iterator[MatrixBlock], naming: FrameNames) -> list[MatrixBl
     found = list(blocks)
     cameras = [block for block in found if block.name and not block.name.startswith("imu") and is_camera(block)]
     numbered = sorted(cameras, key=lambda block: [int(number) for number in re.findall(r"[0-9]{1,9}", block.name)])
-    told = {block.path: name for block, name in zip(numbered, naming.blocks, strict=False)}
-    return [block._replace(name=told.get(block.path, block.name)) for block in found]
+    names_set = {block.path: name for block, name in zip(numbered, naming.blocks, strict=False)}
+    return [block._replace(name=names_set.get(block.path, block.name)) for block in found]
 
 
 def _blocks(entries: dict[str, Any], name: str, path: Path, depth: int = 0) -> Iterator[MatrixBlock]:

@@ -46,10 +46,10 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield one edge per name."""
     frames = options.answers.frames
     base = options.answers.names("base")[0]
-    count, told, said, left = 0, False, True, dict[str, None]()
+    count, in_base, said, left = 0, False, True, dict[str, None]()
 
     def take(value: Any, reading: Reading) -> Iterator[Edge]:
-        nonlocal count, told, said
+        nonlocal count, in_base, said
         reading.bare_numbers = False
         top: dict[Any, Any] = as_mapping(value, "poses by the names of frames")
         path: Path = ()
@@ -63,7 +63,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             reading.here = here
             try:
                 pose, ends = _entry(name, entry, reading, options, left)
-                told |= ends is None
+                in_base |= ends is None
                 said &= type(entry) is dict and not {*PARENTS}.isdisjoint(entry)
                 target, source, child = ends or (base, str(name), str(name))
                 if child != source:
@@ -77,7 +77,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
     if frames and said:
         options.tally.note(f"--frames {','.join(frames)} has no effect: each pose names its parent", 1)
     count_of = f"{count} {'pose' if count == 1 else 'poses'}"
-    assumed = f"{count_of} in {bare(base)} (--frames says another)" if told and not frames else ""
+    assumed = f"{count_of} in {bare(base)} (--frames says another)" if in_base and not frames else ""
     others = f"{', '.join(map(bare, left))} left out" if left else ""
     options.tally.assumed = "; ".join(filter(None, (assumed, others)))
 

@@ -45,7 +45,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
     def take(value: Any, reading: Reading) -> list[Edge]:
         frames = options.answers.frames
-        naming = FrameNames(base=frames[0] if frames else "", alone="cam", told=frames)
+        naming = FrameNames(base=frames[0] if frames else "", alone="cam", names_set=frames)
         matrices = Matrices(as_mapping(value, "matrices by name"), naming, options.answers, reading)
         found = f"; {', '.join(matrices.left[:3])}" if matrices.left else ""
         nothing = f"no pose in it{found}; a pose is named after its two frames, as body_T_cam0"

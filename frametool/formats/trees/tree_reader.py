@@ -20,7 +20,7 @@ from frametool.documents.source import InputFile, Source, pointer
 from frametool.errors import Finding, FormatError, Unanswered, ValueInvalid, alternatives, bare, shown
 from frametool.frames.stamps import parse_stamp
 from frametool.geometry.rigid import IDENTITY
-from frametool.grammar.edges import Edge, Options, Tally
+from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
 from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, tell, within
@@ -413,7 +413,7 @@ def _placed(faults: Sequence[Misfit], source: Source, document: int) -> Iterator
             yield FormatError(str(fault), source=source.name, line=line, column=column, rule=fault.rule)
 
 
-def remember(notes: Iterable[Finding], lines: Iterable[int], tally: Tally) -> None:
+def remember(notes: Iterable[Finding], lines: Iterable[int], tally: Diagnostics) -> None:
     """Record warnings, each with its line and after the keys that lead to it."""
     for note, line in zip(notes, lines, strict=True):
         tally.note_each(f"{bare(dotted(note.path))}: {note.message}" if note.path else note.message, line, note.rule)

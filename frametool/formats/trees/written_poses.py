@@ -81,11 +81,11 @@ class Precision:
         self.metres = 0.0
         self.radians = 0.0
 
-    def add(self, given: Rigid, back: Rigid) -> None:
+    def add(self, original: Rigid, back: Rigid) -> None:
         """Compare one pose with what is read back."""
-        same = (*given[:3], *quaternion.from_quaternion(*given[3:], floats))
+        same = (*original[:3], *quaternion.from_quaternion(*original[3:], floats))
         if same != back:
-            metres, radians = rigid.distance(*given, *back, floats)
+            metres, radians = rigid.distance(*original, *back, floats)
             self.metres, self.radians = max(self.metres, metres), max(self.radians, radians)
 
     def tell(self, style: Style) -> None:
@@ -103,13 +103,13 @@ def angles_of(rotation: Quaternion) -> tuple[Three[float], Quaternion]:
     The angles with the fewest decimals that give the same bits, which are those of a file the rotation came from;
     otherwise the nearest angles.  The equivalent angles on the other side are tried too.
     """
-    given = quaternion.from_quaternion(*rotation, floats)
-    exact: Three[float] = euler.from_quaternion(*given, "sxyz", floats)
+    original = quaternion.from_quaternion(*rotation, floats)
+    exact: Three[float] = euler.from_quaternion(*original, "sxyz", floats)
     for decimals in range(MOST_DECIMALS):
         for roll, yaw in product(*((angle, angle - copysign(2.0 * pi, angle)) for angle in (exact[0], exact[2]))):
             angles = (round(roll, decimals), round(exact[1], decimals), round(yaw, decimals))
-            if of_angles(angles) == given:
-                return angles, given
+            if of_angles(angles) == original:
+                return angles, original
     return exact, of_angles(exact)
 
 
@@ -121,8 +121,8 @@ def of_angles(angles: Iterable[float]) -> Quaternion:
 
 def rows_of(pose: Rigid) -> tuple[list[list[float]], Rigid]:
     """Return the rows of the 4x4 matrix of a pose, and the pose that they read back to."""
-    position, given = pose[:3], quaternion.from_quaternion(*pose[3:], floats)
-    numbers = [number + 0.0 for number in rigid.to_homogeneous(*position, *given, floats)]  # avoids -0.0
+    position, original = pose[:3], quaternion.from_quaternion(*pose[3:], floats)
+    numbers = [number + 0.0 for number in rigid.to_homogeneous(*position, *original, floats)]  # avoids -0.0
     turn = matrix.check(*numbers[0:3], *numbers[4:7], *numbers[8:11])
     back = quaternion.canonical(*matrix.to_quaternion(*turn, floats), floats)
     return [list(numbers[at : at + 4]) for at in (0, 4, 8, 12)], (*position, *back)
