@@ -54,7 +54,7 @@ def literal(value: Any, reading: Reading) -> Term:
         return term_of_pose(pose)
     if unknown := [each for each in value if each not in (key, "frame")]:
         hint = did_you_mean(unknown[0], ("frame",))
-        raise Misfit(f"unknown key {shown(unknown[0])} beside {key}{hint}; expected frame", (unknown[0],), key=True)
+        raise Misfit(f"unknown key {shown(unknown[0])} next to {key}{hint}; expected frame", (unknown[0],), key=True)
     type_, names = PLACED[key]
     frame = value.get("frame")
     if frame is not None and (type(frame) is not str or not frame):
@@ -212,7 +212,7 @@ class _Walk:
         if name == "ans":
             raise CalcError("there is no last value yet")
         if name in UNITS:
-            raise CalcError(f"unknown name {shown(name)}; a unit stands close to its number: 1{name}")
+            raise CalcError(f"unknown name {shown(name)}; write a unit directly after its number: 1{name}")
         known = [*(each for each in scope.names if each != "ans"), *FUNCTIONS, *RESERVED]
         hint = did_you_mean(name, known)
         frames = [frame for _, tree in scope.trees for frame in tree.frames]

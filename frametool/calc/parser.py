@@ -38,7 +38,7 @@ LOOKUP = "a look-up is written TARGET<-SOURCE"
 HINTS = {
     "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": LOOKUP, ">": LOOKUP,
     ".": "a number has a digit behind its point, a column is row.NAME",
-    ";": "write one expression a line", "~": "the inverse is inv(..)", "'": 'names with blanks stand in "',
+    ";": "write one expression a line", "~": "the inverse is inv(..)", "'": 'write names with blanks in "',
 }  # fmt: skip
 
 _BLANKS = re.compile(r"\s*+")
@@ -288,11 +288,11 @@ class _Parser:
         """Return what may be meant by an unexpected token."""
         token, before = self.next, self.tokens[self.index - 1] if self.index else None
         if before is not None and before.kind == "number" and not before.unit and token.text in UNITS:
-            return f"; a unit stands close to its number: {before.text}{token.text}"
+            return f"; write a unit directly after its number: {before.text}{token.text}"
         if token.kind in ("lookup", "name", "pose", "column"):
             return "; poses are joined by *"
         if token.text == "=":
-            return "; a name stands before =, alone: NAME = expression"
+            return "; write a single name before =: NAME = expression"
         return "; a time belongs to a look-up: map<-base @ 2.5s" if token.text == "@" else ""
 
     def _deeper(self, at: int) -> None:

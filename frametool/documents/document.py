@@ -153,7 +153,7 @@ class Aliased(FormatError):
 def refuse_alias(node: Node) -> None:
     """Raise Aliased for an alias of YAML."""
     if node.quote == "*":
-        raise Aliased("an alias of YAML stands in the place of what is rewritten; write out what it stands for")
+        raise Aliased("a YAML alias is in place of what is rewritten; replace it by its value")
 
 
 NOTHING = Node(0, 0, {})  # a mapping without keys

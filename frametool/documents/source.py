@@ -66,7 +66,7 @@ MAGIC = {
     b"\x7fELF": "a program (ELF)",
     b"\x89PNG": "a PNG picture",
     b"\xff\xd8\xff": "a JPEG picture",
-    b"%PDF": "a PDF (view_frames leaves frames.gv beside its own)",
+    b"%PDF": "a PDF (view_frames writes frames.gv next to it)",
     b"\x1f\x8b": "gzip data; unpack it first",
     b"BZh": "bzip2 data; unpack it first",
     b"\xfd7zXZ": "xz data; unpack it first",
@@ -397,7 +397,7 @@ class InputFile:
         self.path = str(path)
         self.name = "stdin" if self.path == "-" else self.path
         self.format = ""
-        self.beside: Sequence[InputFile] = ()  # all files that are read together
+        self.siblings: Sequence[InputFile] = ()  # all files that are read together
         self.stream: BinaryIO = BufferedReader(BytesIO()) if folder else stream or opened(path)
         self._is_pipe = not self.stream.seekable()
 

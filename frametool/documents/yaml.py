@@ -166,7 +166,7 @@ def translated(source: Source, error: Exception) -> FormatError:
         return error_at(source, mark.index, message + _suspicion(source, line))
     if strange := re.search(_UNREADABLE, source.text):
         code = f"U+{ord(strange[0]):04X}"
-        return error_at(source, strange.start(), f"the character {code} may not stand in YAML or JSON; is this text?")
+        return error_at(source, strange.start(), f"the character {code} is not allowed in YAML or JSON; is this text?")
     return error_at(source, 0, _one_line(str(error)) or type(error).__name__)
 
 
@@ -401,7 +401,7 @@ class _Builder:
             raise self._error(event, f"alias *{name} has no anchor &{name} before it")
         value = self.anchors[name]
         if value is current or any(value is container for container, _ in self.open):
-            raise self._error(event, f"alias *{name} stands inside what it repeats")
+            raise self._error(event, f"alias *{name} is inside its own anchor")
         self.aliases -= 1
         if self.aliases < 0:
             raise self._error(event, f"more than {MOST_ALIASES} aliases")

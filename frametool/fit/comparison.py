@@ -330,7 +330,7 @@ def _first(pairs: Pairs, limit: Delta | None) -> int | None:
         return int(limit.amount)
     along = limit.along(pairs.ref)
     if along is None:
-        raise ValueInvalid(f"poses that are counted have no times; the first {limit} cannot be told")
+        raise ValueInvalid(f"poses without stamps have no times; the first {limit} is not known")
     return int(np.searchsorted(along, limit.amount, "right"))
 
 

@@ -349,7 +349,7 @@ def _require_two_axes(turns: _Turns, s_r: float, holder: str, camera: str) -> No
 def _warnings(turns: _Turns, count: int, holder: str) -> list[str]:
     notes = []
     if turns.rms[1] < SLIGHT:
-        small = f"{degrees(turns.rms[1]):.1f} deg rms beside {turns.axis} in {holder}"
+        small = f"{degrees(turns.rms[1]):.1f} deg rms, first axis {turns.axis} in {holder}"
         notes.append(f"turns about a second axis are small ({small}): turn more")
     if count < FEWEST_CERTAIN:
         notes.append(f"{count} samples say little of their own noise: the sigmas are rough; take 8 or more")

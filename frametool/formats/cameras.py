@@ -114,7 +114,7 @@ def cameras_of_tree(tree: Frames, files: Sequence[FrameFile]) -> Makers:
         again = file
         if file.path != "-":
             again = type(file)(file.path, fmt=file.format, answers=file.answers)
-            again.beside = file.beside
+            again.siblings = file.siblings
         with closing(again):
             known = cameras_of(again)
         for name, make in ((name.removeprefix("/"), make) for name, make in known.items()):

@@ -179,8 +179,8 @@ class FrameFile(InputFile):
     def tell(self) -> None:
         """Emit the warnings about the file, once it was read."""
         found: dict[str | Finding, list[Finding]] = {}
-        for told in self.tally.findings():
-            found.setdefault(told if told.rule == "odd" else alike(told), []).append(told)
+        for finding in self.tally.findings():
+            found.setdefault(finding if finding.rule == "odd" else alike(finding), []).append(finding)
         for first, *others in found.values():
             warn(f"{self.name}:{first.line}: {first.message}{more_like_it(1 + len(others))}", rule=first.rule)
 
@@ -194,7 +194,7 @@ def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
         close_all(found)
         raise
     for file in found:
-        file.beside = found
+        file.siblings = found
     return found
 
 
@@ -207,10 +207,10 @@ def close_all(files: Iterable[Source | FrameFile]) -> None:
 
 def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
     """Raise the error for a joint in options or files that no file has, once all were read."""
-    told = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
+    asked = [file.answers for file in files if file.answers.joints or file.answers.joint_files]
     robots = [file.tally for file in files if file.tally.robot is not None]
-    if told and not robots:
-        option = "--joint" if told[0].joints else "--joints"
+    if asked and not robots:
+        option = "--joint" if asked[0].joints else "--joints"
         raise BadAnswer(f"{option}: there are no joints in {', '.join(file.name for file in files)}")
     for name, error in robots[0].unknown_joints.items() if robots else ():
         if all(name in robot.unknown_joints for robot in robots):
@@ -406,11 +406,11 @@ class TreeBuilder:
         if self.buffer is not None:
             made = self.buffer
             single = (track.child for track in made.tracks() if not track.is_static and track.child not in self._moves)
-            standing = set() if self.rules.moving else set(single)
-            for child in standing:
+            static = set() if self.rules.moving else set(single)
+            for child in static:
                 made.make_static(child)
-            self._tell_replaced(standing)
-            tree = self._standing_tree(made)
+            self._warn_replaced(static)
+            tree = self._static_tree(made)
             made = made if made.moves else tree
         made.camera_axes |= self.axes
         made.covariances |= self.covariances
@@ -449,12 +449,12 @@ class TreeBuilder:
                 self._replaced.append(Replaced(parent, child, stamp_ns, earlier, place))
             places[stamp_ns] = place
 
-    def _tell_replaced(self, standing: set[str], most: int = 10) -> None:
+    def _warn_replaced(self, static: set[str], most: int = 10) -> None:
         """Refuse static frames with two values; warn about moving ones with two poses at one stamp."""
         from frametool.frames.stamps import format_stamp
 
         for each in self._replaced:
-            if each.child in standing:
+            if each.child in static:
                 raise self._placed(topology.two_poses(each.child, each.parent), each.parent, each.child, each.later)
         most += len(self._replaced) == most + 1
         for each in self._replaced[:most]:
@@ -464,7 +464,7 @@ class TreeBuilder:
         if len(self._replaced) > most:
             warn(f"{self.name}: {len(self._replaced) - most} more stamps with two poses of one frame")
 
-    def _standing_tree(self, buffer: TransformBuffer) -> FrameTree:
+    def _static_tree(self, buffer: TransformBuffer) -> FrameTree:
         """Return all static edges as a tree, which checks its rules."""
         tree = FrameTree(self.name)
         for frame in buffer.frames:
@@ -543,9 +543,9 @@ def load(
     chosen = tuple(topics)
     if format is not None and format not in readers("tree"):
         raise ValueInvalid(f"no trees are read from {format!r}{alternatives(format, readers('tree'), 'formats')}")
-    given = {} if joints is None or isinstance(joints, str | PathLike) else joints
-    values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in given.items()}
-    joint_files = () if joints is None or given is joints else (str(joints),)
+    by_name = {} if joints is None or isinstance(joints, str | PathLike) else joints
+    values = {name: value if isinstance(value, str) else repr(float(value)) for name, value in by_name.items()}
+    joint_files = () if joints is None or by_name is joints else (str(joints),)
     known = Answers(tuple(frames), joints=values, joint_files=joint_files, **answers)
     for ask, choices in CHOICES.items():
         if (answer := answers.get(ask)) and answer not in choices:

@@ -340,7 +340,7 @@ FORMATS = {
     ),
     "kitti-calib": _read_tree(
         "KITTI calibration", "frametool.formats.trees.kitti_calib", magic=(("text", _KITTI),),
-        conventions="parent<-child, metres, optical axes of cameras unless told",
+        conventions="parent<-child, metres, optical axes of cameras by default",
         required_options=("frames", "camera_axes"), cameras=True,
     ),
     "handeye": _tree(

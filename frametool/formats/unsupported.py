@@ -96,17 +96,17 @@ UNSUPPORTED = {
     ),
     "camera_info": Unsupported(
         "camera_info, the intrinsics of a camera",
-        "there is no pose in it; its frame stands in the tree of the robot: frametool project TREE FRAME --camera FILE",
+        "there is no pose in it; its frame is in the tree of the robot: frametool project TREE FRAME --camera FILE",
         (("yaml key", "projection_matrix|distortion_model"), ("line", r"\[image\]$")),
     ),
     "intrinsics": Unsupported(
         "cameras of Kalibr that were calibrated alone",
-        "there is no pose in it; one would stand under T_cam_imu or T_cn_cnm1 (project --camera FILE reads it)",
+        "there is no pose in it; it would be under T_cam_imu or T_cn_cnm1 (project --camera FILE reads it)",
         (("yaml inner", r"distortion_coeffs|cam_overlaps"),),
     ),
     "cameras": Unsupported(
         "cameras.txt of COLMAP, the intrinsics",
-        "there is no pose in it; those of the cameras stand in images.txt (frametool project --camera FILE reads it)",
+        "there is no pose in it; those of the cameras are in images.txt (frametool project --camera FILE reads it)",
         (("text", rf"\A(?:\s*#[^\n]*\n)*\s*\d+ (?:{_COLMAP_MODELS}) \d+ \d+ "),),
     ),
     "lio": Unsupported(

@@ -608,7 +608,7 @@ def _model_of(model: str | None, count: int, own: dict[str, float]) -> tuple[str
         counts = " or ".join(map(str, row.coefficients)) or "no"
         raise ValueInvalid(f"{name} has {counts} coefficients in D, not {count}")
     if own.keys() != {*row.parameters}:
-        needed = " and ".join(row.parameters) or "no parameters beside D"
+        needed = " and ".join(row.parameters) or "only D as a parameter"
         raise ValueInvalid(f"{name} has {needed}, not {' and '.join(own) or 'none'}")
     for each, value in own.items():
         low, high = (0.0, inf) if name == "omni" else RANGES[each]

@@ -1,7 +1,7 @@
-"""How positions on the Earth are written: latitude and longitude, ECEF, UTM, local axes; each way to ECEF and back.
+"""Notations of positions on the Earth: latitude and longitude, ECEF, UTM, local axes; conversion to ECEF and back.
 
-A `Place` says what numbers mean as a unit says it of lengths, and what rotations beside them are given in.  Knows
-numbers only, floats or arrays of one shape; a zone of UTM is a number, as `transverse_mercator` has it.
+A `Place` defines the meaning of numbers, as a unit does for lengths, and the axes of their rotations.  Knows numbers
+only, floats or arrays of one shape; a zone of UTM is a number, as in `transverse_mercator`.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Components, Namespace, Rigid, Vector
 
-ECEF, ENU, NED, GRID = "ecef", "enu", "ned", "grid"  # axes; two of them are places too, beside an origin
+ECEF, ENU, NED, GRID = "ecef", "enu", "ned", "grid"  # axes; ENU and NED are notations too, with an origin
 LLA, UTM = "lla", "utm"
 LOCAL = (ENU, NED)
-ZONE, AXES = "zone", "axes"  # what is written as a word
-SAMPLE = 0.5  # a number that is no zone
-ROUNDING = 1e-6  # metres or degrees: numbers that differ by no more are the same one, as it was read
-EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both are whole degrees
-GRIDDED = ("convergence_deg", "grid_scale")  # what results say of UTM beside its numbers
+ZONE, AXES = "zone", "axes"  # written as words
+SAMPLE = 0.5  # a number that is not a zone
+ROUNDING = 1e-6  # metres or degrees: a computed number this close to the one that was read is unchanged
+EDGE, END = 1e-11, 1e-13  # degrees: 1 micrometre, where zones meet, and 1e-8 m, where UTM ends; both at whole degrees
+GRIDDED = ("convergence_deg", "grid_scale")  # results have them in addition to UTM's numbers
 UNSAID = (
     "a pose at lat, lon does not state the axes of its rotation; "
     "axes: enu, ned, grid or ecef; for rows --local-axes"
@@ -38,20 +38,20 @@ UNSAID = (
 
 
 class Origin:
-    """Where the axes of enu and ned stand: at a place, or at the first position that is written.
+    """The origin of enu and ned: a fixed position, or the first one that is written.
 
-    tell: says where, once it is settled by a position
+    tell: reports the origin once it is set by a position
     """
 
     __slots__ = ("place", "tell")
 
     def __init__(self, place: Vector | None = None, tell: Callable[[Vector], None] | None = None) -> None:
-        """Take lat, lon, alt; None for the first position."""
+        """Store lat, lon, alt; None for the first position."""
         self.place = place
         self.tell = tell
 
     def settle(self, x: Any, y: Any, z: Any) -> None:
-        """Take the first finite position of ECEF for the origin, where none was told."""
+        """Use the first finite position in ECEF as the origin, unless it is set."""
         if self.place is not None:
             return
         rows = zip(*(part.tolist() if hasattr(part, "tolist") else [part] for part in (x, y, z)), strict=True)
@@ -59,28 +59,28 @@ class Origin:
             found = earth.lla(row[0], row[1], row[2], floats)
             if all(map(isfinite, found)):
                 lat, lon, alt = found
-                self.place = found = round(lat, 13), round(lon, 13), round(alt, 8)  # as short as it may be: 10 nm
+                self.place = found = round(lat, 13), round(lon, 13), round(alt, 8)  # short to print: 10 nm
                 if self.tell is not None:
                     self.tell(found)
                 return
 
     def pose(self, axes: str) -> Rigid:
-        """Return ecef_from_axes there."""
+        """Return ecef_from_axes at the origin."""
         if self.place is None:
             raise ValueInvalid("there is no position to take for the origin")
         return earth.pose(*self.place, axes, floats)
 
 
 class Place(NamedTuple):
-    """One way to write positions on the Earth, and what rotations there are given in.
+    """A notation of positions on the Earth, with the axes of rotations.
 
     name: of its row of POSITIONS
-    fields: what each of its numbers is, in their order
-    axes: of rotations: enu, ned, grid, ecef; "" where nothing is said, or each row has its own among its numbers
-    level: rotations are headings: turns about down, which a frame whose z is up has another way round
-    zone: of UTM the one that all are in; None where each has its own, which is then among its numbers
+    fields: the meaning of each of its numbers, in order
+    axes: of rotations: enu, ned, grid, ecef; "" if not stated, or if each row has its own among its numbers
+    level: rotations are headings: about down, which is the opposite direction in a frame with z up
+    zone: of UTM, common to all; None if each position has its own among its numbers
     origin: of enu and ned
-    more: further ways that a result is written in beside this one
+    more: further notations of a result
     """
 
     name: str
@@ -93,7 +93,7 @@ class Place(NamedTuple):
 
     @classmethod
     def written(cls, names: Sequence[str], earth_: Earth) -> Place:
-        """Return how results are written that are asked for by the names of representations."""
+        """Return the notation of results from the names of representations."""
         made = []
         for name in names:
             if name in LOCAL and earth_.origin is None:
@@ -106,7 +106,7 @@ class Place(NamedTuple):
 
     @classmethod
     def of_xyz(cls, name: str, said: Earth) -> Place | None:
-        """Return what x, y, z are in ecef, in the zone that is held, or in the local axes of the origin; else None.
+        """Return the notation of x, y, z: in ecef, in the fixed zone, or in the local axes of the origin; else None.
 
         Raises ValueInvalid for local axes without an origin.
         """
@@ -120,29 +120,29 @@ class Place(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Count its numbers."""
+        """Return the number of its fields."""
         return len(self.fields) + sum(each.size for each in self.more)
 
     @property
     def is_local(self) -> bool:
-        """Return True if one of the ways it is written in has an origin."""
+        """Return True if one of its notations has an origin."""
         return any(each.origin is not None for each in (self, *self.more))
 
     @property
     def sample(self) -> tuple[float, ...]:
-        """Return numbers that stand for others, also for those that are written as words."""
+        """Return example numbers, also for fields that are written as words."""
         return (SAMPLE,) * self.size
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Name its numbers as columns of a table."""
+        """Return the column names of its fields."""
         own = dict(zip(POSITIONS[self.name].names, POSITIONS[self.name].columns, strict=True))
         rest = (name for each in self.more for name in each.columns)
         return (*(own.get(field, field) for field in self.fields), *rest)
 
     @property
     def words(self) -> dict[int, tuple[str, ...]]:
-        """Return the words that numbers stand for, by the number's place: zones."""
+        """Return the words for numbers that are written as words, by the index of the field: zones."""
         found = {at: mercator.ZONES for at, field in enumerate(self.fields) if field == ZONE}
         first = len(self.fields)
         for each in self.more:
@@ -151,7 +151,7 @@ class Place(NamedTuple):
         return found
 
     def with_grid(self, *, gridded: bool) -> Place:
-        """Return the same with convergence and scale beside UTM, where there is room for them, or without."""
+        """Return the same with or without convergence and scale in addition to UTM."""
         size = len(self.fields) - len(GRIDDED) * (GRIDDED[0] in self.fields)
         fields = self.fields[:size] + GRIDDED * (gridded and self.name == UTM)
         return self._replace(fields=fields, more=tuple(each.with_grid(gridded=gridded) for each in self.more))
@@ -159,13 +159,13 @@ class Place(NamedTuple):
     # --- reading ---
 
     def lla(self, numbers: Sequence[Any]) -> Components:
-        """Return lat, lon in degrees and alt of its numbers."""
+        """Return lat, lon in degrees and alt from its numbers."""
         xp, row = namespace(numbers), kernels(self.name)
         a, b, c = row.read(self, self.given(numbers), xp)
         return (a, b, c) if row.is_angular else earth.lla(a, b, c, xp)
 
     def ecef(self, numbers: Sequence[Any]) -> Components:
-        """Return x, y, z in ECEF of its numbers; NaN for what is no place, and `check` says why."""
+        """Return x, y, z in ECEF from its numbers; NaN for an invalid position; `check` raises the reason."""
         xp, row = namespace(numbers), kernels(self.name)
         a, b, c = row.read(self, self.given(numbers), xp)
         return earth.ecef(a, b, c, xp) if row.is_angular else (a, b, c)
@@ -175,7 +175,7 @@ class Place(NamedTuple):
         return dict(zip(self.fields, numbers, strict=True))
 
     def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
-        """Return a rotation given in the axes there, as x y z w, in ECEF."""
+        """Return in ECEF a rotation that is relative to the local axes, as x y z w."""
         if AXES in self.fields:
             return self._by_row(numbers, rotation)
         if self.axes == ECEF:
@@ -183,14 +183,14 @@ class Place(NamedTuple):
         return quaternion.compose(*self._axes_at(numbers), *self.levelled(rotation))
 
     def levelled(self, rotation: Components) -> Components:
-        """Return a rotation in the axes there: of a heading, a turn about down, yaw = 90 degrees - it where z is up."""
+        """Return a rotation relative to the local axes, from a heading about down: yaw = 90 degrees - it for z up."""
         if not self.level or self.axes == NED:
             return tuple(rotation)
         _, _, s, c = rotation
         return quaternion.settled(0.0 * s, 0.0 * s, SQRT_HALF * (c - s), SQRT_HALF * (c + s))
 
     def _by_row(self, numbers: Sequence[Any], rotation: Components) -> Components:
-        """Return rotations that are given in the axes that each row says."""
+        """Return rotations relative to the axes of each row."""
         at = self.fields.index(AXES)
         codes, others = numbers[at], [*numbers[:at], *numbers[at + 1 :]]
         bare = self._replace(fields=(*self.fields[:at], *self.fields[at + 1 :]))
@@ -203,7 +203,7 @@ class Place(NamedTuple):
         return found
 
     def base(self, numbers: Sequence[Any]) -> Components:
-        """Return ecef_from_axes at the place that numbers say."""
+        """Return ecef_from_axes at the position."""
         return (*self.ecef(numbers), *self._axes_at(numbers))
 
     def _axes_at(self, numbers: Sequence[Any]) -> Components:
@@ -222,7 +222,7 @@ class Place(NamedTuple):
         return self.given(numbers).get(ZONE, self.zone)
 
     def check(self, numbers: Sequence[float]) -> None:
-        """Raise ValueInvalid unless floats are a place."""
+        """Raise ValueInvalid unless floats are a valid position."""
         given = self.given(numbers)
         if self.name == UTM:
             mercator.check_grid(given[ZONE] if self.zone is None else self.zone, given["easting"], given["northing"])
@@ -235,15 +235,15 @@ class Place(NamedTuple):
     # --- writing ---
 
     def settle(self, x: Any, y: Any, z: Any) -> None:
-        """Let the first of positions in ECEF be the origin, where that is asked for."""
+        """Use the first of positions in ECEF as the origin, if requested."""
         for each in (self, *self.more):
             if each.origin is not None:
                 each.origin.settle(x, y, z)
 
     def numbers(self, x: Any, y: Any, z: Any, read: Spot | None = None) -> list[Any]:
-        """Return its numbers of a position in ECEF; NaN where there are none, and `check_result` says why.
+        """Return its numbers for a position in ECEF; NaN if it has none; `check_result` raises the reason.
 
-        read: the place that the position was read as, where nothing has moved it: that is not taken through ECEF
+        read: the position as it was read, if unchanged: it is not converted through ECEF
         """
         xp = namespace((x, y, z))
         lla: Components = ()
@@ -267,7 +267,7 @@ class Place(NamedTuple):
         return found
 
     def local(self, x: Any, y: Any, z: Any, rotation: Components) -> Components:
-        """Return a rotation of ECEF, as x y z w, in the axes at a position of ECEF."""
+        """Return a rotation in ECEF, as x y z w, relative to the axes at a position in ECEF."""
         if self.axes == ECEF:
             return rotation
         if self.origin is not None:
@@ -279,7 +279,7 @@ class Place(NamedTuple):
         return quaternion.compose(*quaternion.conjugate(*base), *rotation)
 
     def check_result(self, x: float, y: float, z: float) -> None:
-        """Raise ValueInvalid unless a position in ECEF can be written so."""
+        """Raise ValueInvalid unless a position in ECEF can be written in this notation."""
         for each in (self, *self.more):
             if kernels(each.name).is_angular:
                 earth.check_ecef(x, y, z)
@@ -288,7 +288,7 @@ class Place(NamedTuple):
                 mercator.check_utm(_held(each.zone, lat, lon, floats), _edged(lat, END, floats), lon)
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
-        """Return its numbers as the keys that a mapping has."""
+        """Return its numbers as the keys of a mapping."""
         own = dict(zip(self.fields, numbers, strict=False))
         if self.name == UTM:
             own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else mercator.ZONES[int(own[ZONE])]}}
@@ -302,19 +302,19 @@ class Place(NamedTuple):
 
 
 class Spot(NamedTuple):
-    """A position as it was read: how it is written, and its numbers."""
+    """A position as it was read: its notation, and its numbers."""
 
     place: Place
     numbers: Sequence[Any]
 
 
 class Unmoved(tuple[Any, ...]):  # noqa: SLOT001 - the slots of a tuple cannot be added to
-    """The components of a result at the place that its row was read as: `read`."""
+    """The components of a result at the position of its row as it was read: `read`."""
 
     read: Spot
 
     def __new__(cls, parts: Components, read: Spot) -> Self:
-        """Put the two together."""
+        """Create from both."""
         made = super().__new__(cls, parts)
         made.read = read
         return made
@@ -330,8 +330,8 @@ class Kernels(NamedTuple):
 
     read: takes a place, its numbers by field and a namespace, and returns lat, lon and alt; or x, y, z in ECEF
     write: takes the place, these three and a namespace, and returns its numbers
-    is_angular: these are lat, lon, alt, which take no way through ECEF
-    least: how many of the numbers there must be; axes: of rotations there, where nobody says
+    is_angular: these are lat, lon, alt, without a conversion through ECEF
+    least: the minimum count of numbers; axes: default axes of rotations
     is_nested: a mapping has the numbers below its name
     """
 
@@ -363,7 +363,7 @@ def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
 
 
 def _read_local(place: Place, given: dict[str, Any], _: Namespace) -> Components:
-    """Return x, y, z of axes at the origin; what is not there is 0."""
+    """Return x, y, z of axes at the origin; missing numbers are 0."""
     zero = next(iter(given.values())) * 0.0
     return rigid.apply(*_origin(place), *(given.get(name, zero) for name in POSITIONS[place.name].names))
 
@@ -398,19 +398,19 @@ def kernels(name: str) -> Kernels:
 
 
 def _height(given: dict[str, Any], other: Any) -> Any:
-    """Return the height above the ellipsoid, 0 where none is given."""
+    """Return the height above the ellipsoid, by default 0."""
     return given["msl"] + given["undulation"] if "msl" in given else given.get("alt", other - other)
 
 
 def _as_read(own: Any, made: Any, xp: Namespace) -> Any:
-    """Return a number as it was read where it is the one that was computed, but for rounding."""
+    """Return a number as it was read if the computed one differs only by rounding."""
     return made if own is None else xp.where(abs(own - made) <= ROUNDING, own, made)
 
 
 class Earth(NamedTuple):
-    """What is said of all positions on the Earth in one run.
+    """Options for all positions on the Earth in one run.
 
-    origin: of enu and ned; axes: of rotations; zone: of UTM, which holds everywhere
+    origin: of enu and ned; axes: of rotations; zone: of UTM, fixed for all
     """
 
     origin: Origin | None = None
@@ -419,20 +419,20 @@ class Earth(NamedTuple):
 
 
 def _held(zone: Any, lat: Any, lon: Any, xp: Namespace) -> Any:
-    """Return the zone that is held, or that of each place; one at an edge is there though rounding moved it."""
+    """Return the fixed zone, or that of each position; one at an edge is inside in spite of rounding."""
     if zone is None:
         return mercator.standard_zone(_edged(lat, EDGE, xp), _edged(lon, EDGE, xp), xp)
     return zone + (lat - lat)
 
 
 def _edged(angle: Any, near: float, xp: Namespace) -> Any:
-    """Return whole degrees where an angle is as near to them."""
+    """Return whole degrees for an angle this close to them."""
     whole = nearest(angle)
     return xp.where(abs(angle - whole) <= near, whole, angle)
 
 
 def namespace(numbers: Sequence[Any]) -> Namespace:
-    """Return what computes with numbers: floats, or arrays."""
+    """Return the namespace for numbers: floats, or arrays."""
     if all(type(number) is float for number in numbers):
         return floats
     from frametool.geometry import arrays

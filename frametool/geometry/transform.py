@@ -79,7 +79,7 @@ class Transform(Batched):
         if isinstance(xyz, Rotation):
             raise ValueInvalid("xyz: the position comes first, the rotation by its name: from_parts(xyz, rotation=..)")
         if len(rotation) > 1:
-            raise ValueInvalid(f"from_parts takes one rotation beside xyz, not {' and '.join(rotation)}")
+            raise ValueInvalid(f"from_parts takes one rotation, not {' and '.join(rotation)}")
         (name, inputs), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
         turn = inputs if name == "rotation" else Rotation.from_notation(name, inputs, normalize=normalize)
         shift = validation.columns(xyz, 3, "xyz")

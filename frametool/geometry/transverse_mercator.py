@@ -165,10 +165,10 @@ def lat_lon(zone: N, easting: N, northing: N, xp: Functions[N]) -> Two[N]:
     x, y = _product(s2 * ch2, c2 * sh2, *_complex_polynomial(c2 * ch2, 0.0 - s2 * sh2, BACK))
     s, c = half_sincos(2.0 * (xi + x), xp)
     sh, ch = _sinh_cosh(eta + y, xp)
-    beside = xp.sqrt(sh * sh + c * c)
-    lon = xp.doubled_arctan(sh / (beside + c)) * RADIAN
-    sx, cx = s / ch, beside / ch
-    chi = xp.doubled_arctan(s / (ch + beside))
+    hyp = xp.sqrt(sh * sh + c * c)
+    lon = xp.doubled_arctan(sh / (hyp + c)) * RADIAN
+    sx, cx = s / ch, hyp / ch
+    chi = xp.doubled_arctan(s / (ch + hyp))
     lat = (chi + (2.0 * sx * cx) * polynomial((cx - sx) * (cx + sx), GEODETIC)) * RADIAN
     lat = within(lat, SOUTH - SLACK, NORTH + SLACK, xp)
     lon = within(lon, -REACH - SLACK, REACH + SLACK, xp)

@@ -5,7 +5,7 @@ a kernel's body for each.  `Functions[N]` is what it finds in `xp`: the module `
 among arrays is constant for every element.
 """
 
-# ruff: noqa: D102 - the functions of a namespace are those of `math`; the others say what they do where they stand
+# ruff: noqa: D102 - the functions of a namespace are those of `math`; the others have docstrings where they are defined
 
 from __future__ import annotations
 

@@ -53,8 +53,8 @@ def find_columns(names: Sequence[str], size: int) -> tuple[tuple[int, ...], tupl
     entries = columns(size)
     whole = tuple(names.index(name) for name in entries) if {*entries} <= {*names} else ()
     if not whole and size == 36 and {*columns(9)} <= {*names}:
-        given = sum(name in names for name in entries)
-        raise NotARotation(f"covariance has {given} columns; 36 are needed, c11 .. c66 (x y z, rotation about X Y Z)")
+        count = sum(name in names for name in entries)
+        raise NotARotation(f"covariance has {count} columns; 36 are needed, c11 .. c66 (x y z, rotation about X Y Z)")
     places: list[int] = []
     found: dict[str, tuple[int, str]] = {}
     for place, name in enumerate(names):

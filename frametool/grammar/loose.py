@@ -60,7 +60,7 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
             together, part = _FLAT[key]
             parts = found.setdefault(together, {})
             if type(parts) is not dict or part in parts:
-                raise Misfit(f"{bare(key)} says again what stands beside it; keep one", (key,), key=True)
+                raise Misfit(f"{bare(key)} repeats another key; keep one", (key,), key=True)
             parts[part], places[together, part] = value, key
         elif key in _WHOLE:
             if type(value) is not list or len(value) != 7:
@@ -89,14 +89,14 @@ def _in_grammar(fields: dict[str, Any], order: str, places: dict[Path, str]) -> 
             present = found.get(spelled)
             if type(present) is dict and present.keys() != {*parts} and present.keys() != least:
                 missing = ", ".join(part for part in parts if part not in present)
-                raise Misfit(f"half a rotation: missing {missing} beside {', '.join(present)}")
+                raise Misfit(f"incomplete rotation: missing {missing} beside {', '.join(present)}")
     return found
 
 
 def _put(found: dict[str, Any], key: str, value: Any, present: str) -> None:
     """Store a value; raises Misfit for a second position, or for a duplicate."""
     if key in found:
-        raise Misfit(f"{bare(present)} says again what stands beside it; keep one", (present,), key=True)
+        raise Misfit(f"{bare(present)} repeats another key; keep one", (present,), key=True)
     found[key] = value
 
 
@@ -119,6 +119,6 @@ def _turn(value: Any, order: str, key: str) -> tuple[str, Any]:
 def _ordered(value: list[Any], order: str, key: str) -> str:
     if not order:
         numbers = ", ".join(str(each) for each in value)
-        what = f"{bare(key)} [{bare(numbers)}] does not say where w stands"
+        what = f"{bare(key)} [{bare(numbers)}] does not state the position of w"
         raise Unclear(f"{what}: give --from xyzw or --from wxyz, for all of the file", (key,), key=True)
     return order

@@ -81,7 +81,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     said, axes = AXES_KEY in mapping, take_axes(mapping, reading, spots[0].place.name)
     check_parent(mapping, own)
     if "inverse" in mapping:
-        raise Misfit("a place on the Earth is given in ecef; leave inverse out", ("inverse",), key=True)
+        raise Misfit("a position on the Earth is in ecef; remove inverse", ("inverse",), key=True)
     turn = _heading(own, axes)
     if turn is not None and inner.rotation is not None:
         raise Misfit("a heading is a rotation; keep one", (next(key for key in HEADINGS if key in own),), key=True)
@@ -95,8 +95,8 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
             return inner._replace(parent=inner.parent or ECEF)
         inner = inner._replace(position=None)
     rotation = turn or inner.rotation
-    stands = AT in own or reading.framed  # a frame has axes, a position does not
-    needs_axes = stands or rotation is not None or inner.covariance is not None
+    is_frame = AT in own or reading.framed  # a frame has axes, a position does not
+    needs_axes = is_frame or rotation is not None or inner.covariance is not None
     if needs_axes and not axes:
         raise Misfit(UNSAID)
     if not needs_axes:
@@ -109,7 +109,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     made = placed.compose(place.base(numbers), inner._replace(rotation=rotation, scale=1.0).placed)
     found = inner.of(made, inner.name, inner.parent or ECEF)
     found = found if inner.position else found._replace(read=spots[0])
-    return found if rotation is not None or stands else found._replace(rotation=None)
+    return found if rotation is not None or is_frame else found._replace(rotation=None)
 
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:

@@ -299,7 +299,7 @@ def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None
     known -= LISTED_WORDS
     if unknown and "children" in also and type(mapping[unknown[0]]) is dict:
         below = f"children: {{{unknown[0]}: ..}}"
-        raise Misfit(f"frames below one with a pose stand under {below}", (unknown[0],), key=True)
+        raise Misfit(f"frames below one with a pose are under {below}", (unknown[0],), key=True)
     if unknown:
         named = unknown_keys([(key, did_you_mean(key, known)) for key in unknown[: MOST_NAMED + 1]], len(unknown))
         choices = ", ".join([*ROTATIONS][:MOST_CHOICES])

@@ -1,8 +1,8 @@
-"""Products, inverses and differences of poses that name their frames; frames that do not touch are refused.
+"""Products, inverses and differences of poses that name their frames; inner frames have to match.
 
     map_from_tool = product(map_from_base, base_from_tool)
 
-A lookup is such a result too: the pose of SOURCE in TARGET as an entry of a tree, with the times that mattered.
+A lookup has such a result too: the pose of SOURCE in TARGET as an entry of a tree, with its times.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RELATIVE_EXTRAS = ("distance", "angle", "angle_deg")
 def product(left: Pose, right: Pose) -> Pose:
     """Return a_from_c of a_from_b and b_from_c.
 
-    Raises ValueInvalid where both name the frame between them and the names differ.
+    Raises ValueInvalid if both name the inner frame and the names differ.
     """
     is_exact = left.is_exact and right.is_exact
     compose = (lambda a, b: rigid.compose(*a, *b)) if is_exact else _placed().compose
@@ -41,14 +41,14 @@ def product(left: Pose, right: Pose) -> Pose:
 
 
 def _placed() -> Any:
-    """Return what composes poses that are not exact, or scaled; few are, and a start does without."""
+    """Return the functions for poses with a covariance or a scale; they are rare, so start-up does not import them."""
     from frametool.geometry import placed
 
     return placed
 
 
 def composed_names(left: Pose, right: Pose) -> tuple[str | None, str | None]:
-    """Return parent and name of a product; raise ValueInvalid if the frames do not touch."""
+    """Return parent and name of a product; raise ValueInvalid if the inner frames differ."""
     if left.name is not None and right.parent is not None and left.name != right.parent:
         raise ValueInvalid(
             f"frames do not touch: {left.parent or '?'} <- {left.name} is followed by "
@@ -58,7 +58,7 @@ def composed_names(left: Pose, right: Pose) -> tuple[str | None, str | None]:
 
 
 def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
-    """Return the one time that some poses have, for their result; of several times it has none, which is told."""
+    """Return the common time of some poses, for their result; different times give none, with a warning."""
     stamps = sorted({pose.stamp_ns for pose in poses if pose.stamp_ns is not None})
     if len(stamps) > 1:
         warn(f"the result has no stamp: {' and '.join(map(format_stamp, stamps[:2]))} are the times of two poses")
@@ -66,7 +66,7 @@ def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
 
 
 def inverse(pose: Pose) -> Pose:
-    """Return b_from_a of a_from_b; what the pose does not say stays unsaid."""
+    """Return b_from_a of a_from_b; missing parts remain missing."""
     back = Pose.of(rigid.inverse(*pose.components) if pose.is_exact else _placed().inverse(pose.placed))
     return back._replace(
         position=None if pose.position is None else back.position,
@@ -78,9 +78,9 @@ def inverse(pose: Pose) -> Pose:
 
 
 def relative(a: Pose, b: Pose) -> Result:
-    """Return B seen from A, inverse(a) b, with the distance in metres and the angle in radians and degrees.
+    """Return the pose of B in A, inverse(a) b, with the distance in metres and the angle in radians and degrees.
 
-    Raises ValueInvalid where the two are given in different frames.
+    Raises ValueInvalid if the two are in different frames.
     """
     components = rigid.relative(*a.components, *b.components)
     distance, angle = rigid.extent(*components, floats)
@@ -90,7 +90,7 @@ def relative(a: Pose, b: Pose) -> Result:
 
 
 def relative_names(a: Pose, b: Pose) -> tuple[str | None, str | None]:
-    """Return parent and name of B seen from A; raise ValueInvalid if they are given in different frames."""
+    """Return parent and name of the pose of B in A; raise ValueInvalid if they are in different frames."""
     _refuse_two_parents(a, b)
     return a.name, b.name
 
@@ -107,9 +107,9 @@ def turn_between(start: Vector, end: Vector) -> Result:
 
 
 def interpolated(a: Pose, b: Pose, fraction: float) -> Pose:
-    """Return the pose at a fraction of the way, and of the time, from a (0) to b (1): straight line and slerp, as tf2.
+    """Interpolate pose and time from a (0) to b (1): linearly and by slerp, as tf2 does.
 
-    Raises ValueInvalid where the two are given in different frames.
+    Raises ValueInvalid if the two are in different frames.
     """
     _refuse_two_parents(a, b)
     components = rigid.interpolate(*a.components, *b.components, fraction, floats)
@@ -121,7 +121,7 @@ def interpolated(a: Pose, b: Pose, fraction: float) -> Pose:
 
 def _refuse_two_parents(a: Pose, b: Pose) -> None:
     if a.parent is not None and b.parent is not None and a.parent != b.parent:
-        raise ValueInvalid(f"A is given in {shown(a.parent)} and B in {shown(b.parent)}; give both in one frame")
+        raise ValueInvalid(f"A is in {shown(a.parent)} and B in {shown(b.parent)}; use one frame for both")
 
 
 BLOCK = 1 << 14  # times
@@ -130,7 +130,7 @@ BLOCK = 1 << 14  # times
 def result_at(
     components: Rigid, target: str | None, source: str | None, at_ns: int | None, entries: Iterable[float] | None = None
 ) -> Result:
-    """Return target_from_source as a result; a time of None did not matter.  entries: of its covariance."""
+    """Return target_from_source as a result; a time of None has no effect.  entries: of its covariance."""
     stamp = {} if at_ns is None else {"stamp_ns": at_ns}
     return Result(Pose.of(components, source, target), {**stamp, **uncertain(entries)})
 
@@ -138,7 +138,7 @@ def result_at(
 def looked_up(
     frames: Frames, target: str, source: str, at_ns: int | None = None, *, covariance: bool = False
 ) -> Result:
-    """Look up at one time; None is the latest, and the result says which that was."""
+    """Look up at one time; None is the latest, and the result states it."""
     at_ns = frames.latest(target, source) if at_ns is None else at_ns
     found = frames.lookup_components(target, source, at_ns)
     return result_at(found, target, source, at_ns, frames.carried(target, source, at_ns) if covariance else None)
@@ -147,7 +147,7 @@ def looked_up(
 def looked_up_across(
     frames: Frames, target: str, at_ns: int | None, source: str, source_at_ns: int | None, fixed: str
 ) -> Result:
-    """Look up across two times by way of a fixed frame; the result says both."""
+    """Look up across two times through a fixed frame; the result states both."""
     found = frames.lookup_across(target, at_ns, source, source_at_ns, fixed)
     at_ns = frames.latest(target, fixed) if at_ns is None else at_ns
     source_at_ns = frames.latest(fixed, source) if source_at_ns is None else source_at_ns
@@ -161,7 +161,7 @@ def looked_up_many(
 ) -> Iterator[Result]:  # fmt: skip
     """Look up at many times, in their order, block by block.
 
-    miss: takes each time without data, which then has no result; without it the first one raises.
+    miss: receives each time without data, which has no result; without it the first one raises an error.
     """
     for begin in range(0, len(times), BLOCK):
         block = times[begin : begin + BLOCK]
@@ -190,7 +190,7 @@ def why_missing(frames: Frames, target: str, source: str, at_ns: int) -> LookupF
 
 
 def sample_stamps(frames: Frames, target: str, source: str) -> list[int]:
-    """Return the stamps of all samples on the way between two frames at which all of it has data, sorted."""
+    """Return the stamps of all samples on the path between two frames at which all edges have data, sorted."""
     span = frames.span(target, source)
     if span is None:
         return []
@@ -203,15 +203,15 @@ def sample_stamps(frames: Frames, target: str, source: str) -> list[int]:
         if first <= stamp_ns <= last
     }
     if not stamps:
-        frames.lookup_components(target, source, first)  # raises: the samples of two edges never overlap
+        frames.lookup_components(target, source, first)  # raises an error: the samples of two edges never overlap
     return sorted(stamps)
 
 
 class Lookups:
-    """Look-ups of a tree, with the covariances of its edges if these are carried, and what is to be said of them."""
+    """Look-ups of a tree, with the covariances of its edges if requested, and warnings about them."""
 
     def __init__(self, tree: Frames, *, carried: bool) -> None:
-        """Begin before the first result."""
+        """Start without results."""
         self.tree, self.carried = tree, carried
         self.edges: set[str] = set()  # by their children
         self.widest: Sequence[float] = ()
@@ -234,7 +234,7 @@ class Lookups:
         return self._with_covariance(found, target, source, times_ns) if self.carried else found
 
     def noted(self, result: Result) -> Result:
-        """Take a result of a lookup in."""
+        """Record a result of a lookup."""
         if not self.carried:
             return result
         from frametool.geometry.uncertainty import widest_turn
@@ -262,7 +262,7 @@ class Lookups:
         return (*poses, *entries.T)
 
     def granted(self) -> str:
-        """Return what was taken for granted, "" for nothing; warn of turns too wide for the first order."""
+        """Return the assumptions about covariances, or ""; warn about rotations too uncertain for the first order."""
         if not self.edges:
             return ""
         from frametool.geometry.uncertainty import warn_if_wide

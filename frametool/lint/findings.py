@@ -34,7 +34,7 @@ RULES = {
     "topics": ("note", "the topics that transforms came by"),
     "two-topics": ("error", "a frame that comes by the topics of two robots"),
     "limit": ("warning", "the value of a joint beyond its limits"),
-    "odd": ("warning", "anything else worth a look while reading"),
+    "odd": ("warning", "anything else suspicious while reading"),
     "self": ("error", "a frame that is its own parent"),
     "cycle": ("error", "frames that form a cycle"),
     "two-parents": ("error", "a static frame with two parents"),

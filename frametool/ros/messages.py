@@ -143,7 +143,7 @@ def read_pose(message: dict[str, Any], reading: Reading, body: str) -> tuple[str
     pose = part(message, "pose", HAS)
     path: Path = ("pose",)
     if "pose" in pose:
-        pose, path = within(path, part, pose, "pose", "with a covariance beside it"), ("pose", "pose")
+        pose, path = within(path, part, pose, "pose", "with a covariance"), ("pose", "pose")
     position, rotation = within(path, read_rigid, pose, ("position", "orientation"), reading)
     parent = frame_of(header, "frame_id", ("header",), reading)
     child = frame_of(message, "child_frame_id", (), reading) if message.get("child_frame_id") else body

@@ -175,7 +175,7 @@ frametool: a list of 4 numbers; a point has 3, a twist 6; rotations need a name:
 frametool: cannot add a number in m and a number in rad
   1m + 90deg
      ^
-frametool: unexpected 'm'; a unit stands close to its number: 1m
+frametool: unexpected 'm'; write a unit directly after its number: 1m
   1 m
     ^
 frametool: expected ')' here
@@ -279,7 +279,7 @@ def test_what_does_not_fit_is_refused_with_its_place(sentence: str, text: str, c
     ("d[map<-lidr]", "did you mean 'lidar'?"),
     ("map tool", "unexpected 'tool'"),
     ("(map<-tool) map<-lidar", "unexpected 'map<-lidar'; poses are joined by *"),
-    ("3 * deg", "unknown name 'deg'; a unit stands close to its number: 1deg"),
+    ("3 * deg", "unknown name 'deg'; write a unit directly after its number: 1deg"),
     ("inv", "inv is a function: inv(pose)"),
     ("goal = map<-tool;goal(1)", "unknown function 'goal'; goal is a value, poses are joined by *"),
 ])  # fmt: skip

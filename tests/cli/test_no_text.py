@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 NOISE = np.random.default_rng(3).bytes(4000)
 LISTED = "`frametool formats` lists what is read"
 FRAMES = "frames, not a pose; look one up: frametool lookup {} TARGET SOURCE"
-PDF = "not text but a PDF (view_frames leaves frames.gv beside its own)"
+PDF = "not text but a PDF (view_frames writes frames.gv next to it)"
 FILES: dict[str, tuple[bytes, str]] = {
     "a.bag": (b"#ROSBAG V2.0\nE\0\0\0" + NOISE, f"ROS 1 bag: {FRAMES.format('a.bag')}"),
     "a.mcap": (b"\x89MCAP0\r\n" + NOISE, f"MCAP file: {FRAMES.format('a.mcap')}"),

@@ -307,7 +307,7 @@ def test_frames_make_a_tree_ours_whatever_stands_beside_them(beside: str, tmp_pa
     path = tmp_path / "a"
     for text in (f"{beside}\nframes: {{a: {{b: {{xyz: [1, 0, 0]}}}}}}\n", f"frames:\n  a:\n{beside}\n"):
         path.write_text(text)
-        with pytest.raises(FormatError, match=r"unknown key .* beside frames"):
+        with pytest.raises(FormatError, match=r"unknown key .* next to frames"):
             load(path)
 
 

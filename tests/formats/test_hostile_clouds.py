@@ -90,12 +90,12 @@ def test_a_broken_pcd_is_one_line(run: Run, tmp_path: Path, data: bytes, message
         (told(PLY, b"property float y", b"property float x"), "in.ply:7: property 'x' of 'vertex' appears twice"),
         (told(PLY, b"property float y", b"propert float y"), "in.ply:7: 'propert' is no key of a PLY header; keys: format, element, property, comment, obj_info, end_header"),
         (told(PLY, b"property uint ring", b"property list uchar int ring"), "in.ply:5: the list 'ring' within 'vertex' is not read; write it as an element of its own, or leave it out"),
-        (ply(CLOUD, before=FACE), "in.ply:5: element 'face' with the list 'vi' stands before 'vertex'; write 'vertex' first, or the file as ascii"),
+        (ply(CLOUD, before=FACE), "in.ply:5: element 'face' with the list 'vi' is before 'vertex'; write 'vertex' first, or the file as ascii"),
         (ply(CLOUD, before="element cam 10000000000\nproperty float f\n"), "in.ply: the file ends before its vertices, 39999999952 bytes early"),
         (PLY[: PLY.index(b"end_header")], "in.ply:10: the header ends before its `end_header` line; is the file whole?"),
         (TEXT_PLY[: TEXT_PLY.rindex(b"\n", 0, -1)], "in.ply: the header says 3 points, the file holds 2"),
         (TEXT_PLY + b"1 2 3 4\n", "in.ply:14: the header says 3 points, more rows follow; correct the header"),
-        (ply(CLOUD, "ascii", after=FACE).replace(b"vertex 3", b"vertex 2") + b"3 0 1 2\n", "in.ply: behind the vertices stand 2 lines, the header says 1; correct the header"),
+        (ply(CLOUD, "ascii", after=FACE).replace(b"vertex 3", b"vertex 2") + b"3 0 1 2\n", "in.ply: after the vertices there are 2 lines, the header says 1; correct the header"),
     ],
 )  # fmt: skip
 def test_a_broken_ply_is_one_line(run: Run, tmp_path: Path, data: bytes, message: str) -> None:

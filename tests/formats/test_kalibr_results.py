@@ -136,7 +136,7 @@ def test_what_it_means_is_told_and_frames_are_called_otherwise(run: Callable[...
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (HEAD + TARGET, "r.txt: no pose in it: one would stand under baseline T_1_0 or T_ci"),
+        (HEAD + TARGET, "r.txt: no pose in it: it would be under baseline T_1_0 or T_ci"),
         (HEAD + "baseline T_1_0:\n", "r.txt:9: baseline T_1_0: expected q: [x y z w] and t: [x y z] below it"),
         (
             HEAD + "baseline T_1_0:\n  q: [0 0 1]\n  t: [1 2 3]\n",

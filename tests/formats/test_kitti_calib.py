@@ -117,5 +117,5 @@ def test_a_file_cut_off_or_without_a_pose_says_so(tmp_path: Path) -> None:
         read(tmp_path, ODOMETRY[: ODOMETRY.index("Tr:") + 28], "calib.txt")
     with pytest.raises(FormatError, match="no pose in it"):
         read(tmp_path, f"P0: {projection()}\n", "calib.txt")
-    with pytest.raises(FormatError, match="missing T: beside R:"):
+    with pytest.raises(FormatError, match="missing T: together with R:"):
         read(tmp_path, VELO_TO_CAM.replace("T: ", "X: "), "calib.txt")

@@ -247,7 +247,7 @@ PLUGIN = "tf2_ros::StaticTransformBroadcasterNode"
     ],
 )  # fmt: skip
 def test_a_composable_publisher_is_listed_as_not_read(tmp_path: Path, text: str, name: str, line: int) -> None:
-    why = "it is a composable node, whose transform stands in its parameters"
+    why = "it is a composable node, whose transform is in its parameters"
     assert read(tmp_path, text, name)[1] == [f"{name}:{line}: static_transform_publisher not read: {why}"]
 
 

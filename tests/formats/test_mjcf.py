@@ -225,7 +225,7 @@ def test_joints_move_over_time_where_a_file_of_values_has_stamps(run: Callable[.
         ("a.xml:home", KEYS.replace("0 0 0 9", "0 0 x 9"), "a.xml:4:46: qpos: 'x' is not a number"),
         ("a.xml:home", KEYS.replace("0 0 0 9", "0 0 0 0"), "a.xml:4:46: qpos of joint 'neck': 0 0 0 0 has no direction"),
         ("a.xml:home", KEYS.replace('qpos="1', 'qvel="1'), "a.xml:4:23: key 'home' has no qpos"),
-        ("a.xml:home", KEYS.replace("keyframe", "nothing"), "a.xml: no <key> in it, which would say where joints stand"),
+        ("a.xml:home", KEYS.replace("keyframe", "nothing"), "a.xml: no <key> in it, which would have joint values"),
     ],
 )
 def test_a_key_that_does_not_fit_is_one_line(run: Callable[..., Any], key: str, text: str, said: str) -> None:
@@ -311,7 +311,7 @@ def test_a_thousand_bodies_inside_one_another_are_read(tmp_path: Path) -> None:
 
 def test_what_cannot_be_known_from_the_file_alone_is_said(tmp_path: Path) -> None:
     _, said = read(tmp_path, '<camera name="c" mode="targetbody" target="b"/><body name="b"/>\n<flexcomp/>')
-    assert said[0] == "a.xml:2: camera:c has the mode 'targetbody', in which MuJoCo turns it over time; it stands as written"
+    assert said[0] == "a.xml:2: camera:c has the mode 'targetbody', in which MuJoCo rotates it over time; its pose is as written"
     assert said[1].startswith("a.xml:3: <flexcomp> is left out: its bodies are made by MuJoCo; save it whole: mujoco.")
 
 

@@ -120,9 +120,9 @@ def test_two_files_that_disagree_are_both_named(tmp_path: Path) -> None:
         ("- {name: b, parent: a, samples: [{stamp: 0.1234567891}]}", "finer than a nanosecond"),
         ("- {name: b, parent: a, samples: []}", "expected samples as a list"),
         ("- {name: b, parent: a, samples: {stamp: 1}}", "expected samples as a list"),
-        ("- {name: b, parent: a, xyz: [0, 0, 0], samples: [{stamp: 1}]}", "samples and a pose or a stamp beside them"),
+        ("- {name: b, parent: a, xyz: [0, 0, 0], samples: [{stamp: 1}]}", "samples and also a pose or a stamp"),
         ("- {name: b, samples: [{stamp: 1}]}", "moves but has no parent"),
-        ("- {name: b, parent: a, samples: [{stamp: 1, name: c}]}", "name is given by the entry"),
+        ("- {name: b, parent: a, samples: [{stamp: 1, name: c}]}", "name is defined by the entry"),
         ("- {name: b, parent: a, samples: [{stamp: 1, stamp_ns: 1}]}", "keep one"),
         ("- {name: b, parent: a, samples: [{stamp: 1, xzy: [0, 0, 0]}]}", "did you mean 'xyz'"),
         (

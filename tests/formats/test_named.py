@@ -84,7 +84,7 @@ def test_four_numbers_do_not_say_where_w_stands(run: Run, turn: str) -> None:
     text = f"lidar: {{trans: [0.5, 2, -1], {turn}}}\n"
     done = run("tree", "e.yaml", files={"e.yaml": text})
     assert (done.status, done.out) == (2, "")
-    assert "does not say where w stands: give --from xyzw or --from wxyz, for all of the file" in done.err
+    assert "does not state the position of w: give --from xyzw or --from wxyz, for all of the file" in done.err
     assert tree(run, text, "--from", "xyzw").splitlines()[-1] == f"  - {POSE}"
     swapped = text.replace(f"[0, 0, {HALF}, {HALF}]", f"[{HALF}, 0, 0, {HALF}]")
     assert tree(run, swapped, "--from", "wxyz").splitlines()[-1] == f"  - {POSE}"
@@ -188,15 +188,15 @@ def test_python_reads_it_with_the_same_answers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ("roll: 1, pitch: 2", "1:4: half a rotation: missing yaw beside roll, pitch"),
-        ("qx: 0, qy: 0, qz: 0", "1:4: half a rotation: missing w beside x, y, z"),
-        ("rot_x: 0, rot_y: 0, rot_z: 0", "1:4: half a rotation: missing w beside x, y, z"),
+        ("roll: 1, pitch: 2", "1:4: incomplete rotation: missing yaw beside roll, pitch"),
+        ("qx: 0, qy: 0, qz: 0", "1:4: incomplete rotation: missing w beside x, y, z"),
+        ("rot_x: 0, rot_y: 0, rot_z: 0", "1:4: incomplete rotation: missing w beside x, y, z"),
         ("ax: 0, ay: 0, az: 1", "1:4: ax, ay, az and theta belong together: an axis and the angle about it"),
         ("rot: [1, 2, 3]", "1:23: rot of 3 numbers does not say what they are; write rpy, rpy_deg or rotvec"),
         ("yaww: 1", "1:23: unknown key 'yaww'; a pose has xyz and one rotation: "),
         ("value: [1, 2]", "1:30: expected 7 numbers, found 2 numbers"),
-        ("tx: 4", "1:23: tx says again what stands beside it; keep one"),
-        ("xyz: [1, 2, 3]", "1:23: xyz says again what stands beside it; keep one"),
+        ("tx: 4", "1:23: tx repeats another key; keep one"),
+        ("xyz: [1, 2, 3]", "1:23: xyz repeats another key; keep one"),
         ("yaw: fast", "1:28: 'fast' is not a number"),
         ("parent: b, frame_id: c", "1:23: frame_id and parent in one entry; keep one"),
         ("parent: a", "1:4: frame 'a' is its own parent"),

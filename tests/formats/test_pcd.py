@@ -163,7 +163,7 @@ def test_runs_of_lzf_are_unpacked(given: bytes, wanted: bytes) -> None:
     [
         (b"\x02ab", 3, "it ends in the middle of a run"),
         (b"\x20", 3, "it ends in the middle of a run"),
-        (b"\x00a\x20\x05", 4, "it refers to what stands before its beginning"),
+        (b"\x00a\x20\x05", 4, "it refers to bytes before its beginning"),
         (b"\x00a", 2, "it makes only 1 bytes, not 2"),
         (b"\x02abc\x02abc", 2, "it makes at least 3 bytes, not 2"),
         (b"\x00a", 10**9, "2 packed bytes cannot hold 1000000000"),

@@ -365,7 +365,7 @@ def test_the_saved_state_of_a_world_is_not_taken_for_its_models_and_said(tmp_pat
     state = '<state world_name="w"><model name="m"><pose>9 9 9 0 0 0</pose></model></state>'
     tree, said = read(tmp_path, f"<world name='w'>{model(LINK)}\n{state}</world>")
     assert tree.lookup("world", "m").xyz.tolist() == [0.0, 0.0, 0.0]
-    assert said == ["a.sdf:4: <state> is left out: every model stands where its own pose has it"]
+    assert said == ["a.sdf:4: <state> is left out: every model is at its own pose"]
 
 
 def test_joints_move_over_time_where_a_file_of_values_has_stamps(run: Callable[..., Any]) -> None:
@@ -401,7 +401,7 @@ def test_a_joint_without_an_axis_takes_no_value_and_one_that_screws_neither(tmp_
     _, said = read(tmp_path, model(A_AND_B + JOINT.format("revolute2", "<axis/>")), joints={"j": 0.1})
     assert said == ["a.sdf:3: joint 'j' has no <axis2>: it takes no value there"]
     _, said = read(tmp_path, model(A_AND_B + JOINT.format("screw", "<axis/>")))
-    assert said == ["a.sdf:3: joint 'j' is a screw: it stands as in the file and takes no value"]
+    assert said == ["a.sdf:3: joint 'j' is a screw: it is fixed as in the file and takes no value"]
     with pytest.raises(FormatError, match="joint 'j' is fixed and takes no value"):
         read(tmp_path, model(A_AND_B + JOINT.format("screw", "<axis/>")), joints={"j": 0.1})
 

@@ -156,17 +156,17 @@ REFUSED = {
     "{name: b, xyz: [1, 2, 3]}": "0.yaml:1:1: frame 'b' has a pose but no parent",
     "{parent: b, xyz: [1, 2, 3]}": "0.yaml:1:1: missing name; an entry is {name: .., parent: .., xyz: [..], ..}",
     "frames: {a: {xyz: [1, 2, 3]}}":
-        "0.yaml:1:14: 'xyz' stands where a frame's name is expected: a root has no pose, its keys are its children",
-    "frames: {a: {b: {name: c}}}": "0.yaml:1:18: name is given by the nesting; leave it out",
-    "frames: {c: {parent: b, name: d}}": "0.yaml:1:25: name is given by the nesting; leave it out",
+        "0.yaml:1:14: 'xyz' is in place of a frame's name: a root has no pose, its keys are its children",
+    "frames: {a: {b: {name: c}}}": "0.yaml:1:18: name is defined by the nesting; remove it",
+    "frames: {c: {parent: b, name: d}}": "0.yaml:1:25: name is defined by the nesting; remove it",
     "frames: {c: {parent: b, x: 1, theta: 9m}}": "0.yaml:1:38: '9m' is not an angle: the units are deg and rad",
-    "frames: {c: {parent: b, x: 1, roll: 9}}": "0.yaml:1:13: half a rotation: missing pitch, yaw beside roll",
+    "frames: {c: {parent: b, x: 1, roll: 9}}": "0.yaml:1:13: incomplete rotation: missing pitch, yaw beside roll",
     "frames: {a: {b: {xyz: [1, 2, 3], c: {}}}}":
-        "0.yaml:1:34: frames below one with a pose stand under children: {c: ..}",
+        "0.yaml:1:34: frames below one with a pose are under children: {c: ..}",
     "frames: {a: {b: {children: [1]}}}": "0.yaml:1:28: expected the children as a mapping by name, found a list",
     "{frams: {}}":
         "0.yaml:1:1: no frame tree: expected frames:, transforms: or an entry with name: and parent:; found the keys 'frams'",
-    "{frames: {}, angels: deg}": "0.yaml:1:14: unknown key 'angels' beside frames; expected angles",
+    "{frames: {}, angels: deg}": "0.yaml:1:14: unknown key 'angels' next to frames; expected angles",
     "transforms: [{child_frame_id: b, header: {frame_id: a}}]":
         "0.yaml:1:14: missing transform; a TransformStamped has header, child_frame_id, transform",
     "42": "0.yaml:1:1: expected a frame tree, found '42'",

@@ -198,7 +198,7 @@ BAD = {  # what stands in an entry, what is said of it, and what the place point
     "scale": ("scale: 2", "scale: a similarity, not a pose; apply --transform, compose and invert take it", "2}"),
     "sample": (
         "samples: [{stamp: 0, xyz: [1, 2, 3], sigma: {xyz: 1}}]",
-        "sigma is one for all samples; write it beside samples", "sigma",
+        "sigma is common to all samples; write it next to samples", "sigma",
     ),
     "inverse-sample": (
         f"{SIGMA}, samples: [{{stamp: 0, xyz: [1, 2, 3], inverse: true}}]",

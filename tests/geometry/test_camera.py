@@ -344,7 +344,7 @@ K = [1.0, 1.0, 0.0, 0.0]
         ({"model": "ds", "xi": -1.0, "alpha": 0.5}, "xi -1 is beyond -0.999999 .. inf"),
         ({"model": "omni", "xi": -0.1}, "xi -0.1 is beyond 0 .. inf"),
         ({"model": "ds", "xi": 0.1}, "ds has xi and alpha, not xi"),
-        ({"model": "pinhole", "xi": 0.1}, "pinhole has no parameters beside D, not xi"),
+        ({"model": "pinhole", "xi": 0.1}, "pinhole has only D as a parameter, not xi"),
         ({"model": "thin_prism", "D": [0.0] * 12 + [0.1, 0.0]}, "D is of a tilted sensor, tau 0.1 0, which is not read"),
         ({"model": "pinhole", "size": (640, 0)}, "size 640 x 0 is no size: give whole pixels, width and height"),
         ({"model": "pinhole", "axes": "enu"}, "axes 'enu' are not known; axes: optical, opengl, flu"),

@@ -205,7 +205,7 @@ def test_the_sign_that_leaves_is_canonical() -> None:
         (lambda: Transform([1, 2, 3], Rotation.identity()), r"got list; Transform\(rotation, xyz\) takes a Rotation first; from_parts\(xyz=.., rpy=..\) says which is which"),  # type: ignore[arg-type]
         (lambda: Transform.from_parts(Rotation.identity()), r"xyz: the position comes first, the rotation by its name"),  # type: ignore[arg-type]
         (lambda: Transform.from_parts([1, 2, 3], rotation=[0, 0, 0, 1]), r"rotation: expected a Rotation, got list"),
-        (lambda: Transform.from_parts([1, 2, 3], rpy=[0, 0, 1], xyzw=[0, 0, 0, 1]), r"takes one rotation beside xyz, not rpy and xyzw"),
+        (lambda: Transform.from_parts([1, 2, 3], rpy=[0, 0, 1], xyzw=[0, 0, 0, 1]), r"takes one rotation, not rpy and xyzw"),
         (lambda: Transform.from_parts(quaternion=[0, 0, 0, 1]), r"does not say its order; give xyzw=\[..\] or wxyz=\[..\]"),
         (lambda: Transform.from_parts(euler=[0, 0, 1]), r"euler needs its axes: write euler:rzyx"),
         (lambda: Transform.from_parts(position=[0, 0, 1]), r"unknown representation 'position'"),

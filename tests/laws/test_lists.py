@@ -61,7 +61,7 @@ def test_an_alias_of_yaml_in_what_is_rewritten_is_refused_at_its_place(run: Run,
     good = "point: [1, 2, 3]\n---\n"
     done = run(*MOVE, "-f", form, "--in", "yaml", "--on-error", "skip", stdin=good * before + ALIASED[kind])
     line, column = next((at, text.index("*") + 1) for at, text in enumerate(ALIASED[kind].splitlines(), 1) if "*" in text)
-    refused = f"stdin:{2 * before + line}:{column}: an alias of YAML stands in the place of what is rewritten; write out what it stands for"
+    refused = f"stdin:{2 * before + line}:{column}: a YAML alias is in place of what is rewritten; replace it by its value"
     assert (done.status, done.out.count("point")) == (3, before)
     assert refused in done.err
 

@@ -131,7 +131,7 @@ class MjcfModel:
         if node.tag == "camera":
             self.options.tally.axes[name] = self.options.answers.camera_axes or "opengl"
         if "mode" in attributes and (mode := attributes["mode"].text.strip()) != "fixed":
-            message = f"{name} has the mode {shown(mode)}, in which MuJoCo turns it over time; it stands as written"
+            message = f"{name} has the mode {shown(mode)}, in which MuJoCo rotates it over time; its pose is as written"
             self.options.tally.note_each(message, node.line)
 
     def _place(self, node: XmlNode, inside: _Inside, pose: Rigid) -> str:
@@ -229,7 +229,7 @@ def _key(root: XmlNode, state: str) -> XmlNode:
     names = {key.attribute("name") or str(index): key for index, key in enumerate(keys)}
     numbered = {str(index): key for index, key in enumerate(keys)}
     if not keys:
-        raise FormatError("no <key> in it, which would say where joints stand", source=file)
+        raise FormatError("no <key> in it, which would have joint values", source=file)
     if not state:
         message = f"name one of its keys: {file}:{next(iter(names))}"
         raise FormatError(f"{message}{alternatives('', names, 'keys')}", source=file)

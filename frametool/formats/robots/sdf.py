@@ -155,7 +155,7 @@ class SdfFrames:
                     remedy = "it needs other files; with them: gz sdf -p FILE > whole.sdf"
                     self.note(holder, f"<include> {name} is left out, {remedy}")
                 elif holder.tag == "state":
-                    self.note(holder, "<state> is left out: every model stands where its own pose has it")
+                    self.note(holder, "<state> is left out: every model is at its own pose")
                 elif holder.tag in ("model", "link", "joint", "frame"):
                     frame = self._named(holder, scope)
                     if holder.tag == "model":
@@ -363,7 +363,7 @@ class SdfJoints:
             raise holder.error(f"joint {shown(frame.local)} does not connect two links")
         if kind in STILL:
             named = f"joint {shown(frame.local)} is a {kind}"
-            self.frames.note(holder, f"{named}: it stands as in the file and takes no value")
+            self.frames.note(holder, f"{named}: it is fixed as in the file and takes no value")
         hanging, outer = (parent, child) if child.kind == WORLD else (child, parent)
         return SdfJoint(frame, parent, child, self._motions(frame, kind), hanging, outer)
 

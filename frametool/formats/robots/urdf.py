@@ -135,7 +135,7 @@ class _Reader:
 
     def _frame(self, node: XmlNode) -> None:
         for inner in node.children:
-            message = f"<{inner.tag}> inside a <link>; links and joints stand side by side in <robot>"
+            message = f"<{inner.tag}> inside a <link>; links and joints are siblings in <robot>"
             raise self.xml.error(inner.element, message)
         name = self._bare(node.element, "name")
         if name in self.frames:

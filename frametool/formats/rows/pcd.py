@@ -279,7 +279,7 @@ def _unpack(packed: bytes, size: int, out: bytearray) -> None:
         at += 1
         start = len(out) - distance
         if start < 0:
-            raise ValueInvalid("it refers to what stands before its beginning")
+            raise ValueInvalid("it refers to bytes before its beginning")
         if distance >= length:
             out += out[start : start + length]
         else:  # the run overlaps its own output

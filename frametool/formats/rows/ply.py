@@ -310,7 +310,7 @@ class PlyFile(clouds.CloudFile):
             lines += sum(map(bool, map(bytes.strip, whole)))
         lines += bool(begun.strip())
         if lines != expected:
-            said = f"behind the vertices stand {lines} lines, the header says {expected}; correct the header"
+            said = f"after the vertices there are {lines} lines, the header says {expected}; correct the header"
             raise FormatError(said, source=self.file.name)
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
@@ -342,7 +342,7 @@ def _check_lists(before: Sequence[PlyElement], vertex: PlyElement, order: str, s
         raise FormatError(f"{message}, or leave it out", source=source, line=vertex.line)
     for each in before:
         if order and each.lists and each.instances:
-            message = f"element {shown(each.name)} with the list {shown(each.lists[0])} stands before {VERTEX!r}"
+            message = f"element {shown(each.name)} with the list {shown(each.lists[0])} is before {VERTEX!r}"
             raise FormatError(f"{message}; write {VERTEX!r} first, or the file as ascii", source=source, line=each.line)
 
 

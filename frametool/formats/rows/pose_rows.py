@@ -55,7 +55,7 @@ class RowForm(NamedTuple):
     numbers: from tx, ty, tz, x, y, z, w to the numbers in the order of the file
     head, between, tail: text before the first pose, between two, and after the last
     holds: which of `frames`, `stamps` are written; other columns are not
-    beside: what else is written for readers of the format, for a note
+    constants: what else is written for readers of the format, for a note
     """
 
     row: tuple[str | bytes | Numbers, ...]
@@ -65,7 +65,7 @@ class RowForm(NamedTuple):
     tail: bytes = b""
     first: int = 0
     holds: tuple[str, ...] = ("stamps",)
-    beside: str = ""
+    constants: str = ""
 
 
 class DroppedFields:
@@ -93,7 +93,7 @@ class DroppedFields:
         if others := self.found.keys() - {*LOSABLE.values()}:
             left.append(listing(others, MOST_NAMED))
         said = [f"{', '.join(left)} left out"] if left else []
-        said += [self.format.beside] * bool(self.format.beside)
+        said += [self.format.constants] * bool(self.format.constants)
         said += ["without stamps, poses are numbered in seconds: 0, 1, 2 .."] * self.counted
         said += ["pictures are named by their stamps"] * self.by_stamp
         axes = FORMATS[self.style.format].poses.axes
@@ -155,7 +155,7 @@ ROWS = {
         ("number", b" ", Numbers(7), b" 1 ", IMAGE, b"\n\n"), lambda tx, ty, tz, x, y, z, w: (w, x, y, z, tx, ty, tz),
         head=b"# Image list with two lines of data per image:\n"
         b"#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n",
-        first=1, holds=(), beside="every camera is number 1, without points",
+        first=1, holds=(), constants="every camera is number 1, without points",
     ),
     "nerf": RowForm(
         (b'    {"file_path": "', IMAGE, b'", "transform_matrix": [[', Numbers(4, b", "), *_ROW, *_ROW,

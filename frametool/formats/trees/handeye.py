@@ -94,7 +94,7 @@ def write_tree(tree: Frames, style: Style) -> str:
         children = listing(child for _, child, _ in edges)
         raise ValueInvalid(f"{NAME} holds one pose, and here are {len(edges)}: {children}")
     ((parent, child, pose),) = edges
-    warn(f"{NAME}: {shown(parent)} is written as the hand; beside the base write eye_on_hand: false and {BASE}")
+    warn(f"{NAME}: {shown(parent)} is written as the hand; for a fixed camera write eye_on_hand: false and {BASE}")
     warn_lonely_roots(tree, NAME)
     return write_mount(parent, child, pose, style, on_hand=True)
 

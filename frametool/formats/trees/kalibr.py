@@ -63,7 +63,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             both = target[:3] == source[:3] == "cam"
             stated.append(Stated(target, source, child, pose, (label,), chained=both))
     if not stated:
-        raise FormatError("no pose in it: one would stand under baseline T_1_0 or T_ci", source=file.name)
+        raise FormatError("no pose in it: it would be under baseline T_1_0 or T_ci", source=file.name)
     try:
         edges = edges_of(stated, reading)
     except Misfit as misfit:

@@ -142,7 +142,7 @@ class Calibration:
         """Read the pose of R: and T: of the raw recordings; the file's name, or its contents, identify the frames."""
         for name, other in (("R", "T"), ("T", "R")):
             if name not in self.fields:
-                raise FormatError(f"missing {name}: beside {other}:", source=self.file.name)
+                raise FormatError(f"missing {name}: together with {other}:", source=self.file.name)
         chosen = self.options.answers.frames
         base = os.path.basename(self.file.name)
         if len(chosen) == 2:

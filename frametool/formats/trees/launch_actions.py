@@ -41,7 +41,7 @@ class Action(NamedTuple):
         return cls(unread=f"{what} {shown(named)} is not followed; read that file too: --with FILE")
 
 
-COMPOSED = Action.not_read("it is a composable node, whose transform stands in its parameters")
+COMPOSED = Action.not_read("it is a composable node, whose transform is in its parameters")
 
 
 def runs_publisher(words: Sequence[str]) -> bool:

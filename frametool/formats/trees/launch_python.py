@@ -218,25 +218,25 @@ def _below(node: ast.AST) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
 
 def _action(node: ast.Call, scope: Bindings, conditions: tuple[str, ...]) -> Action | None:
     """Return the action of one call; None if it starts no publisher."""
-    given = {each.arg: each.value for each in node.keywords if each.arg}
+    by_name = {each.arg: each.value for each in node.keywords if each.arg}
     if getattr(node.func, "attr", getattr(node.func, "id", "")) == "IncludeLaunchDescription":
-        named = node.args[0] if node.args else given.get("launch_description_source", node.func)
+        named = node.args[0] if node.args else by_name.get("launch_description_source", node.func)
         return Action.not_followed("IncludeLaunchDescription", _written(named))
-    if _text(given.get("plugin"), scope) == COMPOSABLE:
+    if _text(by_name.get("plugin"), scope) == COMPOSABLE:
         return COMPOSED
-    name = "cmd" if "cmd" in given else "arguments"
+    name = "cmd" if "cmd" in by_name else "arguments"
     if name == "cmd":  # other words of the command line need not be literal
-        parts = getattr(given["cmd"], "elts", ())
+        parts = getattr(by_name["cmd"], "elts", ())
         is_call = runs_publisher([_text(part, scope) for part in parts])
     else:
-        is_call = _text(given.get("package"), scope) in PACKAGES
-        is_call = is_call and CALL in (_text(given.get(key), scope) for key in _EXECUTABLE)
+        is_call = _text(by_name.get("package"), scope) in PACKAGES
+        is_call = is_call and CALL in (_text(by_name.get(key), scope) for key in _EXECUTABLE)
     if not is_call:
         return None
-    if name not in given:
+    if name not in by_name:
         return Action.not_read(f"it has no {name}")
     try:
-        value = evaluate(given[name], scope)
+        value = evaluate(by_name[name], scope)
     except NotLiteral as error:
         return Action.not_read(f"{shown(_written(error.node))} is not a literal")
     if not isinstance(value, list):

@@ -59,7 +59,7 @@ ASKED = (("(?:T_)?<a>_to_<b>", "<a>", "<b>"), ("(?:T_)?<a>2<b>", "<a>", "<b>"))
 PAIRS = (
     (r"rvec(.*)", r"tvec\1", "camera", r"object\1", ""),  # OpenCV's own: solvePnP, calibrateCamera
     (r"extrinsicRotation", "extrinsicTranslation", "imu", "cam0", ""),  # VINS-Mono: from the camera to the IMU
-    (r"R", "T", "cam1", "cam0", "R1|P1|Q|E|F"),  # stereoCalibrate, which writes one of these beside them
+    (r"R", "T", "cam1", "cam0", "R1|P1|Q|E|F"),  # stereoCalibrate, which writes one of these too
     (r"R", "[Tt]", "", "", ""),
     (r"(?i:rotation(?:_?matrix)?)", "(?i:translation(?:_?vector)?)", "", "", ""),
 )
@@ -361,7 +361,7 @@ class MatrixBlock(NamedTuple):
 class FrameNames(NamedTuple):
     """Names of frames that no key names.
 
-    base: the reference frame; alone: the frame of a matrix at the top of the file; told: all names of `--frames`
+    base: the reference frame; alone: the frame of a matrix at the top of the file; names_set: all names of `--frames`
     blocks: names of blocks by their position in the file, if they were set
     """
 

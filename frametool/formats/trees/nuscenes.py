@@ -124,7 +124,7 @@ def _rotation(value: Any, reading: Reading) -> Quaternion:
 
 def _channels(file: InputFile) -> dict[str, str] | None:
     """Return the names of sensors, by their tokens; None without the table of them."""
-    table = next((each for each in file.beside if os.path.basename(each.path) == NAMES), None)
+    table = next((each for each in file.siblings if os.path.basename(each.path) == NAMES), None)
     if table is None:
         path = os.path.join(os.path.dirname(file.path), NAMES)
         if file.path == "-" or not os.path.exists(path):

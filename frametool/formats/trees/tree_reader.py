@@ -42,7 +42,7 @@ TREE_KEYS = frozenset(("frames", "angles"))
 STAMP_KEYS = frozenset(("stamp", "stamp_ns"))
 TIMED = frozenset(("samples", "camera", *STAMP_KEYS))
 XYZ = ("x", "y", "z")
-NO_NAME = "stands where a frame's name is expected: a root has no pose, its keys are its children"
+NO_NAME = "is in place of a frame's name: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
 LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # single numbers
 CHILDREN = frozenset(("children", *TIMED))
@@ -110,7 +110,7 @@ MOST_SHOWN = 70  # characters of the keys that were found
 
 def _tree(document: dict[str, Any], reading: Reading) -> Iterator[Edge]:
     if unknown := [key for key in document if key not in TREE_KEYS]:
-        raise Misfit(f"unknown key {shown(unknown[0])} beside frames; expected angles", (unknown[0],), key=True)
+        raise Misfit(f"unknown key {shown(unknown[0])} next to frames; expected angles", (unknown[0],), key=True)
     if "angles" in document:
         reading.degrees = read_angle_unit(document["angles"])
     frames = document["frames"]
@@ -154,7 +154,7 @@ def _nested(parent: str, child: str, entry: Any, path: Path, reading: Reading) -
         if child in POSE_KEYS and type(entry) is not dict:
             raise Misfit(f"{shown(child)} {NO_NAME}", key=True)
         if names := NAMES.intersection(as_mapping(entry, f"the pose of frame {shown(child)}")):
-            raise Misfit(f"{min(names)} is given by the nesting; leave it out", (min(names),), key=True)
+            raise Misfit(f"{min(names)} is defined by the nesting; remove it", (min(names),), key=True)
         pose = _pose(entry, reading, CHILDREN)
         yield from _edges(entry, pose, _above(pose, parent, entry), child, path, reading)
     except Misfit as misfit:
@@ -236,7 +236,7 @@ def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
         return pose.parent or parent
     if parent not in (None, *EARTH_FRAMES):  # a position on the Earth implies its frame
         key = next(filter(may_be_on_earth, entry))
-        raise Misfit(f"{key} places a frame in ecef; it stands under {shown(parent)}", (key,), key=True)
+        raise Misfit(f"{key} places a frame in ecef; its parent is {shown(parent)}", (key,), key=True)
     return parent or pose.parent
 
 
@@ -268,7 +268,7 @@ def read_samples(
 ) -> list[Edge]:
     """Read `samples: [{stamp: 0.0, xyz: [..]}, ..]`; a sample may name another parent."""
     if pose.position is not None or pose.rotation is not None or not STAMP_KEYS.isdisjoint(entry):
-        message = f"frame {shown(child)} has samples and a pose or a stamp beside them; put all into samples"
+        message = f"frame {shown(child)} has samples and also a pose or a stamp; put all into samples"
         raise Misfit(message, ("samples",), key=True)
     if entry.get("inverse") == "true":
         raise Misfit("inverse belongs into each of the samples", ("inverse",), key=True)
@@ -301,7 +301,7 @@ def _given_in(entry: dict[str, Any], reading: Reading) -> Earth:
     from frametool.grammar.place import take_axes
 
     if not any(may_be_on_earth(key) for sample in entry["samples"] if type(sample) is dict for key in sample):
-        what = "axes beside samples are those at places on the Earth; none of these has one"
+        what = "axes next to samples are for positions on the Earth; none of these has one"
         raise Misfit(what, (AXES_KEY,), key=True)
     return Earth(axes=take_axes({AXES_KEY: entry[AXES_KEY]}, reading))
 
@@ -310,13 +310,13 @@ def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, in
     """Read one pose with its stamp.  uncertain: there is a covariance for all."""
     pose = _pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
     if said := COVARIANCE_KEYS.intersection(sample):
-        raise Misfit(f"{min(said)} is one for all samples; write it beside samples", (min(said),), key=True)
+        raise Misfit(f"{min(said)} is common to all samples; write it next to samples", (min(said),), key=True)
     if uncertain and pose.parent is not None and "parent" not in sample:
         raise Misfit("axes turn from place to place; one covariance for all is in no axes; leave it out")
     if uncertain and sample.get("inverse") == "true":
         raise Misfit("a sample that is inverted has no part in one covariance for all; write its inverse", ("inverse",))
     if pose.name is not None:
-        raise Misfit("name is given by the entry; leave it out", ("name",), key=True)
+        raise Misfit("name is defined by the entry; remove it", ("name",), key=True)
     stamp_ns = stamp_of(sample)
     if stamp_ns is None:
         raise Misfit("missing stamp; a sample is {stamp: 12.5, xyz: [..], ..}, in seconds")
