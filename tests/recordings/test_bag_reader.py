@@ -161,7 +161,7 @@ def test_transforms_that_lie_alike_are_the_same_edges_one_by_one(
 
     def edges_and_notes() -> tuple[list[Edge], list[Any], list[str]]:
         file = FrameFile(path)
-        return [*file.edges(tell=False)], [*file.tally.told()], file.tally.names.slashed
+        return [*file.edges(tell=False)], [*file.tally.findings()], file.tally.names.slashed
 
     many = sum(isinstance(each, EdgeColumns) for each in FrameFile(path).pieces(tell=False))
     at_once = edges_and_notes()
