@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from copy import copy
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
@@ -288,7 +289,8 @@ def find_poses(names: Sequence[str], given: Notation | None, count: int, source:
     raise _refusal(f"columns of {wanted} are wanted, found {found}; choose with --columns", source)
 
 
-def plain_pose(names: Sequence[str], *, affixed: bool) -> PoseColumns:
+@lru_cache(maxsize=256)  # records of one kind have the same keys
+def plain_pose(names: tuple[str, ...], *, affixed: bool) -> PoseColumns:
     """Find the one point or pose among the keys of a record: without affixes, else under some if it may be `affixed`.
 
     Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.

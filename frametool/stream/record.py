@@ -642,7 +642,7 @@ def _flat_pose(value: dict[str, Any], rotations: list[str]) -> PoseColumns | Non
         alone = Columns((0, 1, 2, 3), QUATERNION, notation=notation("quaternion"), degrees=(None,) * 4)
         return PoseColumns(None, alone)
     try:
-        found = plain_pose(names, affixed=is_flat)
+        found = plain_pose(tuple(names), affixed=is_flat)
     except ValueInvalid as error:
         raise Misfit(str(error), key=True) from None
     if wrong := next((each.wrong for each in found if each is not None and each.wrong), ""):
