@@ -244,7 +244,7 @@ def _of_documents(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
                 asked = request._replace(operation=COMBINED, degrees=reading.degrees or request.degrees)
                 for record, each in _of_row(row, path, asked, reading):
                     last = max(at for at, step in enumerate(record.path) if type(step) is int)
-                    stamp_ns = stamp_of(document, record, source)
+                    stamp_ns = stamp_of({document.index: document.value}, record, source)
                     found.append((each, record.path[: max(last + 1, len(path))], stamp_ns))
         except Misfit as misfit:
             raise placed(misfit, source) from None

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frametool.errors import Finding
     from frametool.stream.answers import Answer, Entry
     from frametool.stream.layout import Piece
+    from frametool.stream.record import Record
     from frametool.stream.request import Memory, Request
     from frametool.stream.splice import Edit
     from frametool.stream.splitter import Part
@@ -59,6 +60,11 @@ class RecordText:
         self.values = {document.index: document.value for document in documents}
         take = note or self.notes.extend
         self.entries = [entry for each in documents for entry in read_entries(each, request, source, take)]
+
+    @property
+    def records(self) -> list[Record]:
+        """Return the records."""
+        return [entry.record for entry in self.entries]
 
     @cached_property
     def root(self) -> Node:

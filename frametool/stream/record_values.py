@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import NOTHING, Aliased, Node, parse_documents, parse_nodes, refuse_alias
+from frametool.documents.document import NOTHING, Aliased, Node, parse_nodes, refuse_alias
 from frametool.documents.json import JSON_NUMBER, parse_json
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import Finding, FormatError, ValueInvalid, shown, warn
@@ -21,7 +21,7 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.answers import Outside, read_entries, wide_turn, written
+from frametool.stream.answers import Outside, wide_turn, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.record_text import RecordText
 from frametool.stream.request import Memory, Request
@@ -32,7 +32,6 @@ from frametool.stream.stamp_source import read_stamp
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.documents.document import Document
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
     from frametool.stream.answers import Answer, Entry
@@ -64,22 +63,20 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
     )
     poses: list[Pose] = []
     beside: set[str] = set()
-    nodes: Node | None = None
-    for document, records in documents(source, request):
-        for record in records:
-            poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(document, record, source)))
-            unit = unit_of(record, document.value)
-            if not _says_no_more(record, {document.index: document.value}, unit):
-                nodes = nodes or Node(0, 0, parse_nodes(source.text))
-                beside.update(_header_stamp(record), _rest(nodes.at(unit), unit, record))
+    known = read_text(source, request)
+    for record in known.records:
+        poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(known.values, record, source)))
+        unit = unit_of(record, value_at(known.values, record.path[:1]))
+        if not _says_no_more(record, known.values, unit):
+            beside.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
     return poses, beside
 
 
-def stamp_of(document: Document, record: Record, source: Source) -> int | None:
+def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int | None:
     """Return the stamp of a record, of its header or its own; raises FormatError with its place."""
-    own = value_at(document.value, record.path[1:])
+    own = value_at(documents, record.path)
     key = stamp_key(own) if record.stamp_ns is None and type(own) is dict else ""
     try:
         return _read_stamp(key, own[key]) if key else record.stamp_ns
@@ -136,13 +133,12 @@ class Teller:
             warn(f"{name}: {more} more like these")
 
 
-def documents(source: Source, request: Request) -> Iterator[tuple[Document, list[Record]]]:
-    """Yield the documents of a text with their records, and warn of what is odd in them, with its place."""
+def read_text(source: Source, request: Request) -> RecordText:
+    """Read the records of a text, and warn of what is odd in them, with its place."""
     teller = Teller()
-    for document in parse_documents(source.text, source.name):
-        entries = read_entries(document, request, source, partial(teller.tell, source))
-        yield document, [entry.record for entry in entries]
+    known = RecordText(source, request, json=False, note=partial(teller.tell, source))
     teller.end(source.name)
+    return known
 
 
 def results(source: Source, request: Request, style: Style) -> Iterator[Value]:

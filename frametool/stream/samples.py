@@ -27,7 +27,7 @@ from frametool.grammar.result import Style
 from frametool.stream.as_poses import FormatConverter
 from frametool.stream.header import listed
 from frametool.stream.record import placed, value_at
-from frametool.stream.record_values import documents, pose_of
+from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_poses import plain_cells
 from frametool.stream.table import open_table
@@ -37,7 +37,6 @@ from frametool.text.numbers import parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from frametool.documents.document import Document
     from frametool.geometry.types import Array
     from frametool.grammar.pose import Pose
     from frametool.grammar.readers import Path
@@ -261,28 +260,28 @@ def _of_documents(file: InputFile) -> Points:
     beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
     paths: list[Path] = []
     frames: set[str | None] = set()
-    for document, records in documents(source, request):
-        for record in records:
-            position = pose_of(record, request).position
-            if position is None:
-                raise placed(Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path), source)
-            xyz.append(position)
-            paths.append(record.path)
-            frames.add(record.parent.text)
-            around = _around(document, record.path)
-            for key, cells in beside.items():
-                cells.append(around.get(key))
+    known = read_text(source, request)
+    for record in known.records:
+        position = pose_of(record, request).position
+        if position is None:
+            raise placed(Misfit("expected a point {id: .., xyz: [x, y, z]}", record.path), source)
+        xyz.append(position)
+        paths.append(record.path)
+        frames.add(record.parent.text)
+        around = _around(known.values, record.path)
+        for key, cells in beside.items():
+            cells.append(around.get(key))
     if not xyz:
         raise FormatError("no points in it; each is {id: .., xyz: [x, y, z]}", source=source.name)
     places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
     return _points(source.name, np.array(xyz, float), beside, places, frames)
 
 
-def _around(document: Document, path: Path) -> dict[str, Any]:
+def _around(documents: dict[int, Any], path: Path) -> dict[str, Any]:
     """Return the members of a record and of the mappings that hold it, up to the item of a list that it is."""
     found: dict[str, Any] = {}
     for depth in range(len(path), 0, -1):
-        value = value_at(document.value, path[1:depth])
+        value = value_at(documents, path[:depth])
         if type(value) is dict:
             found = {key: each for key, each in value.items() if type(each) is str} | found
         if depth > 1 and type(path[depth - 1]) is int:

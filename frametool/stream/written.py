@@ -9,7 +9,7 @@ from frametool.explain import derive
 from frametool.explain.derive import LABELS, ByTree, MovedRecord
 from frametool.explain.operations import WrittenPose
 from frametool.geometry import floats
-from frametool.stream.record_values import documents, pose_of
+from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import POSE
 
@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 def written_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[WrittenPose]:
     """Read the poses of a text as they are written; raises as `read_poses` does."""
     request = Request(kind=POSE, degrees=degrees, normalize=normalize)
-    return [_written_pose(record, request) for record in _records(source, request)]
-
-
-def _records(source: Source, request: Request) -> list[Record]:
-    return [record for _, found in documents(source, request) for record in found]
+    return [_written_pose(record, request) for record in read_text(source, request).records]
 
 
 def _written_pose(record: Record, request: Request) -> WrittenPose:
@@ -53,7 +49,7 @@ def derive_record(
     way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
     """
     request = Request(Operation(moves=True), kind=kind, degrees=degrees, normalize=normalize, frame_is_counter=counters)
-    records = _records(source, request)
+    records = read_text(source, request).records
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
     (record,) = records

@@ -53,11 +53,11 @@ def _directions(texts: Sequence[str]) -> tuple[Vector, Vector]:
 
 def _vectors(text: str) -> list[Vector]:
     """Read the vectors of an argument."""
-    from frametool.stream.record_values import documents
+    from frametool.stream.record_values import read_text
     from frametool.stream.request import Operation, Request
     from frametool.stream.row_layout import VECTOR
 
     request = Request(Operation(moves=True), kind=VECTOR)
     with inline_misuse():
-        read = documents(pose_source(text, request), request)
-        return [record.shape.position(record.values) for _, records in read for record in records]
+        records = read_text(pose_source(text, request), request).records
+        return [record.shape.position(record.values) for record in records]
