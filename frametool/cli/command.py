@@ -272,14 +272,6 @@ class File(Text):
         return
 
 
-class Parsed(Text):
-    """A text that a function reads."""
-
-    def __init__(self, parse: Callable[[str], Any]) -> None:
-        """Keep what reads it."""
-        self.read = parse  # type: ignore[assignment, method-assign]
-
-
 TEXT = Text()
 FILE = File()
 
@@ -288,7 +280,11 @@ def _kind(kind: Any) -> click.ParamType[Any]:
     """Return the type of words that a value may be, or of what a function reads."""
     if isinstance(kind, click.ParamType):
         return kind
-    return click.Choice(kind) if isinstance(kind, tuple) else Parsed(kind)
+    if isinstance(kind, tuple):
+        return click.Choice(kind)
+    text = Text()
+    text.read = kind  # type: ignore[method-assign]
+    return text
 
 
 def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any) -> Adds:

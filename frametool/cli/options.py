@@ -252,7 +252,7 @@ def say_if_verbose(text: str) -> None:
 
 # --- results -------------------------------------------------------------------------------------------------------
 
-_PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", Digits())
+PRECISION = _of_results("--precision N|full", "decimals  [default: full; a terminal shows 9 digits]", Digits())
 _PLACE = (
     _of_results("-o --output FILE", "write to this file, atomically"),
     _of_results("--force", "let --output overwrite a file", requires=("output", "report")),
@@ -287,7 +287,7 @@ def result_options(*what: str) -> Adds:
     recording = [] if set(forms).isdisjoint(writers("recording")) else _RECORDING
     kind = FormatName(("text", *forms), "written here")
     chosen = option("-f --format FORMAT", "of the result (frametool formats)", kind, name="format_name")
-    return together(chosen, *_PLACE, _PRECISION, *recording)
+    return together(chosen, *_PLACE, PRECISION, *recording)
 
 
 def list_options(*more: str) -> Adds:
@@ -340,10 +340,8 @@ class Skipped:
 
     def __init__(self, *, in_json: bool) -> None:
         """Create an empty count; `in_json` says how errors are written."""
-        self.in_json = in_json
+        self.in_json, self.count, self.found = in_json, 0, 0
         self.errors: list[FrametoolError] = []
-        self.count = 0
-        self.found = 0
 
     @property
     def is_full(self) -> bool:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Inputs, option, refuse, together
-from frametool.cli.options import FULL, Digits, file_with, suffix_of
+from frametool.cli.options import FULL, PRECISION, file_with, suffix_of
 from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
 from frametool.cli.stderr import say
@@ -85,8 +85,7 @@ output_options = together(  # what is shown of a run
     option("--view FILE.html", "show the frames over time on a page, like `view`", file_with(".html")),
     option("-f --format", "format of the records  [default: text on a terminal, yaml otherwise]", FORMS,
            name="format_name"),
-    option("--precision N|full", "digits after the point  [default: the shortest text that reads back to the same "
-           "bits]", Digits(), under="Result"),
+    PRECISION,
     option("-o --output FILE", "write to this file instead of stdout, atomically", under="Result"),
     option("--plot FILE", "draw the result into a .svg, .html or .png", file_with(".svg", ".html", ".png")),
     option("--force", "let --output and --plot overwrite files", requires=("output", "plot", "view"),

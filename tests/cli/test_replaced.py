@@ -24,6 +24,7 @@ TYPED = {
     "--explain-full": "convert --explain-full --from rpy 0 0 1",
     "compare --end": "compare --end 5 a.tum b.tum",
     "align --end": "align --end=5 a.tum b.tum",
+    "view --sliders": "view arm.urdf --sliders -o a.html",
     "--array": "convert -i poses.npz --array xyz",
 }
 
