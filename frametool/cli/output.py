@@ -218,9 +218,7 @@ class Output:
             self.pieces(CsvTable(self.style).pieces(good))
             return
         in_blocks = self._in_blocks
-        values: Iterator[Any] = chain.from_iterable(
-            _in_blocks(each) if in_blocks else each.in_order() for each in good
-        )
+        values: Iterator[Any] = chain.from_iterable(_in_blocks(each) if in_blocks else each.in_order() for each in good)
         first = list(islice(values, 1))
         if self._fault is not None and not first:
             raise self._fault

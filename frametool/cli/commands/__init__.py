@@ -145,8 +145,7 @@ def _surroundings() -> str:
 @click.command(cls=Group, help=HELP)
 @click.option("-v", "all_versions", is_flag=True, is_eager=True,
               help="with --version: of Python and of its packages too")  # fmt: skip
-@click.option("--version", is_flag=True, expose_value=False, callback=_show_version,
-              help="Show the version and exit.")  # fmt: skip
+@click.option("--version", is_flag=True, expose_value=False, callback=_show_version, help="Show the version and exit.")
 def group(all_versions: bool) -> None:
     """Hold the commands."""
 

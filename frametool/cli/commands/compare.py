@@ -45,8 +45,7 @@ def _read_limits(text: str) -> list[Limit]:
 @error_options
 @option("--rows [=ate|rpe|kitti]", "one row per pair, step or segment: CSV, JSON", OPTIONAL["--rows"])
 @option("--explain", "the formulas with this run's numbers", ("text",), under="Result")
-@option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits,
-    name="limits")  # fmt: skip
+@option("--fail LIMIT,..", "exit with 1 if a limit is exceeded: ate>5cm", _read_limits, name="limits")
 @option("--report FILE.html|svg", "also write a report in one file; with -o instead", file_with(*REPORTS))
 @trajectory_options
 @reading_options()

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 @option("--rate HZ", "poses per second, from the first on", parse_number)
 @option("--at FILE|TIMES", "at the timestamps of a file; T,T,.., START:STOP:STEP", name="times")
 @option("--every 1m|5deg", "at even steps of distance or rotation", lambda text: read_delta(text, "m", "deg"))
-@option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", read_span,
-    name="max_gap_ns")  # fmt: skip
+@option("--max-gap TIME", "longest gap to interpolate  [default: 3 medians]", read_span, name="max_gap_ns")
 @trajectory_options
 @limit_options
 @reading_options()

@@ -46,8 +46,7 @@ def _read_names(text: str) -> list[str]:
     multiple=True, requires=("hand_eye",), under="Rows")  # fmt: skip
 @option("--points", "A<-B from matched points")
 @option("--scale", "estimate the scale from A to B too", requires=("points",))
-@option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names,
-    requires=("hand_eye", "points"))  # fmt: skip
+@option("--names NAME,..", "BASE,GRIPPER,CAMERA,TARGET, or A,B", _read_names, requires=("hand_eye", "points"))
 @option("--no-robust", "use all rows, outliers too")
 @option("--report FILE.json|csv", "statistics of the fit and of each row", file_with(".json", ".csv"))
 @reading_options()

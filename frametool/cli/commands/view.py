@@ -46,8 +46,7 @@ def _eye(text: str) -> Eye:
 @option("--below FRAME", "only this frame and its descendants", FRAME)
 @option("--only REGEX", "only frames whose name matches")
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
-@option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye",
-    default="slanted")
+@option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
 @moving_options
 @option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="form")
 @option("-o --output FILE", "write to this file instead of stdout, atomically")
