@@ -21,6 +21,7 @@ from itertools import chain, islice
 from json import dumps
 from operator import mul
 from typing import TYPE_CHECKING, Any
+from zlib import compress
 
 from frametool import __version__
 from frametool.formats.robots.model import JointValue
@@ -194,9 +195,11 @@ def write_page(
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
         head["overlay"] = {"title": other_title, "poses": poses}
-    blob = b64encode(b"".join(_packed(_blob(scene)) if head["packed"] else _blob(scene))).decode()
+    blob = b"".join(_blob(scene))
+    if head["packed"]:
+        blob = compress(blob)
     scripts = " ".join(f"{name}.js" for name in (*SCRIPTS, *(each for each in EXTRAS if each in head), "main"))
-    held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(blob)}
+    held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(b64encode(blob).decode())}
     return write_html(title, page_file("page.html"), style="page.css", script=scripts, data=held)
 
 
@@ -242,14 +245,6 @@ def _little(numbers: array[Any]) -> bytes:
     if sys.byteorder == "big":
         numbers.byteswap()
     return numbers.tobytes()
-
-
-def _packed(pieces: Iterator[bytes]) -> Iterator[bytes]:
-    from zlib import compressobj
-
-    packer = compressobj(6)
-    yield from map(packer.compress, pieces)
-    yield packer.flush()
 
 
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:

@@ -7,7 +7,6 @@ from html import escape
 from typing import Any
 
 from frametool.frames.lookups import Frames
-from frametool.geometry.transform import Transform
 
 
 def html_of(value: Any) -> str | None:
@@ -26,15 +25,14 @@ def html_of(value: Any) -> str | None:
     if hasattr(value, "stamps_ns"):
         from frametool.frames.trajectory import way
 
-        stamps = value.stamps_ns
-        span = f", {(stamps[-1] - stamps[0]) / 1e9:.3f} s" if stamps is not None and len(stamps) else ""
-        said = f"{value.size} poses of {value.body} in {value.world}{span}, {way(value.xyz)[-1]:.3f} m of path"
-        return f"<pre>{escape(said)}</pre>"
+        path = f"{way(value.xyz)[-1]:.3f} m of path" if value.size else "empty"
+        return f"<pre>{value.size} poses of {escape(value.body)} in {escape(value.world)}, {path}</pre>"
     if isinstance(value, Frames) or value.shape:
         return None
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, Style
     from frametool.view.pose_text import write_poses
 
-    pose = Pose.of(value.components) if isinstance(value, Transform) else Pose(rotation=value.components)
+    parts = value.components
+    pose = Pose.of(parts) if len(parts) > len("xyzw") else Pose(rotation=parts)
     return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"
