@@ -93,9 +93,7 @@ def _require_plane(kind: str, xyz: Array, name: str) -> None:
         raise Unaligned(f"{name} lies on a line: the turn about it is free; --align yaw, origin or none")
 
 
-def umeyama(
-    ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool, tied: bool = False
-) -> Fit:
+def umeyama(ref: Array, est: Array, weights: Array | None = None, *, with_scale: bool, tied: bool = False) -> Fit:
     """Minimise the sum of w |c R e + t - r|^2; source: Umeyama 1991.  tied: subject to c R e_0 + t = r_0."""
     mass = np.ones(len(ref)) if weights is None else weights
     ref_mean, est_mean = (each[0] if tied else centre(each, mass) for each in (ref, est))

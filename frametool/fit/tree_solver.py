@@ -247,9 +247,7 @@ class TreeProblem:
 
     # noise, and selection of rows
 
-    def estimated(
-        self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
-    ) -> Noise:
+    def estimated(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool) -> Noise:
         """Return the noise of the used rows: sums of squares over their degrees of freedom."""
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:

@@ -132,9 +132,7 @@ class FrameFile(InputFile):
         """Return what was assumed about a file that was read, or omitted; "" if it is complete."""
         return f"{self.name}: {self.tally.assumed}" if self.tally.assumed else ""
 
-    def edges(
-        self, report: Report = stop, *, tell: bool = True, normalize: bool = False
-    ) -> Iterator[Edge]:
+    def edges(self, report: Report = stop, *, tell: bool = True, normalize: bool = False) -> Iterator[Edge]:
         """Yield the edges in the order of the file, then emit warnings; otherwise as `pieces`."""
         for piece in self.pieces(report, tell=tell, normalize=normalize):
             if isinstance(piece, Edge):

@@ -371,9 +371,7 @@ def check_in_ecef(parent: str | None, place: Place) -> None:
     raise ValueInvalid(NOT_IN_ECEF.format(names, found))
 
 
-def _numbers_of(
-    frame: str | None, position: Sequence[float], place: Place, read: Spot | None = None
-) -> list[float]:
+def _numbers_of(frame: str | None, position: Sequence[float], place: Place, read: Spot | None = None) -> list[float]:
     """Return the numbers of a position in ecef; raises ValueInvalid for another frame, or if it cannot be written.
 
     read: the position as it was read, which is used if it is unchanged
@@ -475,9 +473,7 @@ def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
     return ({}, pose) if place.name == ECEF else (entry.pop(UTM, {}) | entry, local)
 
 
-def point_entry(
-    frame: str | None, point: Sequence[float], place: Place, read: Spot | None = None
-) -> dict[str, Any]:
+def point_entry(frame: str | None, point: Sequence[float], place: Place, read: Spot | None = None) -> dict[str, Any]:
     """Return a point of ecef as a mapping: as a position on the Earth, or with its frame.
 
     Raises ValueInvalid for a point of another frame, and for one that cannot be written in this notation.

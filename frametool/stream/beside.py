@@ -238,10 +238,10 @@ def with_rates(
     first = 1 + max((each.number for each in columns if isinstance(each, New)), default=-1)
     number = {place: first + at for at, place in enumerate(place for each in turned for place in each)}
     more = tuple(map(Shape, kinds))
-    return (*shapes, *more), (*targets, *map(request.target, more)), (*places, *number), [
-        New(number[each.place], names[each.place]) if isinstance(each, Kept) and each.place in number else each
-        for each in columns
-    ]  # fmt: skip
+    made = {place: New(at, request.prefix + names[place]) for place, at in number.items()}
+    columns = [made.get(each.place, each) if isinstance(each, Kept) and not request.keep else each for each in columns]
+    columns += made.values() if request.keep else ()
+    return (*shapes, *more), (*targets, *map(request.target, more)), (*places, *number), columns
 
 
 MIRRORED = "the covariance cannot be carried through axes that mirror; leave it out"

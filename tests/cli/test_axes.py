@@ -271,3 +271,6 @@ def test_a_whole_log_turns_in_one_command(run: Any) -> None:
     numbers |= {"c11": 2e-4, "c22": 1e-4, "c33": 3e-4, "c44": 5e-4, "c55": 4e-4, "c66": 6e-4, "c12": 0, "roll_deg": 0, "pitch_deg": 0}
     assert {name: float(found[name]) for name in numbers} == pytest.approx(numbers)
     assert found["mode"] == "auto"
+    kept = run("convert", "--all-axes", "ros_from_aircraft", "--keep", "--prefix", "n_", stdin=LOG.format("vx,vy,vz")).out
+    found = dict(zip(*(line.split(",") for line in kept.splitlines()), strict=True))
+    assert [found[name] for name in ("vx", "vy", "vz", "n_vx", "n_vy", "n_vz")] == ["4", "5", "6", "5.0", "4.0", "-6.0"]

@@ -11,11 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import parse_documents
-from frametool.formats.rows.pose_rows import (
-    Written,
-    position_and_turn,
-    samples,
-)
+from frametool.formats.rows.pose_rows import Written, position_and_turn, samples
 from frametool.formats.table import FORMATS
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 

@@ -287,9 +287,7 @@ def read_samples(
             above = within(("samples", index), _above, moved, parent, sample)
             if above is None:
                 raise Misfit(f"frame {shown(child)} moves but has no parent", ("samples", index))
-            edges.append(
-                Edge(above, child, moved.components, stamp_ns, path=reading.here, covariance=pose.covariance)
-            )
+            edges.append(Edge(above, child, moved.components, stamp_ns, path=reading.here, covariance=pose.covariance))
     finally:
         reading.degrees, reading.earth = outer, earth
     return edges
