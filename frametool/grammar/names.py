@@ -48,6 +48,11 @@ FLAT = {key: row.names for key, row in representations.POSITIONS.items() if not 
 FLAT_NAMES = frozenset[str]().union(*FLAT.values())
 
 
+def is_rate(key: str) -> bool:
+    """Return True if a key of a record is that of a velocity or of turn rates."""
+    return re.fullmatch(rf"{RATES}|(?:linear_|angular_)?velocity", key) is not None
+
+
 def in_nanoseconds(name: str) -> int:
     """Return the nanoseconds per unit of an integer, by its name: 1 for `stamp_ns`, `t [ns]`; 0 for seconds.
 

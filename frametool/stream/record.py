@@ -20,6 +20,7 @@ from frametool.grammar.names import (
     NAME_KEYS,
     PARENT_KEYS,
     STAMP_KEYS,
+    is_rate,
     may_be_on_earth,
     may_be_uncertain,
 )
@@ -231,6 +232,9 @@ def _search(value: Any, path: Path, outer: tuple[Path, ...], request: Request) -
             found = list(_search_inside(value, path, outer, request, stays))
         if not operation.keeps_frames and (operation.formula is None or operation.formula.reads_row):
             _refuse_half(value, found, path, stays if operation.moves else ())
+        if operation.turns and found and (rates := [key for key in value if is_rate(key)]):
+            what = f"{first_of(rates, 3, quote=shown)} would keep to the old axes; a table turns vx, vy, vz along"
+            raise Misfit(f"{what}; leave them out, or convert to CSV first", (*path, rates[0]), key=True)
         yield from found
 
 

@@ -75,7 +75,7 @@ def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedRea
         for block in read_blocks(stream, whole=splitter.whole):
             edits = []
             for part in splitter.parts(block).parts:
-                with suppress(FrametoolError, UnicodeDecodeError):
+                with suppress(FrametoolError, TypeError, UnicodeDecodeError):  # a list is no key
                     moved, _ = stamp_source.at_other_times(block[part.start : part.end].decode(), offset_ns)
                     edits.append((part.start, part.end, moved.encode()))
             yield stamp_source.replaced(block, edits)

@@ -260,6 +260,15 @@ def test_velocities_that_cannot_turn_are_told_to_stay(run: Any, names: str, chan
     assert "old axes" not in run("convert", "--all-axes", "ros_from_aircraft", stdin=LOG.format("a,b,c")).err
 
 
+@pytest.mark.parametrize("keys", ['"vx": 1, "vy": 2, "vz": 3', '"velocity": [1, 2, 3]', '"angular_velocity": [1, 2, 3]'])
+def test_records_do_not_keep_velocities_in_the_old_axes(run: Any, keys: str) -> None:
+    line = f'{{"xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1], {keys}}}\n'
+    for many in (1, 40):
+        done = run("convert", "--all-axes", "ros_from_aircraft", stdin=line * many)
+        assert (done.status, "would keep to the old axes" in done.err) == (1, True)
+        assert run("convert", "--to", "rpy", stdin=line * many).status == 0
+
+
 def test_a_whole_log_turns_in_one_command(run: Any) -> None:
     entries = [f"c{row}{column}" for row in range(1, 7) for column in range(1, 7)]
     variances = [1e-4 * (row + 1) * (row == column) for row in range(6) for column in range(6)]

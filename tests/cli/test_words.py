@@ -188,3 +188,5 @@ def test_what_found_no_other_place_is_refused_in_one_sentence(command: tuple[str
     files = {"images.txt": "# Image list with two lines\n1 1 0 0 0 0 0 0 1 a.png\n\n", "list.txt": "[ INFO] [17]: Spinning\n"}
     done = run(*command, files=files)
     assert (done.status in (1, 2), said in done.err) == (True, True)
+    rows = ("convert", "-i", "list.txt", "--in", "yaml")
+    assert run(*rows, "--time-offset", "1s", files=files).out == run(*rows, files=files).out
