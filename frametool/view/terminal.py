@@ -213,10 +213,9 @@ class TerminalPicture:
 
 def print_terminal(scene: FrameScene, eye: tuple[float, float] = SLANTED, color: str = "auto") -> None:
     """Print a picture of the terminal's size, in colour where it has any, or as `color` says: always or never."""
-    from os import get_terminal_size
-    from sys import stdout
+    from shutil import get_terminal_size
 
-    columns, lines = get_terminal_size(stdout.fileno())
+    columns, lines = get_terminal_size()
     coloured_console(color).print(_rich_text(TerminalPicture(scene, columns, lines - 1, eye)))
 
 

@@ -105,6 +105,9 @@ def test_with_columns_the_output_is_laid_out_as_on_a_terminal(monkeypatch: pytes
     assert max(map(len, wide.splitlines())) > 60
     assert max(map(len, narrow.splitlines())) < 60
     assert "\x1b[" not in wide
+    drawn = run("view robot.yaml", files=files, columns=60)
+    assert (drawn.status, drawn.err) == (0, "")
+    assert 50 < max(map(len, drawn.out.decode().splitlines())) <= 60
     monkeypatch.delenv("NO_COLOR")
     monkeypatch.setenv("TERM", "xterm-256color")
     assert "\x1b[" in run("tree robot.yaml", files=files, columns=80).out.decode()

@@ -236,6 +236,9 @@ def test_a_page_that_a_command_wrote_stands_beside_the_line_alone(tab: Any) -> N
     assert inner.evaluate("self.origin") == "null"
     tab.click("#beside button")
     assert tab.locator("#beside iframe").count() == 0
+    typed(tab, "view examples/robot.yaml --below base_link", 2)
+    tab.frame_locator("#beside iframe").locator("canvas").first.wait_for(timeout=20_000)
+    assert tab.locator(".answer").count() == 2
 
 
 def test_a_long_run_is_stopped_and_the_next_line_runs(open_page: Visit) -> None:

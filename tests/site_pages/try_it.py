@@ -16,6 +16,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 MISSING = ("numpy", "rosbags", "mcap", "pyarrow", "laspy", "matplotlib")
+NO_FILE = 5  # exit code of what needs a file, or a package, that is not there
 TESTS = Path(__file__).resolve().parents[1]
 
 
@@ -51,7 +52,7 @@ def main() -> None:
         typed = SHORTENED.sub("", line)
         if all(stage.split()[:1] == ["frametool"] for stage in pipeline(typed)):
             ran = frametool.run(typed, files=files, columns=WIDTH)
-            if not re.search(r"a library cannot be loaded|frametool\[|is for a shell", ran.err):
+            if ran.status != NO_FILE and not re.search(r"a library cannot be loaded|is for a shell", ran.err):
                 found[line] = typed
     print(json.dumps(found))
 

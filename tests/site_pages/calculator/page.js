@@ -72,7 +72,14 @@ async function run(text) {
   running = null;
   $("stop").hidden = true;
   delete document.body.dataset.running;
-  if (result) show(text, result, took);
+  if (!result) return;
+  show(text, result, took);
+  if (/^view\s/.test(text) && !result.status && !/\s(-o|-f|--output|--format)\b/.test(text)) drawn(text);
+}
+
+async function drawn(text) { // what the terminal shows of frames, as a page that turns
+  const { result } = await ask("answer", `${text} -o view.html`, Object.fromEntries(files), columns());
+  if (result?.files["view.html"]) framed(result.files["view.html"], text);
 }
 
 function stop() {
