@@ -15,7 +15,6 @@ from frametool.documents.source import InputFile
 from frametool.errors import FormatError, Misused, ValueInvalid, warn
 from frametool.formats.rows.pose_rows import IMAGE, NUMBER, StampFile, blocks, describe, rows_of
 from frametool.formats.table import FORMATS, is_recording, is_trajectory
-from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Diagnostics, Options, Topics, stop
 from frametool.grammar.names import EARTH_FRAMES
@@ -28,7 +27,7 @@ from frametool.stream.row_layout import POINT, POSE, Shape, Target
 from frametool.stream.row_poses import RowPoses, kept
 from frametool.stream.rows import Block, spans_of
 from frametool.stream.table import rename_of
-from frametool.stream.table_stream import TablePoses, begin_table
+from frametool.stream.table_stream import TablePoses, begin_table, stamps_for
 from frametool.stream.writers import LEARNED
 from frametool.text.spans import Spans, framed
 
@@ -151,22 +150,14 @@ class FormatConverter:
             poses = self._with_place(block, lambda size: [*rows.given[:size]])
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            poses = poses._replace(stamps_ns=self._stamps(poses, form, count))
+            stamps = stamps_for(poses, self.stamps, form, count)
+            poses = poses._replace(stamps_ns=self._held(stamps, form) if form.counted else stamps)
             count += len(poses.numbers)
             yield Step(poses, outcome)
         if self.stamps:
             self.stamps.finish(count, self.source)
         if is_trajectory(self.form):
             describe(Options(self.tally, Topics(), answers=self.answers), form, count, named=False)
-
-    def _stamps(self, poses: RowPoses, form: Poses, before: int) -> Any:
-        """Return the stamps of poses: their own, those of a file, or their numbers as seconds."""
-        size = len(poses.numbers)
-        if self.stamps:
-            return np.array([self.stamps.at(before + at) for at in range(size)], np.int64)
-        if poses.stamps_ns is None and form.counted:
-            return self._held(np.arange(before, before + size, dtype=np.int64) * BILLION, form)
-        return poses.stamps_ns
 
     def _held(self, stamps_ns: Any, form: Poses) -> Any:
         """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""

@@ -300,12 +300,6 @@ def _count(kind: str, earth: Earth) -> int:
     return len(POSITIONS[kind].names) - (kind == UTM and earth.zone is not None)
 
 
-def of_fix(names: Sequence[str]) -> tuple[int, ...]:
-    """Return the places of the nine numbers of a NavSatFix's covariance: field.position_covariance0, or [0]."""
-    found = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
-    return tuple(found[at] for at in range(9)) if len(found) == 9 else ()
-
-
 def along(
     shape: Shape, names: Sequence[str], places: tuple[int, ...], source: str
 ) -> tuple[tuple[int, ...], Shape]:
@@ -316,8 +310,9 @@ def along(
     place = shape.place
     if place is None:
         return places, shape
-    if not places and shape.kind == POINT and (fix := of_fix(names)):
-        return fix, shape._replace(unit=place._replace(axes=ENU))
+    fix = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
+    if not places and shape.kind == POINT and len(fix) == 9:  # field.position_covariance0, or [0]
+        return tuple(fix[at] for at in range(9)), shape._replace(unit=place._replace(axes=ENU))
     if places and not (place.axes or AXES in place.fields):
         raise FormatError(UNSAID.replace("rotation", "covariance").replace("a pose", "a row"), source=source, line=1)
     return places, shape

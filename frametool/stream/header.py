@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from copy import copy
-from functools import lru_cache
+from functools import lru_cache, partial
+from os.path import commonprefix
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import FormatError, Misused, ValueInvalid, bare, did_you_mean, listing, shown
@@ -406,7 +407,7 @@ def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[
     poses = []
     left = list(positions)
     for rotation in rotations:
-        near = max(left, key=lambda position: _kinship(position, rotation), default=None)
+        near = max(left, key=partial(_kinship, rotation), default=None)
         if rotation.whole or near is None:
             poses.append(PoseColumns(None, rotation))
             continue
@@ -416,13 +417,8 @@ def _paired(positions: Sequence[Columns], rotations: Sequence[Columns]) -> list[
     return sorted(poses, key=lambda pose: min(each.places[0] for each in pose if each is not None))
 
 
-def _kinship(position: Columns, rotation: Columns) -> tuple[bool, int]:
-    same = 0
-    for a, b in zip(position.prefix, rotation.prefix, strict=False):
-        if a != b:
-            break
-        same += 1
-    return position.suffix == rotation.suffix, same
+def _kinship(rotation: Columns, position: Columns) -> tuple[bool, int]:
+    return position.suffix == rotation.suffix, len(commonprefix([position.prefix, rotation.prefix]))  # noqa: RUF071
 
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:

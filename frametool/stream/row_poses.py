@@ -239,18 +239,14 @@ def texts_of(cells: Cells) -> list[str]:
         texts: list[str] = cells.astype(np.str_).tolist()
         return [text.lower() for text in texts] if cells.dtype.kind == "b" else texts
     if not isinstance(cells, Spans):
-        cells = float_spans(cells)
+        doubles = cells.astype(np.float64)
+        doubles = doubles if cells.dtype.itemsize > 4 else rounded_to_single(doubles)
+        spans = shortest_spans(doubles.reshape(-1, 1), b",")
+        cells = Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
     bare = without_quotes(cells)
     data = bare.data.tobytes()
     places = zip(bare.starts.tolist(), bare.ends.tolist(), strict=True)
     return [data[start:end].decode("utf-8", "replace").strip().replace('""', '"') for start, end in places]
-
-
-def float_spans(values: NDArray[Any]) -> Spans:
-    """Write floats as the shortest text that reads back to the same float of their type."""
-    doubles = values.astype(np.float64) if values.dtype.itemsize > 4 else rounded_to_single(values.astype(np.float64))
-    spans = shortest_spans(doubles.reshape(-1, 1), b",")
-    return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
 
 
 def text_of(value: Any) -> str:

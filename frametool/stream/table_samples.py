@@ -14,12 +14,11 @@ from frametool.documents.source import not_text
 from frametool.errors import FormatError
 from frametool.formats.rows.pose_rows import StampFile, describe
 from frametool.formats.table import FORMATS
-from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Samples
 from frametool.stream.faults import BadRow, Fault
 from frametool.stream.request import Request
-from frametool.stream.table_stream import TablePoses, begin_table
+from frametool.stream.table_stream import TablePoses, begin_table, stamps_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -53,7 +52,8 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
             column = rows.table.name(rows.naming.places[role] or 0)
             fault = Fault(line + int(block.lines[row]), column, "no name of a frame")
             options.report(BadRow(fault, fault.reason, source=file.name))
-        yield from _pieces(block, _times(block, stamps, form, count), line, form, options)
+        times = stamps_for(block, stamps, form, count)
+        yield from _pieces(block, None if times is None else times.tolist(), line, form, options)
         count += len(block.numbers)
     if stamps:
         stamps.finish(count, file.name)
@@ -69,17 +69,6 @@ def _check(rows: TablePoses, form: Poses, file: InputFile, options: Options) -> 
         lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
         wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
         raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)
-
-
-def _times(block: RowPoses, stamps: StampFile | None, form: Poses, before: int) -> list[int] | None:
-    """Return the stamps of a block's rows; None where they stand still."""
-    count = len(block.numbers)
-    if stamps:
-        return [stamps.at(before + at) for at in range(count)]
-    if block.stamps_ns is not None:
-        times: list[int] = block.stamps_ns.tolist()
-        return times
-    return [(before + at) * BILLION for at in range(count)] if form.counted else None
 
 
 def _nameless(block: RowPoses, roles: Sequence[int]) -> dict[int, int]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from frametool.errors import FormatError, FrametoolError, Misused, listing
 from frametool.formats.table import FORMATS
+from frametool.frames.stamps import BILLION
 from frametool.grammar.names import NORMAL_NAMES, in_nanoseconds, stamp_places
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import NULL, Fault, Outcome, RowNote, notes_of
@@ -39,6 +40,8 @@ from frametool.text.lines import read_blocks, whole_lines
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
 
+    from frametool.formats.rows.pose_rows import StampFile
+    from frametool.formats.table import Poses
     from frametool.stream.request import Request
     from frametool.stream.rows import Block
     from frametool.stream.stamp_source import Timed
@@ -262,6 +265,15 @@ def _texts(part: Spans) -> Sequence[str | None]:
         return [None]
     texts, codes = coded(part)
     return [texts[0] or None] if len(texts) == 1 else [texts[code] or None for code in codes.tolist()]
+
+
+def stamps_for(block: RowPoses, file: StampFile | None, form: Poses, before: int) -> Ints | None:
+    """Return the stamps of poses behind some: those of a file, their own, or their numbers as seconds."""
+    size = len(block.numbers)
+    if file:
+        return np.array([file.at(before + at) for at in range(size)], np.int64)
+    counts = block.stamps_ns is None and form.counted
+    return np.arange(before, before + size, dtype=np.int64) * BILLION if counts else block.stamps_ns
 
 
 def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:

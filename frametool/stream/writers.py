@@ -169,14 +169,11 @@ class TextWriter:
             dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
             dropped.by_stamp |= IMAGE in form.row and images is None
             dropped.turned = is_turned(self.style)
-        return self._joined(form, np.array(form.numbers(*self._canonical(block))).T + 0.0, block)  # none is -0.0
-
-    def _canonical(self, block: RowPoses) -> Components:
-        """Return position and quaternion of a block as the form has them: axes, direction, the sign that is written."""
-        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]
+        tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]  # as the format has them: axes, direction, sign
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
-        return (tx, ty, tz, *((x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)))
+        turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
+        return self._joined(form, np.array(form.numbers(tx, ty, tz, *turn)).T + 0.0, block)  # none is -0.0
 
     def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""
