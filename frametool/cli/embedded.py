@@ -107,7 +107,7 @@ def streams(stdin: Any, stdout: TextIO, stderr: TextIO | None = None) -> Iterato
 
 @contextmanager
 def _terminal_of(columns: int) -> Iterator[None]:
-    """Let the environment say how wide the terminal is; 0 where there is none."""
+    """Let the environment say how wide the terminal is; 0 for a pipe."""
     before = os.environ.get("COLUMNS")
     if columns:
         os.environ["COLUMNS"] = str(columns)

@@ -123,6 +123,6 @@ def links(folder: str, names: Iterable[str]) -> list[str]:
 
 
 def see_also(rows: Mapping[str, Iterable[str]]) -> str:
-    """Return a heading and a line of links for each kind there is; nothing where there is none."""
+    """Return a heading and a line of links for each kind there is; "" without any."""
     lines = [f"{kind}: {', '.join(found)}" for kind, found in rows.items() if found]
     return f"## See also\n\n{bullets(lines)}" if lines else ""
