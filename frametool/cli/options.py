@@ -170,13 +170,14 @@ class JointSetting(Text):
     """A joint of a robot and its value."""
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-        """Offer the joints of the URDF on the line with their limits; behind the = the limits."""
-        from frametool.formats.robots.urdf import load_robot
+        """Offer the joints of the robot on the line with their limits; behind the = the limits."""
+        from frametool.cli.trees import load_tree
 
         try:
-            joints = load_robot(tree_on_the_line(ctx) or "").joints.values()
-        except (FrametoolError, OSError):
+            robots = load_tree(tree_on_the_line(ctx) or ".").robots
+        except (FrametoolError, click.UsageError):
             return {}  # as for columns
+        joints = [joint for _, links, _ in robots for link in links for joint in link.joints]
         ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
         name, equals, _ = incomplete.partition("=")
         if equals:
