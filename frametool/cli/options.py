@@ -15,7 +15,7 @@ import click
 
 from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, together
 from frametool.cli.stderr import as_json, say, say_error, tell
-from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, shown
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, heard_by, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
@@ -171,11 +171,12 @@ class JointSetting(Text):
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:
         """Offer the joints of the robot on the line with their limits; behind the = the limits."""
-        from frametool.cli.trees import load_tree
+        from frametool.formats.load import load
 
         try:
-            robots = load_tree(tree_on_the_line(ctx) or ".").robots
-        except (FrametoolError, click.UsageError):
+            with heard_by(lambda *_: None):
+                robots = load(tree_on_the_line(ctx) or "").robots
+        except FrametoolError:
             return {}  # as for columns
         joints = [joint for _, links, _ in robots for link in links for joint in link.joints]
         ends = {each.name: [str(end) for end in (each.lower, each.upper) if end is not None] for each in joints}
