@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 
     from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan
-    from frametool.stream.record_text import RecordText
     from frametool.stream.record_values import Value
     from frametool.stream.request import Request
     from frametool.stream.splitter import Splitter
@@ -238,7 +237,7 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)
-        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style, _Unmarked(template.known))
+        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style, _unmarked)
     except (FrametoolError, ValueError):
         return None
     numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
@@ -268,16 +267,9 @@ def _stamped(value: Value, numbers: Mapping[str, int], *, is_spelled: bool) -> M
     return None if leaf is None else Marked(value, numbers, (int(leaf[1]), in_nanoseconds(key)))
 
 
-class _Unmarked:
-    """Stands for the text of a record with results in it, which shows no marks."""
-
-    def __init__(self, known: RecordText) -> None:
-        """Take the record."""
-        self.known = known
-
-    def at(self, _path: object) -> Any:
-        """Refuse to say what stands at a path."""
-        raise ValueInvalid("written in its own text")
+def _unmarked(_path: object) -> Any:
+    """Stand for the text of a record with results in it, which shows no marks."""
+    raise ValueInvalid("written in its own text")
 
 
 def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, Iterable[int]]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from frametool.stream.record import Record
 
     Value = Result | dict[str, Any]
+    WrittenBack = Callable[[Path], Any]
 
 MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
@@ -162,7 +163,7 @@ def values_of_text(known: RecordText, style: Style, memory: Memory, own: Teller)
     for each in made:
         record = each.entry.record
         units.setdefault(unit_of(record, value_at(known.values, record.path[:1])), []).append(each)
-    written_back = _WrittenBack(known, made)
+    written_back = _WrittenBack(known, made).at
     for unit, ours in units.items():
         alone = all(_says_no_more(each.entry.record, known.values, unit) for each in ours)
         node = NOTHING if alone else known.root.at(unit)
@@ -232,7 +233,7 @@ class _WrittenBack:
 
 
 def values_of_unit(
-    node: Node, unit: Path, answers: list[Answer], request: Request, style: Style, spliced: Any
+    node: Node, unit: Path, answers: list[Answer], request: Request, style: Style, written_back: WrittenBack
 ) -> Iterator[Value]:
     """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
     inside = any(type(step) is str for each in answers for step in each.entry.record.path[len(unit) :])
@@ -242,10 +243,10 @@ def values_of_unit(
     moves = request.operation.moves
     as_read = (inside and style.format in MESSAGES) or (not is_list and style.format in MESSAGES[:2])
     if moves and request.poses and ((as_read and (keeps or is_one)) or (is_one and style.format == "text")):
-        yield spliced.at(unit)
+        yield written_back(unit)
         return
     if moves and is_one:
-        yield _flat_message(node, unit, answers, spliced)
+        yield _flat_message(node, unit, answers, written_back)
         return
     for each in answers:
         kind = each.entry.record.shape.kind
@@ -254,9 +255,9 @@ def values_of_unit(
         elif kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
         elif is_list or not _stays(node, kind, style):
-            yield _flat(node, unit, each, request, style.format, spliced.known.source)
+            yield _flat(node, unit, each, request, style.format)
         else:
-            yield spliced.at(unit)
+            yield written_back(unit)
 
 
 def _stays(node: Node, kind: str, style: Style) -> bool:
@@ -386,7 +387,7 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, source: Source) -> dict[str, Any]:
+def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
     entry = made.entry
     kind = entry.record.shape.kind
@@ -404,27 +405,27 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str, sou
         named[kind] = numbers
     if is_recording(form) and request.operation.keeps_frames:
         holder = node.at(entry.record.path[len(unit) :])
-        named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record, source)) else {}
+        named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record)) else {}
     rest = with_stamp_ns(_rest(node, unit, entry.record), form)
     return antenna | named | _header_stamp(entry.record) | beside | rest
 
 
-def _place_as_read(node: Node, record: Record, source: Source) -> list[float]:
+def _place_as_read(node: Node, record: Record) -> list[float]:
     """Return lat, lon and alt where a record says them; [] elsewhere."""
     from frametool.grammar.place import LLA_KEYS, read_at
 
     keys = [key for key in (*record.members, *record.placed) if key in LLA_KEYS]
     if not keys:
         return []
-    place, numbers = read_at({key: str(plain(node.at((key,)))) for key in keys}, Reading(source))
+    place, numbers = read_at({key: str(plain(node.at((key,)))) for key in keys}, Reading(Source("", "")))
     return [*place.lla(numbers)]
 
 
-def _flat_message(node: Node, unit: Path, answers: list[Answer], spliced: _WrittenBack) -> dict[str, Any]:
+def _flat_message(node: Node, unit: Path, answers: list[Answer], written_back: WrittenBack) -> dict[str, Any]:
     """Return a message of several things as a mapping without levels, a key for each of their numbers."""
     first = answers[0].entry
     found = {"frame": first.parent} | _header_stamp(first.record) | _rest(node, unit, first.record)
-    for key, value in spliced.at(first.record.path).items():
+    for key, value in written_back(first.record.path).items():
         if key != "header":
             found.pop(key, None)
             parts = value.items() if isinstance(value, dict) else [("", value)]

@@ -77,7 +77,7 @@ def test_relative_checks_that_both_are_given_in_one_frame(run: Run) -> None:
     table = f"parent,name,{POSE}\na,c,{ONE}\nx,c,{ONE}\n"
     done = run("relative", "{name: b, parent: a, xyz: [1, 0, 0]}", "-", "--on-error", "skip", stdin=table)
     assert [(row["parent"], row["name"]) for row in rows(done.out)] == [("b", "c")]
-    assert "stdin:3:parent: A is given in 'a' and B in 'x'" in done.err
+    assert "stdin:3:parent: A is in 'a' and B in 'x'" in done.err
 
 
 @pytest.mark.parametrize("size", [0, 30])
