@@ -223,7 +223,7 @@ def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], rea
     off = rule.deviation(*own, floats) if len(own) == len(row.columns) else 0.0
     if not (off > quaternion.SILENT and rule.explained(own, [half_unit(texts[index]) for index in at], floats)):
         return numbers
-    if off > quaternion.TOLERATED and not reading.normalize:
+    if quaternion.TOLERATED < off < math.inf and not reading.normalize:
         reading.note(FEW_DIGITS.format(off), rule="rounded")
     meant = dict(zip(at, rule.repair(*own, floats), strict=True))
     return [meant.get(index, number) for index, number in enumerate(numbers)]

@@ -373,7 +373,7 @@ class Run:
         halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
         meant = rule.explained is not None and rule.explained(own, halves, arrays)
         off = rule.deviation(*own, arrays)
-        far = np.flatnonzero(meant & (off > quaternion.TOLERATED) & (not self.request.normalize))
+        far = np.flatnonzero(meant & (off > quaternion.TOLERATED) & (off < np.inf) & (not self.request.normalize))
         self.mended += rows[far].tolist()
         for at in far[: not self.rounded].tolist():
             line, column = self._place(int(rows[at]), places[0])

@@ -46,3 +46,9 @@ def test_what_rounding_does_not_explain_is_told(run: Run, numbers: str) -> None:
 def test_the_rows_of_a_matrix_count_alike(run: Run, entry: str, said: str) -> None:
     outcome = run("convert", f"{{matrix: [[{entry}, -0.5000, 0], [0.5000, {entry}, 0], [0, 0, 1]]}}")
     assert (outcome.status, said in outcome.err, outcome.err == "") == (0, True, said == "")
+
+
+def test_a_mirror_is_no_matter_of_digits(run: Run) -> None:
+    table = "r11,r12,r13,r21,r22,r23,r31,r32,r33\n1,0,0,0,1,0,0,0,-1\n"
+    for done in (run("convert", "{matrix: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}"), run("convert", "--to", "rpy", stdin=table)):
+        assert (done.status, "mirrored" in done.err, "few digits" in done.err) == (1, True, False)
