@@ -333,7 +333,7 @@ class _Walk:
             raise CalcError(f"unknown name {shown(name)}{did_you_mean(name, trees)}")
         tree = scope.names[name].tree
         if tree is None:
-            raise CalcError(f"{name} is no tree but {scope.names[name].type.named}")
+            raise CalcError(f"{name} is not a tree but {scope.names[name].type.named}")
         scope.leave_out(tree.covariances)
         return tree
 

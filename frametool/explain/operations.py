@@ -55,7 +55,7 @@ BLOCKS = {
     "euler_unity": SheetNames("a2 a3 a1", "a2 a3 a1"),
 }
 AXES_OF = {"rpy": "sxyz", "rpy_unreal": "sxyz", "euler_unity": "szxy"}  # Euler angles under another name
-ORDERS = {"wxyz": "w, x, y, z: the scalar w stands first.", "": "x, y, z, w: the scalar w stands last."}
+ORDERS = {"wxyz": "w, x, y, z: the scalar w is first.", "": "x, y, z, w: the scalar w is last."}
 UNITS = {True: {"deg": "_deg", "unit": "deg"}, False: {"deg": "", "unit": "rad"}}
 PLAIN = ("quaternion", "xyzw")
 MOVERS = {"point": "p", "vector": "v", "twist": "vw", "wrench": "fm"}  # letters of their vectors

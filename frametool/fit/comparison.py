@@ -67,7 +67,7 @@ def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -
     """Read `1m`, `10frames`, `1s`, `5deg`; raises ValueInvalid."""
     found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-z]+)", text.strip())
     if not found or found[2] not in units or not float(found[1]) > 0:
-        raise ValueInvalid(f"{shown(text)} is no distance between poses; write a number with {', '.join(units)}")
+        raise ValueInvalid(f"{shown(text)} is not a distance between poses; write a number with {', '.join(units)}")
     if found[2] == "frames" and not float(found[1]).is_integer():
         raise ValueInvalid(f"{shown(text)}: frames are counted whole")
     return Delta(float(found[1]), found[2])

@@ -393,10 +393,10 @@ def parse_limits(text: str) -> list[Limit]:
     for part in filter(None, map(str.strip, text.split(","))):
         match = re.fullmatch(_LIMIT, part)
         if match is None or match[4] not in UNITS:
-            raise ValueInvalid(f"{shown(part)} is no limit; write a name, > or <, and a bound: ate>5cm, paired<90%")
+            raise ValueInvalid(f"{shown(part)} is not a limit; write a name, > or <, and a bound: ate>5cm, paired<90%")
         name = match[1]
         if ":" in name and not name.startswith("rpe:"):
-            raise ValueInvalid(f"{shown(name)} is no number of a comparison; rpe has a delta behind a colon: rpe:10m")
+            raise ValueInvalid(f"no number is called {shown(name)}; rpe has a delta behind a colon: rpe:10m")
         if "." not in name and ":" not in name and name not in SHORT:
             raise ValueInvalid(f"no number is called {shown(name)}{alternatives(name, [*SHORT, 'rpe:10m'], 'numbers')}")
         found.append(Limit(part, name, match[2], float(match[3]) * UNITS[match[4]], match[4]))

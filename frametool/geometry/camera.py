@@ -570,7 +570,7 @@ def _intrinsics(value: Any, skew: float) -> tuple[float, ...]:
     k = _numbers(value, "K", 4, 9)
     k = k if len(k) == 9 else (k[0], 0.0, k[2], 0.0, k[1], k[3], 0.0, 0.0, 1.0)
     if k[3] or k[6:] != (0.0, 0.0, 1.0):
-        raise ValueInvalid("K is no matrix of a camera: its rows are fx skew cx, 0 fy cy and 0 0 1")
+        raise ValueInvalid("K is not a camera matrix: its rows are fx skew cx, 0 fy cy and 0 0 1")
     if not (k[0] and k[4]):
         raise ValueInvalid(f"{'fy' if k[0] else 'fx'} is 0: the camera is not calibrated")
     return k[0], k[4], k[2], k[5], _numbers(skew, "skew", 1)[0] or k[1]
@@ -579,7 +579,7 @@ def _intrinsics(value: Any, skew: float) -> tuple[float, ...]:
 def _size(value: Any) -> tuple[int, int]:
     width, height = _numbers(value, "size", 2)
     if min(width, height) < 1.0 or width % 1.0 or height % 1.0:
-        raise ValueInvalid(f"size {width:g} x {height:g} is no size: give whole pixels, width and height")
+        raise ValueInvalid(f"size {width:g} x {height:g} is not a size: give whole pixels, width and height")
     return int(width), int(height)
 
 

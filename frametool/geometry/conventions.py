@@ -129,7 +129,7 @@ def _letters(text: str) -> list[str]:
     """Return three signed letters, each axis once; raise ValueInvalid for anything else."""
     found = [each.strip().removeprefix("+") for each in text.split(",")]
     if sorted(each.removeprefix("-") for each in found) != ["x", "y", "z"]:
-        raise ValueInvalid(f"{shown(text)} is no axes of one's own: x, y and z once each, with their signs, as {OWN}")
+        raise ValueInvalid(f"{shown(text)} is not a set of axes: x, y and z once each, with their signs, as {OWN}")
     return found
 
 

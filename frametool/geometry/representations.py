@@ -48,7 +48,7 @@ class Whole:
 
 
 def _no_rotation(*_: Any) -> Any:
-    raise ValueInvalid("a place is no rotation")
+    raise ValueInvalid("a place is not a rotation")
 
 
 class BatchRule:

@@ -320,7 +320,7 @@ def check_parent(mapping: dict[str, Any], own: dict[str, Any]) -> None:
     for key in ("parent", "frame"):
         value = mapping.get(key)
         if value == UTM:
-            raise Misfit("utm is no rigid frame and no parent; place the frame: at: {utm: {..}}, axes: grid", (key,))
+            raise Misfit("utm is neither rigid nor a parent; place the frame: at: {utm: {..}}, axes: grid", (key,))
         if value not in (None, *EARTH_FRAMES):
             what = "at" if AT in own else next(name for name in own if name in EARTH_KEYS)
             raise Misfit(f"{what} places a frame in ecef; {key} is {shown(value)}", (key,))

@@ -20,7 +20,7 @@ RULES = {
     "syntax": ("error", "text that cannot be read, or lacks a part"),
     "empty": ("warning", "a file without any transform"),
     "no-frames": ("warning", "a file of something else, among those of --each"),
-    "denormalized": ("error", "a quaternion or matrix that is no rotation"),
+    "denormalized": ("error", "a quaternion or matrix that is not a rotation"),
     "rounded": ("warning", "a rotation off by 1e-6 to 1e-3: normalised"),
     "mirrored": ("error", "a left-handed matrix"),
     "not-finite": ("error", "NaN or infinity"),

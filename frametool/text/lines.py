@@ -67,7 +67,7 @@ def read_blocks(
             pieces = [text[abs(end) :]]
         if held >= longest:
             what = f"the record that begins in line {line} is longer than {longest} bytes"
-            raise FormatError(f"{what}: this is no text in lines, or a quote is not closed")
+            raise FormatError(f"{what}: this is not text in lines, or a quote is not closed")
     if rest := b"".join((*begun, *pieces)):
         yield rest
 

@@ -95,7 +95,7 @@ def parse_share(text: str) -> float:
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(%?)", text.strip())
     share = float(found[1]) / (100 if found[2] else 1) if found else 2.0
     if share > 1.0:
-        raise ValueInvalid(f"{shown(text)} is no share; write 10%, or 0.1")
+        raise ValueInvalid(f"{shown(text)} is not a share; write 10%, or 0.1")
     return share
 
 
@@ -118,7 +118,7 @@ def parse_fractions(text: str) -> list[float]:
 
     parts = text.split(":")
     if len(parts) != 3:
-        raise ValueInvalid(f"{shown(text)} is no range; a range is START:STOP:STEP, as 0:1:0.25")
+        raise ValueInvalid(f"{shown(text)} is not a range; a range is START:STOP:STEP, as 0:1:0.25")
     start, stop, step = (Decimal(repr(parse_number(each.strip()))) for each in parts)
     if step <= 0 or stop < start:
         raise ValueInvalid(f"{shown(text)}: STEP must be positive and STOP not before START")

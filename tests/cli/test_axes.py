@@ -115,7 +115,7 @@ def test_there_and_back_is_the_same_pose(run: Run, there: str) -> None:
          "on the right of the pose, so beside --world-axes unity_from_ros it is --axes ros_from_unity"),
         (["--all-axes", "unity"], "--all-axes: 'unity' is one end of a change; give A_from_B, as unity_from_ros"),
         (["--all-axes", "x,x,-y"],
-         "--all-axes: 'x,x,-y' is no axes of one's own: x, y and z once each, with their signs, as x,-y,-z"),
+         "--all-axes: 'x,x,-y' is not a set of axes: x, y and z once each, with their signs, as x,-y,-z"),
         (["--all-axes", "unity_from_ros", "--axes", "flu_from_frd"],
          "--all-axes and --axes exclude each other"),
         (["--axes", "optical_from_blendr"],

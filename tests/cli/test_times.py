@@ -345,7 +345,7 @@ def test_nanoseconds_taken_for_seconds_are_shown_as_they_are_written(run: Run) -
 def test_fractions_are_a_range_as_times_are(run: Run) -> None:
     poses = ("interpolate", "{xyz: [0, 0, 0]}", "{xyz: [1, 0, 0]}")
     assert run(*poses, "0:1:0.1", "-f", "csv") == run(*poses, *[str(at / 10) for at in range(11)], "-f", "csv")
-    assert "'0:1' is no range; a range is START:STOP:STEP, as 0:1:0.25" in run(*poses, "0:1").err
+    assert "'0:1' is not a range; a range is START:STOP:STEP, as 0:1:0.25" in run(*poses, "0:1").err
     assert "STEP must be positive" in run(*poses, "0:1:-1").err
 
 

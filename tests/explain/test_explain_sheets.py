@@ -28,7 +28,7 @@ AXIS_ANGLE = """\
    vy = ay/n = 0/1.41421 = 0
    vz = az/n = 1/1.41421 = 0.707107
    ! The axis is not a unit vector: it is divided by its length. With a longer
-     axis q would be no rotation.
+     axis q would not be a rotation.
    angle = angle_deg·pi/180 = 180·pi/180 = 3.14159 rad
    w     = cos(angle/2) = sqrt(0)/2 = 0
    s     = sin(angle/2) = sqrt(4)/2 = 1
@@ -37,8 +37,7 @@ AXIS_ANGLE = """\
    x = vx·s = 0.707107·1 = 0.707107
    y = vy·s = 0·1 = 0
    z = vz·s = 0.707107·1 = 0.707107
-   ! Half the angle stands inside: a quaternion acts twice (q v q*), so w =
-     cos(angle/2).
+   ! The half angle: a quaternion acts twice (q v q*), so w = cos(angle/2).
    norm = sqrt(x^2 + y^2 + z^2 + w^2)
         = sqrt(0.707107^2 + 0^2 + 0.707107^2 + 0^2) = 1.00000
 
@@ -50,7 +49,7 @@ INVERSE = """\
    base_from_camera: xyz 0.1 0 1.2 m, xyzw 0 0.6 0 0.8
 
 2. camera_from_base = inverse of base_from_camera
-   The axis turns round: q* = (-x, -y, -z, w), and its matrix is R^T.
+   The axis is negated: q* = (-x, -y, -z, w), and its matrix is R^T.
    t' = -R^T t
           [0.28 0 -0.96] [0.1]   [  1.12400]
       = - [   0 1     0] [  0] = [        0] m
@@ -133,7 +132,7 @@ def sheet(pose: dict[str, Any], to: str = "quaternion", precision: int | None = 
 
 @pytest.mark.parametrize(("pose", "to", "said"), [
     ({"wxyz": [-0.5, 0.5, 0.5, 0.5]}, "quaternion", ["! Double cover", "qw = -w = -(-0.5) = 0.5"]),
-    ({"rpy": [0.1, 0, 0]}, "quaternion", ["! Half the angle stands inside"]),
+    ({"rpy": [0.1, 0, 0]}, "quaternion", ["! The half angle"]),
     ({"xyzw": [0, 0, 0, 1]}, "axis_angle", ["No rotation: the angle is 0, any axis will do, and x is taken."]),
     ({"xyzw": [0, 0, 0, 1]}, "rotvec", ["No rotation: the vector is 0."]),
     ({"rotvec": [0, 0, 0]}, "quaternion", ["The vector is 0: no rotation"]),
@@ -141,7 +140,7 @@ def sheet(pose: dict[str, Any], to: str = "quaternion", precision: int | None = 
     ({"rotvec": [1e-300, 0, 0]}, "rotvec", ["leave the range of a double", "rx = vx·angle = 1·1e-300 = 1e-300 rad"]),
     ({"rotvec": [1e-9, 0, 0]}, "axis_angle", ["angle = 2·atan2(s, w) = 2·atan2(5e-10, 1) = 1e-09 rad"]),
     ({"rpy_deg": [0, 90, 0]}, "rpy_deg", ["! Gimbal lock", "yaw   = 0 rad (chosen)", "pitch_deg = pitch·180/pi = 1.57080·180/pi = 90 deg"]),
-    ({"rpy_deg": [0, 89.99999, 10]}, "rpy_deg", ["! Beside lock: roll and yaw each are known only to about"]),
+    ({"rpy_deg": [0, 89.99999, 10]}, "rpy_deg", ["! Near gimbal lock: roll and yaw each are known only to about"]),
     ({"euler": {"axes": "rzxz", "angles": [0.3, 0, 0.4]}}, "euler:rzxz", ["! Gimbal lock", "a3 = 0 rad (chosen)"]),
     ({"xyzw": [0, 0, 1, 0]}, "rpy_deg", ["yaw   = atan2(r21, r11) = atan2(0, -1) = 3.14159 rad", "roll 0.0  pitch 0.0  yaw 180.0 deg"]),
     ({"rpy_deg": [0, 0, 180]}, "matrix", ["cy   = cos(yaw/2) = sqrt(0)/2 = 0", "r11 = 1 - 2·(y^2 + z^2) = 1 - 2·(0^2 + 1^2) = -1"]),

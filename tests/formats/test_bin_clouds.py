@@ -99,7 +99,7 @@ CSV = "x,y,z,intensity\n1e300,2,3,4\n"
         ),
         (
             ("convert", "-i", "five.bin", "--in", "nuscenes-bin", "-f", "csv"),
-            "five.bin:1: ring: 0.5 is no number of a ring; is it --in kitti-bin?",
+            "five.bin:1: ring: 0.5 is not a ring number; is it --in kitti-bin?",
         ),
         (("convert", "-i", "a.csv", "-f", "kitti-bin", "-o", "b.bin"), "column x: 1e+300 is too large for float32"),
         (

@@ -109,7 +109,7 @@ UNSAID = "a pose at lat, lon does not state the axes of its rotation; axes: enu,
         (f"[{{name: map, {PLACE}, rpy: [0, 0, 1]}}]", UNSAID),
         (f"[{{name: map, samples: [{{stamp: 0, {PLACE}}}]}}]", UNSAID),
         (f"[{{name: map, parent: base, {PLACE}, axes: enu}}]", "lat places a frame in ecef; parent is 'base'"),
-        (f"[{{name: map, parent: utm, {PLACE}, axes: enu}}]", "utm is no rigid frame and no parent; place the frame"),
+        (f"[{{name: map, parent: utm, {PLACE}, axes: enu}}]", "utm is neither rigid nor a parent; place the frame"),
         (f"frames: {{base: {{map: {{{AT}, axes: enu}}}}}}", "at places a frame in ecef; its parent is 'base'"),
         (
             f"[{{name: map, parent: base, axes: enu, samples: [{{stamp: 0, {PLACE}}}]}}]",

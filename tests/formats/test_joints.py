@@ -259,7 +259,7 @@ def test_the_later_file_and_the_option_win(run: Run) -> None:
 WRONG_FILES = {
     "an unknown joint in a map": ("pan: 1\nreech: 0.1\n", r"joints:2:8: no joint 'reech'; did you mean 'reach'\?"),
     "an unknown joint in a message": ("name: [pan, reech]\nposition: [1, 2]\n", r"joints:2:15: no joint 'reech'"),
-    "a near column": ("t,pan,reech\n0,1,2\n", r"joints:1: column 'reech' is no joint; did you mean 'reach'"),
+    "a near column": ("t,pan,reech\n0,1,2\n", r"joints:1: column 'reech' is not a joint; did you mean 'reach'"),
     "no column": ("t,x,y\n0,1,2\n", r"joints:1: no column is a joint; columns: t, x, y; joints: grip, "),
     "two columns": ("pan,pan_deg\n1,2\n", r"joints:1: columns 'pan' and 'pan_deg' are both joint 'pan'"),
     "a unit": ("t,pan_mm\n0,1\n", r"joints:1: column 'pan_mm': joint 'pan' is revolute; units: deg, rad"),

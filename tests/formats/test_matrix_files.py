@@ -210,7 +210,7 @@ def test_rectification_projection_and_intrinsics_are_left_out_and_told(run: Call
     more = "".join(stored(*each) for each in (("LEFT.R", np.eye(3)), ("RIGHT.P", projection), ("LEFT.K", np.eye(3))))
     done = run("tree", "a.yaml", files={"a.yaml": VINS + more})
     assert done.status == 0
-    assert "LEFT.R (rectification), RIGHT.P (projection), LEFT.K (intrinsics) are no poses" in done.err
+    assert "LEFT.R (rectification), RIGHT.P (projection), LEFT.K (intrinsics) are not poses" in done.err
     assert len(done.err) < 200 + len("frametool: a.yaml")
 
 

@@ -84,7 +84,7 @@ def test_viewpoint_is_the_pose_of_the_sensor_and_moves_along(run: Run, tmp_path:
 def test_a_viewpoint_that_is_no_pose_stays_and_is_told(run: Run, tmp_path: Path) -> None:
     done = move(run, tmp_path, "pcd", pcd(cloud(), viewpoint="0 0 0 0 0 0 0"))
     assert b"VIEWPOINT 0 0 0 0 0 0 0\n" in (done.data or b"")
-    assert "VIEWPOINT is left as it is: 0 0 0 0 is no rotation" in done.err
+    assert "VIEWPOINT is left as it is: 0 0 0 0 is not a rotation" in done.err
 
 
 def test_fields_of_several_values_and_padding_pass(run: Run, tmp_path: Path) -> None:

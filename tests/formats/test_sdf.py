@@ -436,7 +436,7 @@ def test_joints_in_a_circle_of_links_leave_one_out(tmp_path: Path) -> None:
         ("<link/>", "3:17: <link> has no name"),
         ('<link name="world"/>', "the name 'world' is reserved"),
         (A_AND_B + JOINT.format("hinge", ""), "joint 'j' has the type 'hinge'; types: ball, continuous"),
-        (A_AND_B + JOINT.format("revolute", AXIS.format("0 0 0")), "joint 'j' has the axis 0 0 0, which is no direction"),
+        (A_AND_B + JOINT.format("revolute", AXIS.format("0 0 0")), "joint 'j' has the axis 0 0 0, which is not a direction"),
         (A_AND_B + JOINT.format("fixed", "").replace("<child>b</child>", ""), "joint 'j' has no <child>"),
         (A_AND_B + JOINT.format("fixed", "").replace("<child>b", "<child>c"), "no frame 'c' in model 'm'"),
         (A_AND_B + JOINT.format("fixed", "").replace("<child>b", "<child>a"), "joint 'j' does not connect two links"),

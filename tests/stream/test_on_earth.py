@@ -425,7 +425,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {  # the senten
         {"lat": 86.0, "lon": 11.5, "alt": 1}, {"axes": "grid", "qx": 0, "qy": 0, "qz": 0, "qw": 1},
     ),
     "a parent": (
-        "utm is no rigid frame and no parent; place the frame: at: {utm: {..}}, axes: grid",
+        "utm is neither rigid nor a parent; place the frame: at: {utm: {..}}, axes: grid",
         {"lat": 45.0, "lon": 11.5, "alt": 1}, {"parent": "utm"},
     ),
     "another parent": (

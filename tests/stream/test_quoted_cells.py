@@ -27,7 +27,7 @@ def test_a_record_beyond_the_limit_is_refused_with_its_line_whatever_the_block()
         with sized(record=5000):
             found = [flow(text, MOVE, size=size) for size in (7, 100, 4096, 1 << 16)]
         assert found[0].told == [
-            "the record that begins in line 3 is longer than 5000 bytes: this is no text in lines, or a quote is not closed"
+            "the record that begins in line 3 is longer than 5000 bytes: this is not text in lines, or a quote is not closed"
         ]
         assert found[0].status == 1
         assert all(each == found[0] for each in found)

@@ -345,7 +345,7 @@ def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
     for name in names:
         bare_name = _with_unit(name.strip(), joints)[0]
         if bare_name not in joints and (near := did_you_mean(bare_name, [*joints.keys() - held], cutoff=0.8)):
-            return f"column {shown(name)} is no joint{near}"
+            return f"column {shown(name)} is not a joint{near}"
     return ""
 
 

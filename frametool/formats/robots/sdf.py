@@ -391,7 +391,7 @@ class SdfJoints:
             return 0.0, 0.0, 1.0
         x, y, z = xyz.numbers(3)
         if not (x or y or z):
-            raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is no direction")
+            raise xyz.error(f"joint {shown(frame.local)} has the axis 0 0 0, which is not a direction")
         outer, version = frame, self.frames.version
         if name := xyz.attribute("expressed_in"):
             outer = self.frames.find(name, frame.scope, xyz, "expressed_in")

@@ -197,7 +197,7 @@ class _Reader:
     def _axis(self, name: str, element: Element) -> Vector:
         x, y, z = self.xml.numbers(element, "xyz", 3, "1 0 0")
         if not (x or y or z):
-            raise self.xml.error(element, f"joint {shown(name)} has the axis 0 0 0, which is no direction", "xyz")
+            raise self.xml.error(element, f"joint {shown(name)} has the axis 0 0 0, which is not a direction", "xyz")
         return (x, y, z) if x * x + y * y + z * z == 1.0 else unit_vector(x, y, z, floats)
 
     def _limits(self, name: str, element: Element) -> tuple[float | None, float | None]:

@@ -54,7 +54,7 @@ class BinCloud(CloudFile):
             rings = batch.column(self.names.index(RING)) if RING in self.names else np.zeros(0)
             bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
             if len(bad):
-                found = f"ring: {rings[bad[0]]:g} is no number of a ring; is it --in kitti-bin?"
+                found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
                 raise FormatError(found, source=self.file.name, line=done + int(bad[0]) + 1)
             done += batch.size
             yield batch

@@ -121,7 +121,7 @@ def head_lines(
 def count_in(word: str, what: str, fail: Callable[[str], FormatError]) -> int:
     """Read a count of items, which an error calls `what`; raises FormatError."""
     if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
-        raise fail(f"{what} is no count")
+        raise fail(f"{what} is not a count")
     return int(word)
 
 

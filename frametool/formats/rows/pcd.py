@@ -144,7 +144,7 @@ class PcdHead:
             if words[0].startswith("#"):
                 continue
             if (key := words[0].upper()) not in _KEYS:
-                raise fail(f"{shown(words[0])} is no key of a PCD header; keys: {listing(_KEYS)}")
+                raise fail(f"{shown(words[0])} is not a key of a PCD header; keys: {listing(_KEYS)}")
             if (key := "FIELDS" if key == "COLUMNS" else key) in self.lines:
                 raise fail(f"{key} appears twice, first on line {self.lines[key]}")
             self.lines[key], self.words[key] = len(text), words[1:]
@@ -314,7 +314,7 @@ class PcdFile(CloudFile):
             return
         tx, ty, tz, w, x, y, z = self.head.viewpoint
         if quaternion.complaint(x, y, z, w):
-            warn(f"{name}: VIEWPOINT is left as it is: {w:g} {x:g} {y:g} {z:g} is no rotation")
+            warn(f"{name}: VIEWPOINT is left as it is: {w:g} {x:g} {y:g} {z:g} is not a rotation")
             return
         moved = placed.compose(pose, (tx, ty, tz, *quaternion.repaired(x, y, z, w, floats)))
         self.viewpoint = viewpoint_words(placed.pose_of(moved))

@@ -119,7 +119,7 @@ def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElemen
                 _add_property(element, words, fail)
             case word:
                 known = "format, element, property, comment, obj_info, end_header"
-                raise fail(f"{shown(word)} is no key of a PLY header; keys: {known}")
+                raise fail(f"{shown(word)} is not a key of a PLY header; keys: {known}")
     if not fmt:
         raise fail(f"the header has no format; formats: {', '.join(FORMS)}")
     return b"".join(text), FORMS[fmt], list(elements.values())
@@ -133,7 +133,7 @@ def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None
         raise fail(f"{shown(' '.join(words))}: expected property TYPE NAME, or property list TYPE TYPE NAME")
     for each in types:
         if each not in TYPES:
-            raise fail(f"{shown(each)} is no type; types: {', '.join(TYPES)}")
+            raise fail(f"{shown(each)} is not a type; types: {', '.join(TYPES)}")
     if name in element.properties:
         raise fail(f"property {shown(name)} of {shown(element.name)} appears twice")
     codes = [TYPES[each] for each in types]

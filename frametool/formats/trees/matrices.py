@@ -404,7 +404,7 @@ class Matrices:
             raise Misfit(nothing)
         edges = edges_of(self.poses, self.reading)
         if self.left:
-            verb = "is no pose" if len(self.left) == 1 else "are no poses"
+            verb = "is not a pose" if len(self.left) == 1 else "are not poses"
             tally.assumed = f"{first_of(self.left, MOST_TOLD)} {verb}"
         return edges
 
