@@ -63,8 +63,8 @@ LINES = [
     "view|robot.yaml|-o|robot.html", "view|robot.yaml", "convert|-i|walk.tum|-f|csv|-o|walk.csv",
     "convert|-i|walk.tum|-f|npy|-o|walk.npy", "convert|-i|walk.npy|-f|kitti", "apply|--transform|b.yaml|-i|cloud.csv",
     "apply|robot.yaml|map|lidar|-i|cloud.csv|-f|pcd", "mean|walk.tum", "sim|follow|--duration|1|--plot|run.svg",
-    "convert|-i|walk.csv|--to|rpy|-o|walk.csv|--force", "examples|cloud.csv|-o|new.csv", "tree|drive.yaml|-o|run.mcap",
-    "record|run.mcap|--with|{name: camera, parent: base_link, xyz: [1, 2, 3]}|-o|new.mcap",
+    "convert|-i|walk.csv|--to|rpy|-o|walk.csv|--force", "examples|cloud.csv|-o|new.csv", "tree|drive.yaml|-o|drive.mcap",
+    "record|drive.mcap|--with|{name: camera, parent: base_link, xyz: [1, 2, 3]}|-o|new.mcap",
 ]  # fmt: skip
 
 

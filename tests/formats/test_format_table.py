@@ -74,7 +74,7 @@ def test_a_made_up_form_is_read_wherever_a_tree_is(tmp_path: Path) -> None:
 def test_a_made_up_form_is_written_by_name_and_by_suffix_and_read_back(tmp_path: Path) -> None:
     assert with_toy(tmp_path, "tree", "-", "-o", "out.toy", stdin=TEXT) == (0, "", "")
     assert (tmp_path / "out.toy").read_text() == TEXT
-    assert "toy" in with_toy(tmp_path, "tree", "--help")[1]
+    assert "toy" in with_toy(tmp_path, "formats")[1]
     assert with_toy(tmp_path, "tree", "-v", "out.toy", "-f", "toy")[2] == "frametool: out.toy: a toy, known by its first line\n"
 
 

@@ -113,7 +113,7 @@ def test_what_a_command_writes_the_next_one_reads(run: Run, first: str, second: 
     assert written.status == 0, written.err
     whole = came(run, second, written.out)
     if "distance" in written.out and "relative" in second:
-        assert "would stand twice" in whole.err
+        assert "would appear twice" in whole.err
     else:
         assert whole.status == 0, whole.err
     for cut in (linewise, comment_first):
