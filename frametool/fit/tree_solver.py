@@ -91,11 +91,6 @@ class Fitted(NamedTuple):
     few_loops: bool
 
 
-def identities(count: int) -> PoseArrays:
-    """Return poses that are all at the root."""
-    return PoseArrays(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
-
-
 def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Array, Array]:
     """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
     back = np.swapaxes(parent.rotations, -1, -2)
@@ -160,7 +155,8 @@ class TreeProblem:
         """
         shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
         rows = range(self.size)
-        best, least, closest = identities(self.count), math.inf, np.full(self.size, math.inf)
+        best = PoseArrays(np.tile(np.eye(3), (self.count, 1, 1)), np.zeros((self.count, 3)))
+        least, closest = math.inf, np.full(self.size, math.inf)
         orders = [rows, *(sorted(rows, key=[shuffled.random() for _ in rows].__getitem__) for _ in range(trees - 1))]
         at_once = max(1, ROWS_AT_ONCE // max(self.size, self.count))
         while orders:
