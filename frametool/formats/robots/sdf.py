@@ -140,6 +140,7 @@ class SdfFrames:
         while self._read_all():  # until no more names are lost with omitted frames
             pass
         self.tree = FrameTree()
+        self.seen: dict[str, dict[str, Rigid]] = {}  # frame -> those below it, seen from it: chains cost no square
         for frame in self.all.values():
             if frame is not self.top:
                 self._hang(frame)
@@ -281,7 +282,16 @@ class SdfFrames:
             return frame.pose
         if outer.relative_to is frame and outer.placement is None:
             return rigid.inverse(*outer.pose)
-        return self.tree.near(outer.name, frame.name)
+        known = self.seen.setdefault(outer.name, {outer.name: IDENTITY})
+        way, top = [], frame.name
+        while top not in known and (track := self.tree.track(top)):
+            way.append(track)
+            top = track.parent
+        if top not in known:
+            return self.tree.near(outer.name, frame.name)
+        for track in reversed(way):
+            known[track.child] = rigid.compose(*known[track.parent], *track.components)
+        return known[frame.name]
 
 
 KINDS = {  # number of axes of each
