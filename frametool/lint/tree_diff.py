@@ -9,7 +9,7 @@ import re
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, listing, shown
+from frametool.errors import FrametoolError, ValueInvalid, listing, shown
 from frametool.frames.snapshot import Snapshot
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
@@ -18,10 +18,11 @@ from frametool.geometry.transform import NEAR_BY
 from frametool.text.numbers import parse_length, read_number_or_angle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
+    from frametool.geometry.camera import Camera
     from frametool.geometry.types import Rigid
 
 ROUNDING = 2.0**-46  # of the largest number on a path: the maximum error of a product of some dozens of poses
@@ -34,6 +35,7 @@ KINDS = {
     "motion": "a frame that is static in one and moves in the other",
     "no-data": "a frame without data at that time",
     "samples": "a frame that moves in both, but otherwise",
+    "camera": "a camera whose intrinsics differ",
     "moved": "a frame that has another pose, in its parent or seen from elsewhere",
 }
 SAME = "same"
@@ -195,7 +197,7 @@ def diff(
         for tree in (a, b):
             tree.require(seen_from)
     pair.see(seen_from)
-    found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame))]
+    found = [*pair.only(), *(each for frame in pair.common for each in pair.about(frame)), *pair.cameras()]
     order = {kind: number for number, kind in enumerate((*KINDS, SAME))}
     limit = pair.tolerance
 
@@ -313,6 +315,26 @@ class _Pair:
             same = self.tolerance.covers(own) and self.tolerance.covers(seen)
             yield found._replace(kind=SAME if same else "moved", own=own)
 
+    def cameras(self) -> Iterator[Difference]:
+        """Yield the common frames whose intrinsics differ; note what cannot be compared."""
+        try:
+            in_a, in_b = ({**side.tree.read_cameras(), **side.tree.cameras} for side in (self.a, self.b))
+        except FrametoolError as error:
+            self.notes.append(f"intrinsics are not compared: {error}")
+            return
+        if alone := [frame for frame in self.common if (frame in in_a) != (frame in in_b)]:
+            self.notes.append(f"intrinsics in only one of A and B are not compared: {listing(alone, 8)}")
+        for frame in self.common:
+            if frame in in_a and frame in in_b:
+                try:
+                    one, other = _intrinsics(in_a[frame]), _intrinsics(in_b[frame])
+                except FrametoolError as error:
+                    self.notes.append(f"intrinsics of {shown(frame)} are not compared: {error}")
+                    continue
+                keys = [key for key in {**one, **other} if one.get(key) != other.get(key)]
+                if note := ", ".join(f"{key} {one.get(key, 'none')} -> {other.get(key, 'none')}" for key in keys):
+                    yield Difference("camera", frame, self.a.parent(frame), self.b.parent(frame), note=note)
+
     def _other_samples(self, frame: str) -> Difference | None:
         """Compare all samples of a frame that moves in both."""
         one, other = self.a.tree.track(frame), self.b.tree.track(frame)
@@ -340,6 +362,21 @@ MOST_PAIRS = 10_000  # of frames below one parent that are compared
 
 def _apart(a: Rigid, b: Rigid) -> Apart:
     return Apart(*rigid.distance(*a, *b, floats))
+
+
+def _intrinsics(known: Camera | Callable[..., Camera]) -> dict[str, str]:
+    """Return what a camera has, by name, as text without digits that may be rounding."""
+    camera = known() if callable(known) else known
+    fields = {**camera.mapping(), **dict(zip(("fx", "fy", "cx", "cy"), camera.numbers, strict=False))}
+    for key in ("K", "axes"):
+        fields.pop(key, None)
+    return {key: _plain(value) for key, value in fields.items()}
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_plain, value))}]"
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
 def _covered(track: MovingTrack) -> str:

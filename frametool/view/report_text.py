@@ -119,7 +119,7 @@ def write_diff(found: Iterable[Difference]) -> str:
 
 
 _HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "other parent", "motion": "stands or moves",
-             "no-data": "no data", "samples": "other samples"}  # fmt: skip
+             "no-data": "no data", "samples": "other samples", "camera": "other intrinsics"}  # fmt: skip
 
 
 def _said(each: Difference) -> str:

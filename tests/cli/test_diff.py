@@ -98,6 +98,43 @@ def test_annotations_stand_at_the_line_of_b_or_else_of_a(run: Run) -> None:
     ]
 
 
+CHAIN = """cam0:
+  {camera_model: pinhole, intrinsics: [461.5, 460, 367, 248], distortion_model: radtan,
+  distortion_coeffs: [-0.25, 0.07, 0, 0], resolution: [752, 480],
+  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
+"""
+OWN = """frames: {base: {cam0: {xyz: [0, 0, 1], camera: {
+  K: [461.5, 460, 367, 248], D: [-0.25, 0.07, 0, 0], size: [752, 480], model: plumb_bob}}}}
+"""
+
+
+@pytest.mark.parametrize("text", [CHAIN, OWN])
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("461.5", "463", "fx 461.5 -> 463"),
+        ("461.5", "461.50000000000006", ""),  # rounding
+        ("0.07", "0.08", "D [-0.25, 0.07, 0, 0] -> [-0.25, 0.08, 0, 0]"),
+        ("752, 480", "640, 480", "size [752, 480] -> [640, 480]"),
+    ],
+)
+def test_intrinsics_that_differ_are_told_old_and_new(run: Run, text: str, old: str, new: str, told: str) -> None:
+    files = {"a.yaml": text, "b.yaml": text.replace(old, new)}
+    done = run("diff", "a.yaml", "b.yaml", files=files)
+    assert done == ((1, f"other intrinsics:\n  cam0: {told}\n", "") if told else (0, "", ""))
+    lines = run("diff", "a.yaml", "b.yaml", "-f", "json", files=files).out.splitlines()
+    assert [json.loads(line)["note"] for line in lines] == [told] * bool(told)
+
+
+def test_intrinsics_that_cannot_be_compared_are_noted(run: Run) -> None:
+    files = {"a.yaml": CHAIN, "b.yaml": CHAIN.replace("intrinsics: [461.5, 460, 367, 248],", "")}
+    note = "frametool: intrinsics in only one of A and B are not compared: cam0\n"
+    assert run("diff", "a.yaml", "b.yaml", files=files) == (0, "", note)
+    done = run("diff", "a.yaml", "b.yaml", files={**files, "b.yaml": CHAIN.replace("[461.5, 460", "[461.5, north")})
+    assert (done.status, done.out) == (0, "")
+    assert "intrinsics are not compared: b.yaml: " in done.err
+
+
 def test_all_lists_the_frames_that_did_not_move_too(run: Run) -> None:
     entries = [json.loads(line) for line in run("diff", "a.yaml", "b.yaml", "--all", "-f", "json", files=FILES).out.splitlines()]
     assert {each["frame"] for each in entries if each["kind"] == "same"} == {"base", "mast", "lidar"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Scipy
 
-from frametool import FrameTree, Rotation, Transform, TransformBuffer, diff
+from frametool import Camera, FrameTree, Rotation, Transform, TransformBuffer, diff
 from frametool.errors import UnknownFrame
 from frametool.lint.tree_diff import KINDS
 
@@ -276,6 +276,7 @@ def test_every_kind_is_told_in_a_sentence_on_one_line() -> None:
     b.insert("z", "y", turned(1))
     a.insert("base", "s", turned(1))
     b.insert("base", "s", turned(1), 0)
+    a.cameras, b.cameras = ({"y": Camera("pinhole", [fx, 5.0, 2.0, 2.0])} for fx in (5.0, 6.0))
     told = [*diff(a, b).differences, *diff(a, b, at_ns=5 * SECOND).differences]
     assert {each.kind for each in told} == set(KINDS)
     assert all(each.sentence.isprintable() and repr(each.frame)[1:-1] in each.sentence for each in told)

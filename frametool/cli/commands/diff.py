@@ -44,6 +44,7 @@ def command(inputs: Inputs) -> int:
     Lists frames that only one has, frames with another parent, and for all others how far they moved from A to B: in
     their own parent, and as seen from the root, so that two structures of one robot can be compared. The largest motion
     comes first, frames that only moved with their parent last. Signs of quaternions and the order of names are ignored.
+    Cameras of both files whose intrinsics differ are listed with the numbers of A -> B.
     Moving frames are compared at their latest time and sample by sample, or with --at at one time.
 
     A and B are files, - for standard input, or . for the file that FRAMETOOL_TREE names. --in and --frames are taken in
