@@ -318,7 +318,7 @@ class _Pair:
     def cameras(self) -> Iterator[Difference]:
         """Yield the common frames whose intrinsics differ; note what cannot be compared."""
         try:
-            in_a, in_b = ({**side.tree.read_cameras(), **side.tree.cameras} for side in (self.a, self.b))
+            in_a, in_b = (_cameras(side.tree) for side in (self.a, self.b))
         except FrametoolError as error:
             self.notes.append(f"intrinsics are not compared: {error}")
             return
@@ -362,6 +362,10 @@ MOST_PAIRS = 10_000  # of frames below one parent that are compared
 
 def _apart(a: Rigid, b: Rigid) -> Apart:
     return Apart(*rigid.distance(*a, *b, floats))
+
+
+def _cameras(tree: Frames) -> dict[str, Camera | Callable[..., Camera]]:
+    return {**tree.read_cameras(), **tree.cameras}
 
 
 def _intrinsics(known: Camera | Callable[..., Camera]) -> dict[str, str]:
