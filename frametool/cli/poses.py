@@ -33,6 +33,7 @@ INLINE = "argument"
 LONGEST_REMEMBERED = 4096  # characters
 # the grammar's own, or a header; compiled when first needed
 _PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
+_COMMAS = r"\s*[-+]?[.\d][-+.\deE]*(?:[ \t]*,[ \t]*[-+]?[.\d][-+.\deE]*)+[ \t\r]*(?:\n|\Z)"
 # of a table; the last: GTSAM, Gazebo, tf2_echo
 _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*|Translation):\s*\[|\s*Rotation: in "
 
@@ -90,19 +91,22 @@ def rejoined(values: Sequence[str]) -> tuple[str, ...]:
     return (text,) if is_apart else tuple(values)
 
 
-def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[Source | None, BufferedReader]:
+def pasted_stream(
+    stream: BufferedReader, name: str, request: Request, given: Notation | None, place: str
+) -> tuple[Source | None, BufferedReader]:
     """Return what was pasted into a stream as text of the grammar, and the stream, with all that is in it if not.
 
     Only a beginning with which no stream of rows or records has a result is read to its end.
+    given, place: the notation, or the position on the Earth, that --from names
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
-    if re.match(_PLAIN, head) and not re.match(_NO_HEADER, head):
+    if (re.match(_PLAIN, head) and not re.match(_NO_HEADER, head)) or _has_rows(head, given, place):
         return None, stream
     from frametool.grammar.pasted import begins_freely
     from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar, may_be_pasted
 
     moves, alone = request.operation.moves, request.poses == 1 and request.operation.keeps_position
-    given = None if moves else request.given
+    given = None if moves else request.given or given
     is_free = may_be_pasted(head) and begins_freely(head, given, moves=moves, alone=alone)
     if is_free is None:
         raise Misused("three rows of three numbers may be a rotation or positions; give --from matrix, or --in columns")
@@ -114,6 +118,14 @@ def pasted_stream(stream: BufferedReader, name: str, request: Request) -> tuple[
     source = Source(name, decode(data, name))
     found = in_grammar(source, given, normalize=request.normalize, points=request.operation.moves)
     return found, BufferedReader(BytesIO(data))
+
+
+def _has_rows(head: str, given: Notation | None, place: str) -> bool:
+    """Return True for rows with commas of what --from names, without a header; the rows of a matrix are pasted."""
+    if not (found := re.match(_COMMAS, head)) or place or given is None:
+        return bool(found and place)
+    rep = given.representation
+    return rep.whole is None and found[0].count(",") + 1 - len(rep.columns) in (0, 3)
 
 
 def _inverted(text: str) -> re.Match[str] | None:

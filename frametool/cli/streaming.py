@@ -200,7 +200,7 @@ class Stream:
         if not (form or tables_only or self._says_columns() or is_listed):
             from frametool.cli.poses import pasted_stream
 
-            pasted, stream = pasted_stream(stream, self.name, request._replace(given=request.given or self.given))
+            pasted, stream = pasted_stream(stream, self.name, request, self.given, self.given_place)
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())

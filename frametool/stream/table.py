@@ -295,8 +295,13 @@ class Table(NamedTuple):
         return self.head + title + self.line_end
 
 
-def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[Table, bytes]:
-    """Look at the first block; return the table and the block without what stands before the first row."""
+def open_table(
+    block: bytes, form: str, *, header: bool, source: str, given: object = None
+) -> tuple[Table, bytes]:
+    """Look at the first block; return the table and the block without what stands before the first row.
+
+    given: what --from says of numbers without names
+    """
     row = FORMATS[form]
     delimiter = (row.delimiter or "").encode()
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
@@ -314,7 +319,7 @@ def open_table(block: bytes, form: str, *, header: bool, source: str) -> tuple[T
         head, titles, title, end = named
         return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
     if not own:
-        if header and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
+        if header and not given and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")

@@ -85,7 +85,7 @@ def begin_table(stream: ByteStream, form: str, request: Request, *, source: str,
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
-    table, rest = open_table(first, form, header=header, source=source)
+    table, rest = open_table(first, form, header=header, source=source, given=request.given or request.given_place)
     table = as_trajectory(table, form, request, source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))

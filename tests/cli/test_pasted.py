@@ -337,3 +337,18 @@ def test_the_help_of_a_group_lists_its_commands(run: Run) -> None:
 def test_angles_of_a_urdf_beyond_a_turn_are_doubted(run: Run) -> None:
     robot = '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin rpy="0 0 90"/></joint></robot>'
     assert "rpy 90 is more than a full turn in radians; degrees? [degrees]" in run("check", "-", stdin=robot).out
+
+
+@pytest.mark.parametrize(
+    ("given", "to", "row"),
+    [
+        ("lla", "ecef", "48.1 11.5 500"), ("lla", "ecef", "48.1 11.5"), ("wxyz", "rpy_deg", "0.9 0 0.3 0"),
+        ("rpy_deg", "xyzw", "0 0 90"), ("rpy_deg", "xyzw", "1 2 3 0 0 90"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("delimiter", [",", ", ", "\t"])
+def test_rows_without_a_header_that_from_names_are_rows_with_any_delimiter(run: Run, given: str, to: str, row: str, delimiter: str) -> None:
+    with_blanks = run("convert", "--from", given, "--to", to, stdin=f"{row}\n{row}\n")
+    other = run("convert", "--from", given, "--to", to, stdin=f"{row}\n{row}\n".replace(" ", delimiter))
+    assert (other.status, other.err) == (0, with_blanks.err)
+    assert other.out.replace(delimiter.strip(" "), " ").replace("  ", " ") == with_blanks.out
