@@ -268,7 +268,7 @@ def paired_samples(
              for each in (gripper, target) for name in (each.world, each.body)]  # fmt: skip
     for each, file in ((gripper, files[0]), (target, files[1])):
         if each.xyzw is None:
-            raise ValueInvalid(f"{file}: positions alone are no poses: rotations are needed here")
+            raise ValueInvalid(f"{file}: positions alone are not poses: rotations are needed here")
     if gripper.stamps_ns is None or target.stamps_ns is None:
         if gripper.size != target.size:
             counts = f"{files[0]} has {gripper.size} poses, {files[1]} {target.size}"

@@ -54,7 +54,7 @@ class Trajectory(NamedTuple):
     def poses(self) -> Transform:
         """The poses; raises ValueInvalid if there are only positions."""
         if self.xyzw is None:
-            raise ValueInvalid("positions alone are no poses: rotations are needed here")
+            raise ValueInvalid("positions alone are not poses: rotations are needed here")
         return Transform.of(*columns(self.xyz), *columns(self.xyzw))
 
     def with_poses(self, poses: Transform) -> Trajectory:

@@ -114,7 +114,7 @@ def _looked_up(
     stamps, missing, bad = stamps_of(column, time_column)
     if len(bad):
         seconds = column[int(bad[0])].as_py()
-        raise ValueInvalid(f"{time_column}[{bad[0]}]: {seconds} is no time in seconds; integers are nanoseconds")
+        raise ValueInvalid(f"{time_column}[{bad[0]}]: {seconds} is not a time in seconds; integers are nanoseconds")
     needed = np.ones(len(stamps), np.bool_) if nulls is None else ~nulls
     if missing is not None and (missing & needed).any():
         row = int(np.argmax(missing & needed))

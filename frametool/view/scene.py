@@ -60,7 +60,7 @@ def _expression(text: str) -> re.Pattern[str]:
         with warnings.catch_warnings(action="ignore", category=FutureWarning):
             return re.compile(text)
     except (re.error, OverflowError, RecursionError) as error:
-        raise ValueInvalid(f"{shown(text)} is no regular expression: {error}") from None
+        raise ValueInvalid(f"{shown(text)} is not a regular expression: {error}") from None
 
 
 class Ground(NamedTuple):

@@ -83,7 +83,7 @@ def test_what_is_drawn_can_be_chosen(run: Run, arguments: tuple[str, ...], names
     [
         (("nope", "tool"), 4, "unknown frame 'nope'"),
         (("--below", "nope"), 4, "unknown frame 'nope'"),
-        (("--only", "("), 1, "'(' is no regular expression"),
+        (("--only", "("), 1, "'(' is not a regular expression"),
         (("--only", "zzz"), 1, "nothing matches"),
         (("--path",), 2, "name both"),
         (("--from", "above"), 2, "expected slanted, front, side, top or AZ,EL in degrees, found 'above'"),

@@ -248,9 +248,9 @@ def test_a_null_row_needs_no_time() -> None:
     [
         ([1, None], r"t\[1\] is null: no time"),
         (["1", "2"], "column 't' is string; stamps are a timestamp, integer nanoseconds, or float seconds"),
-        ([1.0, float("nan")], r"t\[1\]: nan is no time in seconds"),
+        ([1.0, float("nan")], r"t\[1\]: nan is not a time in seconds"),
         ([0, 10**12], "no data for map -> base at 1000.000000000"),
-        ([1.0, 1e18], r"t\[1\]: 1e\+18 is no time in seconds; integers are nanoseconds"),
+        ([1.0, 1e18], r"t\[1\]: 1e\+18 is not a time in seconds; integers are nanoseconds"),
         (pa.array([0, 10**12], pa.timestamp("s")), "column 't': a stamp is beyond 64 bits of nanoseconds"),
     ],
     ids=str,

@@ -131,7 +131,7 @@ class ArrowBatch(column_file.Batch):
                 remedy = "are these some? then call the column stamp_ns, or let it be a timestamp"
                 seconds = numbers[int(np.argmax(beyond))]
                 raise ValueInvalid(f"column {shown(name)}: {seconds} s is beyond 64 bits of nanoseconds; {remedy}")
-        reasons = {row: f"{column[row].as_py()} is no time in seconds" for row in bad.tolist()}
+        reasons = {row: f"{column[row].as_py()} is not a time in seconds" for row in bad.tolist()}
         return stamps, reasons | dict.fromkeys([] if nulls is None else np.flatnonzero(nulls).tolist(), NO_TIME)
 
     def texts(self, place: int) -> list[str]:
