@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from frametool.sim.followed import follow_steps as follow_steps
     from frametool.sim.scene import tutorial as tutorial
     from frametool.sim.simulate import simulate as simulate
-    from frametool.sim.sweep import simulate_many as simulate_many
     from frametool.sim.turtle import Turtle as Turtle
     from frametool.sim.turtle import Twist as Twist
     from frametool.stream.engines import apply_arrow as apply_arrow
@@ -89,7 +88,6 @@ _HOMES = {
     "resample": "frametool.fit.python_api",
     "run": "frametool.cli.embedded",
     "simulate": "frametool.sim.simulate",
-    "simulate_many": "frametool.sim.sweep",
     "solve": "frametool.fit.python_api",
     "solve_hand_eye": "frametool.fit.python_api",
     "solve_mean": "frametool.fit.python_api",

@@ -15,4 +15,3 @@ PIECE = 1 << 20  # bytes of a file of documents that are read at once
 STRETCH = 1 << 17  # characters of a recording that are parsed at once
 ASIDE = 1 << 16  # characters of YAML: plain lists in shorter texts are not worth a separate reader
 PAGE = 512  # samples of an edge over time: a longer page is split when a late sample falls into it
-FOLLOWERS = 1 << 14  # of a sweep, at a time; smaller blocks spend their time on calls

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 # an option, alone or behind its command, an option with a value, or a subcommand -> what to use instead
 REPLACED = {
     "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
-    "sim sweep": "`frametool.simulate_many` in Python tries many gains at once",
+    "sim sweep": 'a loop in Python over `frametool.simulate(..)` of `FollowController("ros1", gain_linear=2)`',
     "view --live": "the page plays what moves, `frametool view TREE --open`",
     "--explain latex": "--explain=markdown has the formulas as LaTeX; pandoc makes a document of it",
     "view --sliders": "a robot's page has its sliders; --no-sliders leaves them out",

@@ -70,16 +70,12 @@ class FollowController:
                 max(-self.max_angular, min(self.max_angular, angular)),
             )
         except ValueInvalid:
-            raise ValueInvalid(unbounded(self.gain_linear, self.gain_angular, distance)) from None
+            gains = f"gain_linear {self.gain_linear:g}, gain_angular {self.gain_angular:g}"
+            raise ValueInvalid(f"{gains} give no finite velocity at {distance:g} m") from None
 
     def due_ns(self, count: int) -> int:
         """Return the time of the n-th control step, from 0; rounded once, so that no rate drifts."""
         return round(count * BILLION / self.rate)
-
-
-def unbounded(gain_linear: float, gain_angular: float, distance: float) -> str:
-    """Return the error that gains are too large; metres."""
-    return f"gain_linear {gain_linear:g}, gain_angular {gain_angular:g} give no finite velocity at {distance:g} m"
 
 
 def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, listing, printable, shown
 
@@ -98,9 +98,9 @@ def check_single(**numbers: float) -> None:
             raise ValueInvalid(f"{name} must be a number within float32, found {value:g}")
 
 
-def wrapped(theta: Any, xp: Any = math) -> Any:
+def wrapped(theta: float) -> float:
     """Wrap an angle to [-PI, PI) by turtlesim's formula."""
-    return theta - 2.0 * PI * xp.floor((theta + PI) / (2.0 * PI))
+    return theta - 2.0 * PI * math.floor((theta + PI) / (2.0 * PI))
 
 
 class Turtle:
