@@ -5,6 +5,7 @@ Also takes the places out of what --to and --from name.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,7 +15,7 @@ from frametool.cli.stderr import say
 from frametool.documents.source import Source
 from frametool.errors import FormatError, warn
 from frametool.geometry.conventions import world_of
-from frametool.geometry.place import UTM, Earth, Origin, Place, kernels
+from frametool.geometry.place import LLA, UTM, Earth, Origin, Place, kernels
 from frametool.geometry.representations import POSITIONS, Notation
 from frametool.geometry.transverse_mercator import zone_number
 from frametool.grammar.place import read_at
@@ -51,16 +52,19 @@ class SaidEarth(Earth):
 
 
 def _origin(text: str) -> Origin:
-    """Read --origin: a place, or the first position."""
+    """Read --origin: a place, numbers of lat, lon, alt, or the first position."""
     if text == FIRST:
         return Origin(tell=_tell)
     from frametool.documents.document import parse_documents
 
+    numbers = re.split(r"\s*,\s*|\s+", text.strip())
+    if text[:1] != "{" and len(numbers) in (2, 3):
+        text = mapping_of(numbers, LLA)
     source = Source("--origin", text)
     reading = Reading(source)
     try:
         documents = parse_documents(text, source.name) if text.startswith("{") else []
-        refuse(len(documents) != 1, f"--origin takes a place like '{{lat: 48.1, lon: 11.5, alt: 520}}', or {FIRST}")
+        refuse(len(documents) != 1, f"--origin takes LAT,LON[,ALT], {{lat: 48.1, lon: 11.5, alt: 520}} or {FIRST}")
         spot = read_at(documents[0].value, reading)
     except Misfit as misfit:
         raise click.UsageError(f"--origin: {misfit}") from None

@@ -310,7 +310,7 @@ _SIGNS = together(
     _of_rotations("--keep-sign", "do not normalize the quaternion's sign to w >= 0"),
     _of_rotations("--local-axes", "axes of rotations at a position on the Earth (help earth)",
                   ("enu", "ned", "grid", "ecef")),
-    _of_rotations("--origin PLACE|first", "position of east north up 0 0 0"),
+    _of_rotations("--origin PLACE|first", "position of east north up 0 0 0, as LAT,LON[,ALT]"),
     _of_rotations("--zone 32N", "UTM zone for all positions"),
 )  # fmt: skip
 # how poses are read; how rotations are written; both

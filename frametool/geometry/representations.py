@@ -477,6 +477,10 @@ def _upper_rows() -> Notation:
 UPPER_ROWS = _upper_rows()  # no name spells it: twelve numbers of a file say it
 
 
+# of other tools
+OTHER_NAMES = {"quat": "quaternion", "ypr": "euler:rzyx", "ypr_deg": "euler_deg:rzyx", "ypr_rad": "euler_rad:rzyx"}
+
+
 def notation(spec: str) -> Notation:
     """Read the name of a notation: `rpy`, `rpy_deg`, `euler:rzyx`, `euler_deg:rzyx`.
 
@@ -490,7 +494,7 @@ def notation(spec: str) -> Notation:
         bare, degrees = name[:-4], name.endswith("_deg")
     row = REPRESENTATIONS.get(bare)
     if row is None:
-        known = f"{_near_names(bare)} representations: {listing(REPRESENTATIONS, near=bare)}"
+        known = f"{_near_names(bare, spec)} representations: {listing(REPRESENTATIONS, near=bare)}"
         raise ValueInvalid(f"unknown representation {shown(bare)}{known}")
     if degrees is not None and not row.angles:
         raise ValueInvalid(f"{bare} has no angle: write it without {name[-4:]}")
@@ -501,8 +505,10 @@ def notation(spec: str) -> Notation:
     return Notation(spec, row, CHECKED[row.axes](axes) if colon else None, degrees=degrees)
 
 
-def _near_names(name: str) -> str:
+def _near_names(name: str, spec: str) -> str:
     """Return the nearest representation, and those nearly as near that have the same numbers in another order."""
+    if spec in OTHER_NAMES:
+        return f"; did you mean {shown(OTHER_NAMES[spec])}?"
     near = nearest(name, REPRESENTATIONS)
     rivals = [each for each in near if {*REPRESENTATIONS[each].columns} == {*REPRESENTATIONS[near[0]].columns}]
     return f"; did you mean {' or '.join(map(shown, rivals))}?" if near else ";"

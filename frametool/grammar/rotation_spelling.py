@@ -206,7 +206,7 @@ def read_components(
     return as_meant(notation, numbers, texts, reading), degrees
 
 
-FEW_DIGITS = "a rotation that is off by {:.2g}, as its few digits explain, was normalised"
+FEW_DIGITS = "a rotation is off by {:.2g}, which its few digits explain, and was normalised"
 
 
 def as_meant(notation: Notation, numbers: list[float], texts: Sequence[str], reading: Reading) -> list[float]:

@@ -294,7 +294,9 @@ def test_resampling_keeps_the_poses_there_are(run: Run) -> None:
     assert (steps <= 1 + 1e-6).all()
     assert (steps > 0.8).all()
     gaps = run("resample", "gaps-ref.csv", "--rate", "20", files=FILES)
-    assert "moments are beyond the ends of gaps-ref.csv, or in a gap: no pose" in gaps.err
+    assert "of gaps-ref.csv or in a gap and are left out" in gaps.err
+    line = {"odo.csv": "t,x,y,z\n0,0,0,0\n5,1,0,0\n"}
+    assert run("resample", "odo.csv", "--at", "9", files=line).err == "frametool: note: 1 of 1 times lies outside 0 .. 5 s of odo.csv and is left out\n"
     assert run("resample", "drone-ref.tum", files=FILES).status == 2
 
 

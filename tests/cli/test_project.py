@@ -185,6 +185,7 @@ def test_the_count_says_what_became_of_points(run: Run) -> None:
     assert done.err == "frametool: 5 points: 2 in the image, 2 behind the camera, 1 beyond the model (46.0 deg)\n"
     most = run("project", "--camera", camera, stdin=table([*points, (0.0, 1.0, -1.0), (0.0, 1.0, -1.0)]))
     assert "most are behind: --camera-axes" in most.err
+    assert run("project", "--camera", camera, stdin=table([(0.0, 0.0, -1.0)])).err == "frametool: 1 point: 1 behind the camera\n"
     assert run("project", "--camera", camera, "--quiet", stdin=table(points)).err == ""
 
 

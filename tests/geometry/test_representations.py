@@ -83,6 +83,8 @@ def test_columns_carry_the_unit_that_was_said(spec: str, columns: tuple[str, ...
     ("spec", "message"),
     [
         ("quaternon", "unknown representation 'quaternon'; did you mean 'quaternion'? representations: "),
+        ("quat", "unknown representation 'quat'; did you mean 'quaternion'? representations: "),
+        ("ypr_deg", "unknown representation 'ypr'; did you mean 'euler_deg:rzyx'? representations: "),
         ("matrix_deg", "matrix has no angle: write it without _deg"),
         ("euler:rzyz_", "unknown Euler axes 'rzyz_'; did you mean 'rzyz'? s (static axes) or r (rotating axes)"),
         ("euler:ZYX", "unknown Euler axes 'ZYX'"),

@@ -534,6 +534,14 @@ def test_the_first_good_row_is_the_origin(run: Callable[..., Any]) -> None:
     assert float(rows[-1][1]) == pytest.approx(0.0019999 * 111_195, rel=1e-3)
 
 
+@pytest.mark.parametrize(("numbers", "mapping"), [("48,11.5,520", "{lat: 48, lon: 11.5, alt: 520}"), ("-48 , 11.5", "{lat: -48, lon: 11.5}"), ("48 11 5", "{lat: 48, lon: 11, alt: 5}")])
+def test_an_origin_may_be_numbers(numbers: str, mapping: str, run: Callable[..., Any]) -> None:
+    ours, told = (run("convert", "--to", "enu", "--origin", origin, stdin="lat,lon,alt\n48.1,11.5,5\n") for origin in (numbers, mapping))
+    assert (ours.status, ours.out) == (0, told.out)
+    for wrong in ("48", "1,2,3,4", "48,east"):
+        assert run("convert", "--to", "enu", "--origin", wrong, stdin="lat,lon,alt\n48.1,11.5,5\n").status == 2
+
+
 def test_a_pipe_in_pieces_has_the_first_row_as_its_origin_throughout(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "frametool", "convert", "--to", "enu", "--origin", "first"]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path)

@@ -12,6 +12,7 @@ from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, warn
 from frametool.formats.table import by_name, writers
+from frametool.frames.refusals import seconds
 from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
 from frametool.text.numbers import parse_number
@@ -60,7 +61,11 @@ def command(inputs: Inputs) -> int:
         stamps = stamps[(window[0] <= stamps) & (stamps <= window[1])]
     made = resampled(found, stamps, inputs.max_gap_ns)
     if lost := len(stamps) - made.size:
-        say(f"note: {lost} of {len(stamps)} moments are beyond the ends of {name}, or in a gap: no pose")
+        first, last = map(int, found.stamps_ns[[0, -1]])
+        in_gap = " or in a gap" * int(lost > ((stamps < first) | (stamps > last)).sum())
+        lies, are = ("lies", "is") if lost == 1 else ("lie", "are")
+        span = f"{seconds(first)} .. {seconds(last)} s of {name}{in_gap}"
+        say(f"note: {lost} of {len(stamps)} times {lies} outside {span} and {are} left out")
     write_trajectory(output, made._replace(stamps_ns=None) if counted else made)
     return ROWS_SKIPPED if skipped else 0
 
