@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 BATCH = 256  # poses
 ZEROS = r"(?<![\w.:])(?P<dim>-?0\.0+)(?![\w.])"
 WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
+OF_TEXT = (".txt", ".out", ".log", ".dat")
 BLOCK = 1 << 13  # poses of a trajectory
 
 
@@ -323,18 +324,23 @@ class Output:
                 write(in_colour(str(text), self.marks) if for_people and self.style.screen else text)
             if self._fault is not None:
                 raise self._fault
-        self._report_suffix()
+        self.report_suffix()
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
         return opened_place(self.style.format, self.path, force=self.force)
 
-    def _report_suffix(self) -> None:
-        """Report the format of a file whose suffix names none, where none was chosen."""
+    def report_suffix(self, form: str = "") -> None:
+        """Report the format of a file whose suffix names none, where none was chosen.
+
+        form: of a stream, which keeps that of its input: a suffix of any text, or its own, goes without a note
+        """
         suffix = splitext(self.path or "")[1]
-        if self._form_is_default and self.path and suffix and not is_special(self.path):
+        usual = (*OF_TEXT, f".{form}", *table.FORMATS[form].suffixes) if form else ()
+        is_told = self._form_is_default and not self._inputs.peek("quiet")
+        if is_told and self.path and suffix.lower() not in ("", *usual) and not is_special(self.path):
             none = f"no format written here has the suffix {shown(suffix)}"
-            say(f"note: {self.path}: {none}; it holds {self.style.format}, -f says another")
+            say(f"note: {self.path}: {none}; it holds {form or self.style.format}, -f says another")
 
     def text(self, text: str) -> None:
         """Write text."""

@@ -232,6 +232,8 @@ class Stream:
         if request.gathered is not None:
             outcomes = request.gathered.placing(outcomes, bad.place)
         status = self._write(outcomes, output, bad, gathers=request.gathered is not None)
+        if request.gathered is None:
+            output.report_suffix(_kept(form, output) if way == self._as_poses else form)
         if about is not None and (assumed := about()) and not self.inputs.quiet:
             say(f"{self.name}: {assumed}")
         return status
@@ -291,8 +293,7 @@ class Stream:
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import FormatConverter
 
-        keeps = "poses" in FORMATS[form].writes and not output.notations
-        target = output.chosen or (form if keeps else "csv")
+        target = output.chosen or _kept(form, output)
         if target not in FORMATS:
             raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
         request = request._replace(by_default=not output.notations)
@@ -381,6 +382,11 @@ class Stream:
             closing(outcomes),
         ):
             return run(outcomes, write, bad, progress.advance)
+
+
+def _kept(form: str, output: Output) -> str:
+    """Return the format in which poses that no table holds are written, if none is chosen."""
+    return form if "poses" in FORMATS[form].writes and not output.notations else "csv"
 
 
 def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:

@@ -119,3 +119,26 @@ def test_a_file_whose_suffix_is_no_form_says_what_it_holds(arguments: tuple[str,
     assert (tmp_path / "out.foo").read_text() == run(*arguments, "-f", "yaml").out
     for quiet in (["-o", "out.yml"], ["-o", "plain"], ["-o", "other.foo", "-f", "yaml"], ["-o", "/dev/null"]):
         assert run(*arguments, *quiet).err == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "note"),
+    [
+        ("out.foo", "no format written here has the suffix '.foo'; it holds tum, -f says another"),
+        *((name, "") for name in ("out.txt", "out.LOG", "out.dat", "out.tum", "out", "/dev/null")),
+    ],
+)
+def test_a_stream_whose_suffix_is_no_form_says_what_it_holds(name: str, note: str, run: Run) -> None:
+    arguments = ("convert", "-i", "a.tum", "-o", name)
+    files = {"a.tum": "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"}
+    done = run(*arguments, files=files)
+    assert done == (0, "", f"frametool: note: {name}: {note}\n" if note else "")
+    assert run(*arguments, *(() if name == "/dev/null" else ("--force",)), "--quiet", files=files).err == ""
+
+
+@pytest.mark.parametrize(("name", "form"), [("out.kitti", "kitti"), ("out.EUROC", "euroc"), ("kitti.txt", "tum"), ("kitti", "tum")])
+def test_the_name_of_a_form_is_a_suffix_of_it(name: str, form: str, run: Run, tmp_path: Path) -> None:
+    arguments = ("convert", "-i", "a.tum", "--quiet")
+    files = {"a.tum": "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"}
+    assert run(*arguments, "-o", name, files=files).status == 0
+    assert (tmp_path / name).read_text() == run(*arguments, "-f", form, files=files).out
