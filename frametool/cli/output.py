@@ -324,7 +324,8 @@ class Output:
                 write(in_colour(str(text), self.marks) if for_people and self.style.screen else text)
             if self._fault is not None:
                 raise self._fault
-        self.report_suffix()
+        if self.path:
+            self.report_suffix()
 
     def opened(self) -> AbstractContextManager[Write]:
         """Open the place where results go."""
@@ -335,10 +336,11 @@ class Output:
 
         form: of a stream, which keeps that of its input: a suffix of any text, or its own, goes without a note
         """
-        suffix = splitext(self.path or "")[1]
+        if not self._form_is_default or not self.path or self._inputs.peek("quiet"):
+            return
+        suffix = splitext(self.path)[1]
         usual = (*OF_TEXT, f".{form}", *table.FORMATS[form].suffixes) if form else ()
-        is_told = self._form_is_default and not self._inputs.peek("quiet")
-        if is_told and self.path and suffix.lower() not in ("", *usual) and not is_special(self.path):
+        if suffix.lower() not in ("", *usual) and not is_special(self.path):
             none = f"no format written here has the suffix {shown(suffix)}"
             say(f"note: {self.path}: {none}; it holds {form or self.style.format}, -f says another")
 

@@ -224,15 +224,13 @@ class Stream:
         if form in RECORDS and (output.chosen or form) != form and request.gathered is None:
             return self._run_as_values(stream, form, request, output)
         way = self._way(form, request, output)
-        keeps = ("camera_axes",) if way == self._as_text else FORMATS[form].required_options
-        asked = tuple(ask for ask in FORMATS[form].required_options if ask in keeps)
+        asked = tuple(ask for ask in FORMATS[form].required_options if way != self._as_text or ask == "camera_axes")
         self.inputs.formats_read = (*self.inputs.formats_read, (form, asked))
         outcomes, about = way(stream, form, request, output)
         bad = self.policy(self.name, "row" if holds_arrays(form) else "line")
-        if request.gathered is not None:
-            outcomes = request.gathered.placing(outcomes, bad.place)
+        outcomes = outcomes if request.gathered is None else request.gathered.placing(outcomes, bad.place)
         status = self._write(outcomes, output, bad, gathers=request.gathered is not None)
-        if request.gathered is None:
+        if output.path and request.gathered is None:
             output.report_suffix(_kept(form, output) if way == self._as_poses else form)
         if about is not None and (assumed := about()) and not self.inputs.quiet:
             say(f"{self.name}: {assumed}")

@@ -442,9 +442,8 @@ def is_folder(name: str) -> bool:
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
     """Return which of several formats is written to a file: by its whole name, by its suffix, by a format's name."""
     last = os.path.basename(path or "")
-    named = os.path.splitext(last)[1].lower().removeprefix(".")
-    by_whole = next((name for name in names if last in FORMATS[name].names), None)
-    return by_whole or by_suffix(path, names) or (named if named in names else None)
+    by_whole = next((name for name in names if last in FORMATS[name].names), None) or by_suffix(path, names)
+    return by_whole or next((name for name in names if last.lower().endswith(f".{name}")), None)
 
 
 def by_suffix(path: str | None, names: tuple[str, ...]) -> str | None:
