@@ -23,7 +23,6 @@ from frametool.fit.least_squares import (
     skew,
 )  # fmt: skip
 from frametool.geometry import validation
-from frametool.geometry.spread import Spread, mean_and_spread
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
@@ -37,6 +36,47 @@ if TYPE_CHECKING:
 
 FEWEST_POSES = 3  # with two poses the outlier cannot be identified
 MOST_TRIED = 200  # poses that are tried as the middle of the others
+FARTHEST = 1e150  # metres: squares stay finite
+LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
+
+
+class Spread(NamedTuple):
+    """Distances from a mean, in metres and radians: the weighted root mean square, and the largest."""
+
+    distance_rms: float
+    distance_max: float
+    angle_rms: float
+    angle_max: float
+
+
+def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[Transform, Spread]:
+    """Return the weighted mean of transforms, as `Transform.mean`, and their distances from it.
+
+    Transforms with weight 0 have no effect.
+    Raises ValueInvalid for invalid weights, and if the rotations are so different that they have no mean.
+    """
+    mass = validation.masses(weights, poses.shape)
+    moment = validation.second_moment(poses.components[3:], mass)
+    _refuse_no_mean(moment)
+    mean = poses.mean(weights)
+    metres, radians = mean.distance(poses)
+    counts = mass > 0.0
+    whole = validation.total(mass.copy())
+    if not metres[counts].max() < FARTHEST:
+        raise ValueInvalid(f"poses lie {metres[counts].max():.3g} m from their mean; at most {FARTHEST:.0e} m")
+    return mean, Spread(
+        (validation.total(mass * metres * metres) / whole) ** 0.5,
+        float(metres[counts].max()),
+        (validation.total(mass * radians * radians) / whole) ** 0.5,
+        float(radians[counts].max()),
+    )
+
+
+def _refuse_no_mean(moment: Any) -> None:
+    """Raise an error if two eigenvectors of sum(w q q^T) are equally good."""
+    *_, second, first = np.linalg.eigvalsh(np.array(moment))
+    if first - second <= LEAST_GAP * (first + second):
+        raise ValueInvalid("the rotations lie so far apart that none is their mean; leave some out, or give weights")
 
 
 class MeanFit(NamedTuple):

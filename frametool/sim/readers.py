@@ -19,13 +19,13 @@ from frametool.documents.document import format_error, parse_documents
 from frametool.documents.source import Source, decode, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
+from frametool.formats.rows.csv import split_line
 from frametool.frames.stamps import BILLION, format_stamp, parse_stamp
 from frametool.grammar.readers import Misfit, as_mapping, kind, read_numbers, within
 from frametool.ros.message_stream import NOISE
 from frametool.sim.drivers import KEYS
 from frametool.sim.scene import LONGEST, LONGEST_NS
 from frametool.sim.turtle import Twist
-from frametool.text.csv_line import split_line
 from frametool.text.numbers import parse_number, read_number_or_angle
 
 if TYPE_CHECKING:

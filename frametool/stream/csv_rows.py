@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.formats.rows.csv import cell
+from frametool.formats.rows.csv import cell, quoted
 from frametool.stream.record_rows import LEAF, NAME, PARENT, STAMP_NS, Filling, plain_texts
 from frametool.stream.rows import constant, number_spans, spans_of, texts_as_rows, written
-from frametool.text.csv_line import quoted
 from frametool.text.spans import Spans
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ import numpy as np
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
 from frametool.errors import ValueInvalid, listing, warn
+from frametool.formats.rows.csv import quoted
 from frametool.formats.rows.pose_rows import (
     IMAGE,
     MOST_NAMED,
@@ -50,7 +51,6 @@ from frametool.stream.row_poses import (
     texts_of,
 )
 from frametool.stream.rows import constant, number_spans, spans_of
-from frametool.text.csv_line import quoted
 from frametool.text.spans import Spans, join
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import cells, printable
-from frametool.text.csv_line import quoted
+from frametool.formats.rows.csv import quoted
 from frametool.view.report_text import columns
 
 if TYPE_CHECKING:

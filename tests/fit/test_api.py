@@ -12,8 +12,8 @@ from worlds import COVARIANCE, world
 
 import frametool
 from frametool.errors import FormatError, FrametoolWarning, ValueInvalid
+from frametool.fit.closed_forms import mean_and_spread
 from frametool.fit.measured_tree import solve_tree
-from frametool.geometry.spread import mean_and_spread
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:

@@ -10,9 +10,8 @@ import pytest
 from rigs import replaced, small
 
 from frametool.errors import ValueInvalid
-from frametool.fit.closed_forms import solve_mean
+from frametool.fit.closed_forms import mean_and_spread, solve_mean
 from frametool.geometry.rotation import Rotation
-from frametool.geometry.spread import mean_and_spread
 from frametool.geometry.transform import Transform
 
 CASES = {each["name"]: each for each in json.loads((Path(__file__).parents[1] / "golden" / "hand_eye.json").read_text())["mean"]}

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from frametool.text.csv_line import quoted, split_line
+from frametool.formats.rows.csv import quoted, split_line
 
 CELLS = st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\r\n\0"), max_size=8), min_size=1, max_size=6)
 

@@ -21,11 +21,11 @@ from frametool.documents.json import looks_like_json
 from frametool.errors import FormatError, Unanswered, ValueInvalid, did_you_mean, listing, shown
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link
+from frametool.formats.rows.csv import LineCell, split_line
 from frametool.formats.trees.tree_reader import line_error
 from frametool.geometry import euler, floats, rigid
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.readers import kind
-from frametool.text.csv_line import LineCell, split_line
 from frametool.text.numbers import LENGTHS, NotFinite, parse_angle, parse_length, parse_number
 
 if TYPE_CHECKING:

@@ -33,6 +33,7 @@ from frametool.errors import (
 )
 from frametool.formats.detect import detect
 from frametool.formats.robots.model import TURNING, Joint, JointValue, Link, followed, read_value
+from frametool.formats.rows.csv import split_line
 from frametool.formats.table import FORMATS, readers
 from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
@@ -41,7 +42,6 @@ from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.readers import Misfit, as_mapping, kind
 from frametool.ros import messages
 from frametool.ros.message_stream import TextMessage, line_texts, read_messages
-from frametool.text.csv_line import split_line
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
 
 if TYPE_CHECKING:

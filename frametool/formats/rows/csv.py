@@ -3,17 +3,18 @@
     name,parent,x,y,z,qx,qy,qz,qw
     camera,map,1.0,2.0,3.0,0.0,0.0,0.0,1.0
 
-Metres, radians unless the column states degrees; the pose of `name` in `parent`.
+Metres, radians unless the column states degrees; the pose of `name` in `parent`.  Single lines are split here, quoted
+as in RFC 4180; `text.cells` processes blocks of lines.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import re
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid
 from frametool.grammar.pose import NAMES
 from frametool.grammar.result import NoResult, Result, carries_position, in_columns, pose_numbers, without_frame
-from frametool.text.csv_line import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -24,6 +25,32 @@ if TYPE_CHECKING:
 PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
 SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")
+_CELL = re.compile(r'(?:[^\S\n]*"((?:[^"]|"")*)"\s*|([^,]*))(?:,|$)')
+
+
+class LineCell(NamedTuple):
+    """The text of a cell without its quotes and surrounding blanks, and its first character's column, from 1."""
+
+    text: str
+    column: int
+
+
+def split_line(line: str) -> list[LineCell]:
+    """Return the cells of a line; an empty line has one empty cell."""
+    cells = []
+    for cell in _CELL.finditer(line):
+        quoted_text, plain = cell.groups()
+        text = plain.strip() if quoted_text is None else quoted_text.replace('""', '"')
+        cells.append(LineCell(text, cell.start() + 1))
+        if not cell[0].endswith(","):
+            break
+    return cells
+
+
+def quoted(text: str) -> str:
+    """Write a cell, in quotes if necessary."""
+    is_split = "," in text or '"' in text or "\r" in text or "\n" in text
+    return '"' + text.replace('"', '""') + '"' if is_split else text
 
 
 def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
