@@ -42,8 +42,8 @@ class Entry(NamedTuple):
     """One record of a text and what is asked of it.
 
     target: how its result is written
-    edge: the pose that moves it; None where there is none, or where its own time decides
-    stamp: the paths of that time, or of what else stands beside it: one, or seconds and nanoseconds
+    edge: the pose that moves it; None if absent, or where its own time decides
+    stamp: the paths of that time, or of what else comes with it: one, or seconds and nanoseconds
     parent, name: the frames of its result
     lost: a frame that the record names and the result cannot
     """
@@ -72,7 +72,7 @@ class Answer(NamedTuple):
 def read_entries(
     document: Document, request: Request, source: Source, note: Callable[[list[Finding]], object]
 ) -> list[Entry]:
-    """Read the records of a document, and what each is asked; what is odd about them goes to `note`.
+    """Read the records of a document, and what each is asked; what is invalid about them goes to `note`.
 
     Raises FormatError with the place of a record that cannot be read.
     """
@@ -118,7 +118,7 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
 
 
 def _path_beside(document: Document, record: Record, name: str) -> tuple[Path, ...]:
-    """Find what stands beside a record under a key; "" is the stamp of its header, or else under a usual key."""
+    """Find what comes with a record under a key; "" is the stamp of its header, or else under a usual key."""
     if name:
         return (_beside(key_path, document, record, name),)
     try:

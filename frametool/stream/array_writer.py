@@ -47,7 +47,7 @@ READS: dict[Kind, Any] = {np.dtype(np.int64): int, DOUBLE: float, FLAG: "true"._
 
 
 def fit(texts: Sequence[str], kind: Kind) -> bool:
-    """Tell whether all cells are written as numbers or truth values of a type are."""
+    """Return True if all cells are written as numbers or truth values of a type are."""
     if not all(map(re.compile(PATTERNS[kind]).fullmatch, texts)):
         return False
     return kind.kind not in WHOLE or all(LIMITS.min <= int(text) <= LIMITS.max for text in texts if len(text) > SAFE)
@@ -68,7 +68,7 @@ class ColumnsWriter:
 
     @property
     def begun(self) -> bool:
-        """Tell whether any block came."""
+        """Return True if any block came."""
         return self.writer is not None or bool(self.waiting)
 
     def of_columns(self, size: int, made: Mapping[str, Made]) -> bytes:
@@ -81,7 +81,7 @@ class ColumnsWriter:
         return b"".join(self._written(is_all=False))
 
     def end(self) -> Iterator[bytes]:
-        """Yield what waits, what comes behind the last block, and tell what was left out."""
+        """Yield what waits, what comes behind the last block, and warn of what was left out."""
         yield from self._written(is_all=True)
         assert self.writer is not None  # noqa: S101 - for the types
         yield from self.writer.end()
@@ -130,14 +130,14 @@ class ColumnsWriter:
         self.writer = self.module.create(self.columns, None, self.style)
 
     def _misfit(self, column: OutColumn) -> str:
-        """Say why a column has no place in the form; "" where it has one."""
+        """Return the reason why a column has no place in the form; "" where it has one."""
         if column.kind is None and not FORMATS[self.style.format].texts:
             return "it holds numbers"
         reason: str = self.module.misfit(column) if hasattr(self.module, "misfit") else ""
         return reason
 
     def _column(self, name: str, parts: Sequence[Cells], *, has_gaps: bool) -> OutColumn:
-        """Say of which type a column is."""
+        """Return of which type a column is."""
         if parts and all(map(_is_typed, parts)):
             own: Kind = parts[0].dtype.newbyteorder("=")  # type: ignore[union-attr]
             return OutColumn(name, DOUBLE if own.kind == "f" and own.itemsize > DOUBLE.itemsize else own)
@@ -187,12 +187,12 @@ class ColumnsWriter:
 
 
 def _is_typed(cells: Cells) -> bool:
-    """Tell whether cells are numbers, truth values or times of numpy, one a row."""
+    """Return True if cells are numbers, truth values or times of numpy, one a row."""
     return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
 
 
 def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
-    """Tell whether whole numbers are floats to the bit."""
+    """Return True if whole numbers are floats to the bit."""
     if kind is None or kind.kind not in WHOLE:
         return False
     return all(
@@ -237,7 +237,7 @@ class ArrayWriter(ColumnsWriter):
     """
 
     def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the form; kind: what a row is; extras: the numbers beside each; placed: it has a position."""
+        """Choose the form; kind: what a row is; extras: the numbers with each; placed: it has a position."""
         super().__init__(style)
         self.kind = kind
         self.extras = tuple(extras)

@@ -114,7 +114,7 @@ class FormatConverter:
         return writer_for(self.style, kind, extras, placed=self.placed)
 
     def _zones(self, poses: RowPoses) -> list[RowNote]:
-        """Return what there is to tell about the zones of results in UTM."""
+        """Return the warnings about the zones of results in UTM."""
         place = self.style.place
         there = np.flatnonzero(~np.isnan(poses.numbers[:, 0])) if place is not None and place.words else ()
         if place is None or not len(there):

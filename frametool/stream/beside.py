@@ -1,4 +1,4 @@
-"""What records and rows say beside a pose or point: a covariance, sigmas, a scale; read where it counts, and moved.
+"""What records and rows say besides a pose or point: a covariance, sigmas, a scale; read where it counts, and moved.
 
 Loaded where one of them is there.
 """
@@ -102,7 +102,7 @@ def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
 
 
 def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
-    """Tell whether a covariance begins with -1: nothing is known of it, nor of what it would be of."""
+    """Return True if a covariance begins with -1: nothing is known of it, nor of what it would be of."""
     return _entries(value, sizes)[0][1] == UNKNOWN
 
 
@@ -129,7 +129,7 @@ def _of_flat(own: dict[str, Any], flat: Sequence[str], reading: Reading) -> Comp
 
 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
-    """Add the covariance that sigmas say; none of its entries stands in the text, and the result names them anew."""
+    """Add the covariance that sigmas say; none of its entries is in the text, and the result names them anew."""
     size = 36 if record.shape.kind == POSE else 9
     degrees = reading.degrees
     reading.degrees = read_angle_unit(own["angles"]) if "angles" in own else degrees
@@ -147,7 +147,7 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
 
 
 def with_scale(record: Record, value: Any, around: Path, above: Path, request: Request) -> Record:
-    """Add the scale beside a pose, where the operation takes one; else it can only be 1."""
+    """Add the scale of a pose, where the operation takes one; else it can only be 1."""
     if not request.operation.similar or around != record.path[len(above) :] or type(value) in (dict, list):
         within(around, refuse_scale, value)
         return record
@@ -251,7 +251,7 @@ SCALED_ALONE = (POINT, VECTOR, POSE)  # what a similarity moves
 def with_own(
     shape: Shape, pose: Components, beside: Components, mover: Components | None, *, mirrors: bool
 ) -> tuple[Components, Components]:
-    """Return a row's pose with its own covariance or scale, and what else stands beside it."""
+    """Return a row's pose with its own covariance or scale, and what else comes with it."""
     size = shape.covariance[0]
     given, rest = beside[:size], beside[size:]
     if mirrors and size > 1:
@@ -286,7 +286,7 @@ def of_multiple(
 
 
 def along_ecef(shape: Shape, own: Components, beside: Components) -> tuple[Shape, Components]:
-    """Return what stands beside a place with its covariance along the axes of ECEF, from the axes there."""
+    """Return what comes with a place with its covariance along the axes of ECEF, from the axes there."""
     size, place = shape.covariance[0], shape.place
     given = beside[:size]
     if shape.sigma:

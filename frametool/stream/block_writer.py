@@ -21,13 +21,13 @@ class BlockWriter(Protocol):
         """Return what is written of a block, perhaps nothing yet."""
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last block, and tell what was left out."""
+        """Yield what comes behind the last block, and warn of what was left out."""
 
 
 def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
     """Return what writes blocks in the form of a style: text, columns of numbers, or messages of a recording.
 
-    kind: pose, point, ..; extras: the numbers beside each; placed: whether poses have a position
+    kind: pose, point, ..; extras: the numbers with each; placed: whether poses have a position
     """
     writes = FORMATS[style.format].writes
     if "arrays" in writes:

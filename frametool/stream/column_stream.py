@@ -56,10 +56,10 @@ class RowResults(NamedTuple):
     """What became of a batch: the rows that are written, in their order.
 
     rows: (n,) which of the batch's rows they are; None for all
-    numbers: (n, k) the results, nan where there is none
+    numbers: (n, k) the results, nan if absent
     absent: (n,) for each shape, rows that have no numbers on purpose; None where all have
     names: by role, the names of the results, one a row, where a column holds them
-    given: the frames that the rows are given in
+    given: the frames that the rows are expressed in
     """
 
     rows: Ints | None
@@ -84,7 +84,7 @@ class ColumnRows(PlannedRows):
         try:
             super().__init__(table, with_vectors(names, request, file.vectors), source)
         except FormatError as error:
-            error.line = 0  # the names of columns stand in no line here
+            error.line = 0  # the names of columns are in no line here
             raise
         for at, place in enumerate(self.layout.places):
             if file.kind(place) is None and at not in self.plan.words:
@@ -231,7 +231,7 @@ class ColumnRows(PlannedRows):
         return columns.T, absent or [None], bad
 
     def _words(self, batch: Batch, at: int, bad: dict[int, tuple[str, str]]) -> list[float]:
-        """Read a column of words, each of which stands for a number."""
+        """Read a column of words, each of which encodes a number."""
         read, texts = self.plan.words[at], [str(text) for text in batch.texts(self.layout.places[at])]
         known: dict[str, float] = {}
         for row, text in enumerate(texts):
@@ -484,7 +484,7 @@ def move_along(file: ColumnFile, request: Request) -> None:
 
 
 def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults) -> list[Made]:
-    """Return what stands in the columns that are made, in their order."""
+    """Return what is in the columns that are made, in their order."""
     made = []
     for column, given in zip(columns, rows.layout.columns, strict=True):
         if isinstance(given, New):

@@ -53,7 +53,7 @@ def _rows(batch: RecordBatch, cells: Mapping[str, Any], columns: Sequence[str], 
 
 
 def _cells(batch: RecordBatch, value: Any, style: Style) -> Spans:
-    """Return what stands in place of a cell with marks in each row."""
+    """Return what replaces a cell with marks in each row."""
     size = len(batch.places)
     if value == STAMP_NS and batch.stamps_ns is not None:
         return spans_of([b"%d" % stamp for stamp in batch.stamps_ns.tolist()])

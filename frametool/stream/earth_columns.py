@@ -1,6 +1,6 @@
 """Find a position on the Earth among columns or keys by their names: lat lon alt, ecef_x .., utm_zone easting ..
 
-A common prefix is one that is set off (`field.latitude`, `gps_lat`); units stand behind names or in brackets.  Knows
+A common prefix is one that is set off (`field.latitude`, `gps_lat`); units follow names or in brackets.  Knows
 names only; loaded where one of them may say such a position.
 """
 
@@ -68,7 +68,7 @@ class NamedColumn(NamedTuple):
 
 
 def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | None:
-    """Find the one position on the Earth among names, and a heading beside it; None where there is none.
+    """Find the one position on the Earth among names, and a heading with it; None if absent.
 
     given: the representation that --from names.
     Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
@@ -206,7 +206,7 @@ def unsaid_heading(names: Iterable[str]) -> str:
 
 
 def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumns | None:
-    """Find a position on the Earth and the rotation beside it; None for rows that are given by x, y, z.
+    """Find a position on the Earth and the rotation with it; None for rows that are expressed as x, y, z.
 
     Raises FormatError for half of one, for heights above the sea, and for a rotation whose axes nobody says.
     """
@@ -242,7 +242,7 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 
 
 def _problem(found: PoseColumns | None, names: Sequence[str], request: Request) -> str:
-    """Say why what --from asks for, or a place that is there by half, cannot be read; "" where all is well."""
+    """Return why the place of --from, or an incomplete one, cannot be read; "" where all is well."""
     given = request.given_place
     if found is None:
         row = POSITIONS.get(given)
@@ -257,7 +257,7 @@ def _problem(found: PoseColumns | None, names: Sequence[str], request: Request) 
 
 
 def _half(names: Iterable[str]) -> str:
-    """Say what is missing of a position that is there by half; "" where there is none."""
+    """Return what is missing of a position that is there by half; "" if absent."""
     if any(name.lower().rpartition(".")[2] == "mgrs" for name in names):
         return NOT_READ["mgrs"]
     fields = {FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
@@ -291,7 +291,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 
 def of_width(width: int, request: Request) -> str:
-    """Say which columns of a table without names are a place: all of them, or those behind a stamp."""
+    """Return which columns of a table without names are a place: all of them, or those behind a stamp."""
     return f"2-{width}" if width == _count(request.given_place, request.earth or Earth()) + 1 else f"1-{width}"
 
 
@@ -303,7 +303,7 @@ def _count(kind: str, earth: Earth) -> int:
 def along(
     shape: Shape, names: Sequence[str], places: tuple[int, ...], source: str
 ) -> tuple[tuple[int, ...], Shape]:
-    """Say what the covariance beside a place is given in; that of a NavSatFix is, where nothing else is there.
+    """Return what the covariance with a place is expressed in; that of a NavSatFix is, where nothing else is there.
 
     Raises FormatError where nobody says so.
     """

@@ -1,4 +1,4 @@
-"""Records that are placed on the Earth: points of latitude and longitude as they stand, anything else read as a pose.
+"""Records that are placed on the Earth: points of latitude and longitude unchanged, anything else read as a pose.
 
     {"id": 7, "lat": 48.1, "lon": 11.5, "alt": 520}                     its numbers stay where they are, and are fast
     {"utm": {..}}  {"at": {..}, "axes": "enu", ..}  {"lat": .., "heading_deg": 30, "axes": "ned"}     written anew
@@ -37,7 +37,7 @@ WHOLE = ("lat", "latitude", "lat_rad", AT, "ecef", "utm", "easting", "east", "no
 
 
 def is_on_earth(value: dict[str, Any]) -> bool:
-    """Tell whether a mapping says a position on the Earth, whole or by half."""
+    """Return True if a mapping says a position on the Earth, whole or by half."""
     return not {*WHOLE, "mgrs", LLA}.isdisjoint(value) and not EARTH_KEYS.isdisjoint(value)
 
 
@@ -56,9 +56,9 @@ class Placed(NamedTuple):
 def placed_record(
     value: dict[str, Any], positions: Sequence[str], inner: Inner, reading: Reading, request: Request
 ) -> Placed | None:
-    """Read a record that is placed on the Earth; None for one that is given by x, y, z.
+    """Read a record that is placed on the Earth; None for one that is expressed as x, y, z.
 
-    inner: reads the pose that stands beside a place, and names its keys
+    inner: reads the pose that comes with a place, and names its keys
     Raises Misfit for half a place, for a pose whose axes nobody says, and for what is no place.
     """
     if not is_on_earth(value):

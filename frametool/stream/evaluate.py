@@ -62,9 +62,9 @@ class Plan(NamedTuple):
     """What is done to every row of one layout, as a request asks.
 
     shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
-    pieces: the text of a result; null: what stands for each number of a row without one
-    edge_of: the pose that moves a row, or one of its shapes, by the name of the frame it is given in
-    source: the frame that rows are given in, whatever they name; frame_column: the name of the column that names frames
+    pieces: the text of a result; null: what replaces each number of a row without one
+    edge_of: the pose that moves a row, or one of its shapes, by the name of the frame it is expressed in
+    source: the frame of all rows, whatever they name; frame_column: the name of the column that names frames
     remedies: for each shape, what to do where its angles are degrees
     words: reads the numbers that are words of a table, by column: zones; marked: angles that are no plain number
     yaml: numbers need a point before the exponent
@@ -175,7 +175,7 @@ class Run:
         return numbers
 
     def _check_covariances(self, numbers: Floats) -> None:
-        """Refuse rows whose covariance is none; sigmas cannot be negative."""
+        """Refuse rows whose covariance is invalid; sigmas cannot be negative."""
         first = 0
         for shape in self.plan.shapes:
             at = first + shape.own_size
@@ -192,7 +192,7 @@ class Run:
             first += shape.size
 
     def _note_zones(self) -> None:
-        """Tell of zones of UTM: those of results, and of a southern one that looks like a band."""
+        """Warn of zones of UTM: those of results, and of a southern one that looks like a band."""
         from frametool.stream.earth_columns import doubt_band, zone_notes
 
         line_of = self.block.line_of
@@ -202,7 +202,7 @@ class Run:
             self.rounded += zone_notes(place, [*self.results.T], lambda row: line_of(int(self.rows[row])))
 
     def _doubt_turns(self, moved: Sequence[Components]) -> None:
-        """Tell of the first row whose turn is too uncertain for the first order."""
+        """Warn of the first row whose turn is too uncertain for the first order."""
         operation = self.operation
         for shape, parts in zip(self.plan.shapes or (Shape(POSE),), moved, strict=False):
             if len(operation.carried(shape)) < 36 or operation.uncertain or not self.count:
@@ -245,7 +245,7 @@ class Run:
         return edges
 
     def _edge(self, frames: Sequence[str | None]) -> Rigid | None:
-        """Return the pose that moves one of the shapes of the rows, by the frames that it is given in."""
+        """Return the pose that moves one of the shapes of the rows, by the frames that it is expressed in."""
         edge_of = self.plan.edge_of
         if edge_of is None or not self.count:
             return None
@@ -510,7 +510,7 @@ def _checked(shape: Shape, own: Components) -> Components:
 
 
 def _without_result(piece: Piece, null: bytes) -> Piece:
-    """Return what stands in a row without a result: nulls for its numbers, the input for what was put in its place."""
+    """Return what is in a row without a result: nulls for its numbers, the input for what was put in its place."""
     if isinstance(piece, Out):
         return Const(piece.between.join([null] * (piece.last - piece.first)))
     if isinstance(piece, Word):

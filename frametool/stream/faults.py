@@ -66,7 +66,7 @@ class RowNote(NamedTuple):
 
     @classmethod
     def of_lost_name(cls, line: int, name: str) -> RowNote:
-        """Tell that a frame is not named any more."""
+        """Warn that a frame is not named any more."""
         return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
 
 
@@ -131,7 +131,7 @@ class BadRows:
         self.tell = tell
         self.counted = counted
         self.count = 0
-        self._has_listed = False  # the list of what there is stands in the first message only
+        self._has_listed = False  # the list of known names is in the first message only
 
     def take(self, faults: Iterable[Fault]) -> None:
         """Report the faults of a block; raise BadRow at the first if that is the rule."""
@@ -239,6 +239,6 @@ def run(
 
 
 def tell_of_rounding(source: str, count: int, rows: int) -> None:
-    """Tell at the end of a stream how many rotations were normalised, of which the first was told of."""
+    """Warn at the end of a stream how many rotations were normalised; the first was reported."""
     if count > 1:
         warn(f"{source}: {count} of {rows} rotations were off by more than 1e-6 and were normalised")

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The poses that were read so far, in metres and as unit quaternions, and a number or text beside each."""
+    """The poses that were read so far, in metres and as unit quaternions, and a number or text with each."""
 
     def __init__(self, *, named: bool = False, labelled: bool = False) -> None:
-        """Begin with none; named: so that `places` says where each was read; labelled: by texts beside them."""
+        """Begin with none; named: so that `places` says where each was read; labelled: by texts with them."""
         self.labelled = labelled
         self.places: list[str] = []
         self._lines: list[int] | None = [] if named else None  # of the block that was read last
@@ -37,7 +37,7 @@ class Gathered:
     def take(
         self, shape: Shape, pose: Components, kept: Flags, beside: Floats | None, line_of: Callable[[int], int]
     ) -> None:
-        """Add the rows of a block that are kept: components of a pose, and what stands beside them."""
+        """Add the rows of a block that are kept: components of a pose, and what comes with them."""
         if self._lines is not None:
             self._lines += map(line_of, np.flatnonzero(kept).tolist())
         self.placed |= shape.whole or shape.unit is not None
@@ -89,5 +89,5 @@ class Gathered:
 
     @property
     def weights(self) -> Floats | None:
-        """Return the numbers beside the poses; None if there are none."""
+        """Return the numbers with the poses; None if there are none."""
         return np.concatenate(self._beside) if self._beside else None

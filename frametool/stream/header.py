@@ -1,6 +1,6 @@
 """Find points and poses among the columns of a table by name: `x y z`, `qx qy qz qw`, `roll_deg ..`, with affixes.
 
-A common prefix or suffix is one that is set off: `pose.qx`, `qx_left`, `field.pose.orientation.x`. A unit stands right
+A common prefix or suffix is one that is set off: `pose.qx`, `qx_left`, `field.pose.orientation.x`. A unit is right
 behind a name (`x_mm`, `roll_deg`) or in brackets at its end (`x [mm]`, `yaw (rad)`). Knows names only.
 """
 
@@ -45,7 +45,7 @@ TOKEN = re.compile(r"[^\W_]+")
 class Columns(NamedTuple):
     """Columns that belong together.
 
-    places: where they stand, in the order of their meaning; names: as the header writes them
+    places: where they are, in the order of their meaning; names: as the header writes them
     prefix, suffix: what surrounds the names
     unit: numbers a metre of a position
     notation: that of a rotation; degrees: what the name of each of its numbers says (True, False, None: nothing)
@@ -148,7 +148,7 @@ class Header:
         return Columns(places, names, *self.affixes.get(key, key), wrong=wrong, spots=tuple(spots))
 
     def is_plain(self, match: Columns) -> bool:
-        """Tell whether a column has the affixes of a position or none: `yaw`, `pose.yaw`, and not `yaw_rate`."""
+        """Return True if a column has the affixes of a position, or no affix: `yaw`, `pose.yaw`, and not `yaw_rate`."""
         key = match.prefix.lower(), match.suffix.lower()
         return key == ("", "") or any(key in self.found.get(base[0], ()) for base in POSITIONS)
 
@@ -162,7 +162,7 @@ for _word in sorted(WORDS.union(COLUMN_WORDS)):
 
 
 def has_pose_column(names: Iterable[str]) -> bool:
-    """Tell whether one of some names is that of a column of a pose or a point."""
+    """Return True if one of some names is that of a column of a pose or a point."""
     return bool(Header(list(names)).found)
 
 
@@ -209,7 +209,7 @@ def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> lis
         maps = _named_maps(header, bare=given is not None) if row.shape == NAMED else ()
         for each in (*_of_representation(row, header, given), *(_rotation(match, row, given) for match in maps)):
             found[frozenset(each.places)] = each
-    best: dict[int, int] = {}  # where several share a column, an axis beside an angle and an angle_deg, the nearest
+    best: dict[int, int] = {}  # where several share a column, an axis with an angle and an angle_deg, the nearest
     for each in found.values():
         for place in each.places:
             best[place] = min(best.get(place, each.spread), each.spread)
@@ -344,7 +344,7 @@ def _only_pose(
 
 
 def _half_rotation(header: Header, given: Notation | None) -> str:
-    """Say what is missing of a rotation that is there by half, or goes by other names; "" where there is none."""
+    """Return what is missing of a rotation that is there by half, or goes by other names; "" if absent."""
     for row in ROTATIONS.values() if given is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
             return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
@@ -385,7 +385,7 @@ def _other_names(header: Header) -> str:
 
 
 def _half_position(header: Header, rotation: Columns) -> Columns | None:
-    """Return x, y beside a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
+    """Return x, y with a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
     affixes = ((rotation.prefix, rotation.suffix), ("", ""))
     for base in POSITIONS:
         for match in header.match(base, partly=True):
@@ -442,7 +442,7 @@ def _six(places: Sequence[int], names: Sequence[str], kind: str) -> Columns:
 
 
 def row_shape(pose: PoseColumns, request: Request) -> Shape:
-    """Say what the numbers of a pose's columns mean."""
+    """Return what the numbers of a pose's columns mean."""
     position, rotation = pose
     if position and position.kind:
         if not request.operation.moves:

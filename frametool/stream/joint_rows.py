@@ -1,4 +1,4 @@
-"""Forward kinematics over rows: values of joints in columns or under keys, a pose beside them.
+"""Forward kinematics over rows: values of joints in columns or under keys, a pose with them.
 
 In the CSV of the echo tools each row is a JointState that names its joints.
 """
@@ -130,7 +130,7 @@ class JointRows:
 
 
 def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequence[str]) -> str:
-    """Say which joints have no column; one of the others may be meant."""
+    """Return which joints have no column; one of the others may be meant."""
     near = did_you_mean(missing[0], others)
     plural = "s" * (len(missing) > 1)
     columns = first_of(names, 12, quote=bare)

@@ -25,7 +25,7 @@ class Out(NamedTuple):
 
 
 class Word(NamedTuple):
-    """A number of the result as the word that it stands for, between quotes or not: the zone of UTM."""
+    """A number of the result as the word that it encodes, between quotes or not: the zone of UTM."""
 
     number: int
     words: tuple[str, ...]
@@ -37,7 +37,7 @@ class Word(NamedTuple):
 
 
 class Item(Word):
-    """A number of a list with what stands around it, or another text where it is none.
+    """A number of a list with what is around it, or another text where it is not a number.
 
     words: the text before it, the one behind it, the other one, and the format of the number
     """
@@ -72,7 +72,7 @@ class Const(NamedTuple):
 
 
 class IfLocked(NamedTuple):
-    """Text that stands only in rows whose angles are not unique."""
+    """Text that is only in rows whose angles are not unique."""
 
     text: bytes
 
@@ -97,7 +97,7 @@ class New(NamedTuple):
 
 
 class Worded(NamedTuple):
-    """A number of the result, under its name, as the word that it stands for."""
+    """A number of the result, under its name, as the word that it encodes."""
 
     number: int
     name: str
@@ -131,7 +131,7 @@ class Layout(NamedTuple):
 
     places: the columns our numbers are read from; time: that of the stamps; below: that of the
         nanoseconds of stamps whose seconds are whole
-    frames: those that name the frame a row is given in, for look-ups the two frames
+    frames: those that name the frame a row is expressed in, for look-ups the two frames
     name: the one that says what a row is the pose of
     stretches: (first, last column, where it begins, where it ends) of the text that passes
     """

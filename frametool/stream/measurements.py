@@ -55,7 +55,7 @@ class Measurement(NamedTuple):
 
     components: tx, ty, tz, x, y, z, w; metres
     covariance: 36 numbers as ROS orders them, in the parent's axes; None where nobody gave it
-    place: where it stands, `m.yaml:12`, and its column behind that where several stand on a line
+    place: where it is, `m.yaml:12`, and its column behind that where several are on a line
     written: how its rotation was written, "rpy" or "rotvec", with the three numbers as read, in radians
     """
 
@@ -131,9 +131,9 @@ def read_measurements(
 
 
 def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[Measurement]:
-    """Return the measurements but those that stand at some places, FILE:LINE.
+    """Return the measurements but those that are at some places, FILE:LINE.
 
-    Raises ValueInvalid for a place where none stands, or several.
+    Raises ValueInvalid for a place where none is, or several.
     """
     there = {each.place: parted(each.place) for each in measurements}
     for place in (each for each in places if each not in there):
@@ -162,7 +162,7 @@ def _reader(file: FrameFile) -> Callable[[FrameFile, Request], Iterator[Measured
 
 
 def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str:
-    """Say what is wrong with a measurement; first: of each pair the first one that says a time."""
+    """Return what is wrong with a measurement; first: of each pair the first one that says a time."""
     parent, child, components, covariance = row.measurement[:4]
     if missing := [key for key, name in (("parent", parent), (CHILD, child)) if not name]:
         return f"missing {' and '.join(missing)}; {LIKE}"

@@ -196,7 +196,7 @@ class PointsOfPixels(Seen):
 
 
 def _is_known(number: Number) -> Any:
-    return number == number  # noqa: PLR0124 - nan is none
+    return number == number  # noqa: PLR0124 - nan is not equal to itself
 
 
 def _number(flag: Any) -> int:

@@ -1,4 +1,4 @@
-"""Records: the points, vectors, poses, twists and wrenches of a document, and where their numbers and names stand.
+"""Records: the points, vectors, poses, twists and wrenches of a document, and where their numbers and names are.
 
     {"id": 7, "frame": "lidar", "point": [1, 2, 3]}
     {"header": {"frame_id": "map"}, "pose": {"position": {"x": ..}, "orientation": {"x": ..}}}    as in ROS messages
@@ -89,7 +89,7 @@ class Name(NamedTuple):
 
 
 class Record(NamedTuple):
-    """One point, vector, pose, twist or wrench: what its numbers mean, where they stand, which frames it names.
+    """One point, vector, pose, twist or wrench: what its numbers mean, where they are, which frames it names.
 
     path: of the mapping or list that holds the numbers
     numbers: the path of each; None for a number that is not written and counts as 0
@@ -99,7 +99,7 @@ class Record(NamedTuple):
     flat: keys that hold one number of the rotation each; `rotation` is then the first of them
     covariances: the keys of those whose numbers come last, or of a scale
     known: where each of them begins, which -1 would make one of those
-    unknown: where a covariance begins that is none, and decides that
+    unknown: where a covariance begins that is invalid, and decides that
     stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the time of the first
     placed: the keys that say a position on the Earth and the rotation there, where its numbers are not theirs
     """
@@ -126,7 +126,7 @@ class Record(NamedTuple):
 class RecordPlace(NamedTuple):
     """What holds the numbers of a record, and the mappings around it; of a message its field, and the kind of that.
 
-    covariances: the keys under which one may stand
+    covariances: the keys under which one may be
     """
 
     path: Path
@@ -163,7 +163,7 @@ def find_records(document: Any, request: Request, reading: Reading, path: Path =
 
 
 def _search_under(document: Any, path: Path, outer: tuple[Path, ...], request: Request) -> Iterator[RecordPlace]:
-    """Search what stands under the key `detections.pose`, which --columns names; a list stands for its items."""
+    """Search what is under the key `detections.pose`, which --columns names; a list stands for its items."""
     found = [(document, path, outer)]
     for key in request.columns[0].split("."):
         items = [(value_at(each, at), (*above, *at), around) for each, above, around in found for at in _mappings(each)]
@@ -250,7 +250,7 @@ def _message(value: dict[str, Any]) -> tuple[dict[str, str], tuple[str, ...]]:
 
 
 def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path, stays: Sequence[str]) -> None:
-    """Stop where something beside what moves is given in the same frame, or may be, and would stay as it is."""
+    """Stop where another field of what moves is expressed in the same frame, or may be, and would stay as it is."""
     header = value.get("header")
     is_message = type(header) is dict and "frame_id" in header
     if is_message and not found:
@@ -266,7 +266,7 @@ def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path
 
 
 def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
-    """Tell whether a value may be given in a frame: it has x, y, z; if doubtful also x and y, or a list of numbers.
+    """Return True if a value may depend on a frame: it has x, y, z; if doubtful also x and y, or a list of numbers.
 
     The names in a list are those of joints, whose positions are no point.
     """
@@ -296,7 +296,7 @@ def _search_inside(
 
 
 def _holds_numbers(value: dict[str, Any]) -> bool:
-    """Tell whether a mapping itself is a record rather than a message around one."""
+    """Return True if a mapping itself is a record rather than a message around one."""
     if _is_holder(value) or set(XYZ) <= set(value) or _parts_of(value) is not None:
         return True
     if any(type(value.get(key)) in (dict, list) for key in INNER):
@@ -435,7 +435,7 @@ def _with_asked(record: Record, document: Any, path: Path, above: Path, request:
 def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, request: Request) -> Record:
     """Read a field of a message.
 
-    An orientation with a covariance that begins with -1 is none: nothing of it is read, and it stays.
+    An orientation with a covariance that begins with -1 is unknown: nothing of it is read, and it stays.
     """
     field, kind = place.field, place.kind
     if request.kind not in ("", kind):
@@ -543,7 +543,7 @@ def _given_on_earth(record: Record, request: Request) -> Record:
 
 
 def _beside_place(rest: dict[str, Any], path: Path, reading: Reading, request: Request) -> tuple[Pose, list[str]]:
-    """Read the pose that stands beside a place on the Earth, and return the keys that say it but its covariance."""
+    """Read the pose that comes with a place on the Earth, and return the keys that say it but its covariance."""
     covariance = None
     if not COVARIANCE_KEYS.isdisjoint(rest):
         from frametool.grammar.covariance import read_covariance
@@ -707,7 +707,7 @@ def _number(
 
 
 def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading: Reading) -> None:
-    """Refuse numbers that are no rotation; note what is odd about them."""
+    """Refuse numbers that are no rotation; note what is invalid about them."""
     try:
         _, odd = checked_rotation(shape, values, normalize=reading.normalize)
     except ValueInvalid as error:
@@ -722,7 +722,7 @@ def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading:
 
 
 def _turns_in_doubt(value: dict[str, Any]) -> bool:
-    """Tell whether a mapping says how sure its rotation is, so that it is a pose, if only by that."""
+    """Return True if a mapping says how sure its rotation is, so that it is a pose, if only by that."""
     sigma = value.get("sigma")
     return type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
 
@@ -832,7 +832,7 @@ def _named(value: dict[str, Any], keys: Sequence[str], path: Path, found: Name, 
 
 
 def _with_stamp(record: Record, header: dict[str, Any], path: Path, above: Path) -> Record:
-    """Add the stamp of a header, and where its seconds and nanoseconds stand; one further in said it better."""
+    """Add the stamp of a header, and where its seconds and nanoseconds are; one further in said it better."""
     if "stamp" not in header:
         return record
     from frametool.ros.messages import read_stamp

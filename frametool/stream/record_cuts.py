@@ -39,7 +39,7 @@ WORTH_CUTTING = 1 << 12  # bytes
 class Cut(NamedTuple):
     """Records of one template found in a block: where each stretch of each begins and ends.
 
-    The last two columns are what follows a record and what stands before it.
+    The last two columns are what follows a record and what is before it.
     """
 
     template: Template
@@ -47,7 +47,7 @@ class Cut(NamedTuple):
     ends: Ints
 
     def part(self, row: int) -> Part:
-        """Return where a record stands."""
+        """Return where a record is."""
         ends = self.ends[row].tolist()
         return Part(int(self.starts[row, -1]), int(self.starts[row, 0]), int(self.starts[row, -2]), ends[-2])
 
@@ -163,7 +163,7 @@ class RecordCutter:
                 yield part, None if part.problem else self.match(text, first, last)
 
     def learned(self, known: RecordText | Fault, text: bytes, part: Part) -> tuple[Template, Places] | None:
-        """Learn from a record; return the template, and where its stretches stand in it."""
+        """Learn from a record; return the template, and where its stretches are in it."""
         if isinstance(known, Fault) or not known.entries:
             return None
         template = self.learn(known)
@@ -261,7 +261,7 @@ def _renamed(template: Template, piece: Renamed, frames: Sequence[Sequence[Names
 
 
 def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
-    """Say what is done to the records of one template."""
+    """Return what is done to the records of one template."""
     after = len(template.stretches)
     renamed = count(after + 2)
     pieces = [In(next(renamed)) if isinstance(each, Renamed) else each for each in template.pieces]
@@ -283,7 +283,7 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
 
 
 def is_text(block: bytes) -> bool:
-    """Tell whether bytes are UTF-8: an expression for bytes would let others pass."""
+    """Return True if bytes are UTF-8: an expression for bytes would let others pass."""
     if block.isascii():
         return True
     try:
@@ -308,7 +308,7 @@ def _cut_chunk(template: Template, chunk: bytes, offset: int) -> tuple[Cut | Non
     rows = slice(0, count * (stretches + 1))
     shape = (count, stretches + 1)
     begins, stops = starts[rows].reshape(shape)[:, 1:], ends[rows].reshape(shape)[:, 1:]
-    first = begins[:, :1]  # nothing stands before a record
+    first = begins[:, :1]  # nothing is before a record
     return Cut(template, np.concatenate([begins, first], axis=1), np.concatenate([stops, first], axis=1)), gaps
 
 

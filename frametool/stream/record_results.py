@@ -106,7 +106,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
 
 
 def _no_result(record: bytes, form: str, style: Style) -> NoResult:
-    """Return what a bad record says beside its numbers; in a table those are empty cells under names of their own."""
+    """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
     try:
         text = record.decode()
         said = plain(parse_nodes(nulled(text, json=form == "json") or text)[0])
@@ -117,7 +117,7 @@ def _no_result(record: bytes, form: str, style: Style) -> NoResult:
 
 
 def _says(value: Any) -> bool:
-    """Tell whether there is more than null in a value."""
+    """Return True if there is more than null in a value."""
     inner = value.values() if type(value) is dict else value if type(value) is list else None
     return value is not None if inner is None else any(map(_says, inner))
 

@@ -1,7 +1,7 @@
 """Records that are written alike, as rows: a record is a row whose columns are its scalars.
 
 What such a row becomes in another form is seen from one whose scalars are marks, by the way that single results take;
-what is odd, or worth telling, takes that way itself.
+what is invalid, or worth telling, takes that way itself.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Marked(NamedTuple):
 class RecordBatch(NamedTuple):
     """Results of records that are written alike, one a row.
 
-    places: (n,) where each stands; results: (n, k) numbers; parents, names: of their frames, one a row or one for all
+    places: (n,) where each is; results: (n, k) numbers; parents, names: of their frames, one a row or one for all
     stamps_ns: (n,) those of their headers, if they have any
     """
 
@@ -273,7 +273,7 @@ def _unmarked(_path: object) -> Any:
 
 
 def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, Iterable[int]]:
-    """Read the stamps of records, in their headers or beside them; give also which records have none."""
+    """Read the stamps of records, in their headers or with them; give also which records have none."""
     record = cut.template.entries[at].record
     places = [cut.template.stretch_of(path) for path in record.stamps[:2]] if record.stamp_ns is not None else []
     places = [cut.template.leaves[each.stamp[0]][0]] if each.stamp is not None else places
@@ -328,7 +328,7 @@ class Filling:
         return self.stamps[row] if part == STAMP_NS else part
 
     def text(self, mark: str, row: int) -> Any:
-        """Return what stands in the place of a text, if that is a mark."""
+        """Return what replaces a text, if that is a mark."""
         if mark in self.known:
             return self.known[mark][row]
         if mark not in self.leaves:

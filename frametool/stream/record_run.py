@@ -116,7 +116,7 @@ class RecordRun:
         return [each for each in self.recording.channels if self._is_used(each)]
 
     def _is_used(self, channel: Channel) -> bool:
-        """Tell whether the transforms of a channel are used: those of the topics that are named, or all."""
+        """Return True if the transforms of a channel are used: those of the topics that are named, or all."""
         return channel.type in TYPES and (not self.transform_topics or _is_among(channel.topic, self.transform_topics))
 
     def _named(self) -> list[Channel]:
@@ -160,7 +160,7 @@ class RecordRun:
         self.recording.refuse_foreign(self.request.topics)
 
     def _empty(self, window: tuple[int, int]) -> str:
-        """Say that no message lies in a window."""
+        """Return the error that no message lies in a window."""
         span = self.copy.span
         there = f"they are logged from {' to '.join(map(format_stamp, span))}" if span else "it has none at all"
         return f"{self.recording.path}: no messages from {' to '.join(map(format_stamp, window))}; {there}"
@@ -238,7 +238,7 @@ class RecordRun:
             yield f"nothing is changed: {_count(sum(self.copy.counts.values()))} copied"
 
     def remarks(self) -> Iterator[Finding]:
-        """Yield what was odd in messages that were moved."""
+        """Yield what was invalid in messages that were moved."""
         if self.mover is not None:
             yield from self.mover.tally.findings()
 
@@ -287,7 +287,7 @@ def _on_topic(topic: str, path: str) -> Iterator[None]:
 
 
 def _is_among(topic: str, topics: set[str]) -> bool:
-    """Tell whether a topic is one of some, with or without a slash in front."""
+    """Return True if a topic is one of some, with or without a slash in front."""
     return topic.strip("/") in {each.strip("/") for each in topics}
 
 

@@ -84,7 +84,7 @@ def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedRea
 
 
 def _has_ended(stream: ByteStream) -> bool:
-    """Tell whether a stream has nothing more to come, or will have within a moment."""
+    """Return True if a stream has nothing more to come, or will have within a moment."""
     import select
 
     try:
@@ -96,9 +96,9 @@ def _has_ended(stream: ByteStream) -> bool:
 
 
 def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
-    """Let no comma stand before the first record that is left, and make the lack of the closing bracket a fault.
+    """Allow no comma before the first record that is left, and make the lack of the closing bracket a fault.
 
-    What stands before that record is held back: where the first one is an error nothing is written.
+    What is before that record is held back: where the first one is an error nothing is written.
     """
     any_kept, is_open, ended = False, None, True
     held = b""
@@ -121,7 +121,7 @@ def _as_array(outcomes: Iterable[Outcome], on_error: str) -> Iterator[Outcome]:
 
 
 class Found:
-    """What one block holds beside the records that templates find: texts and faults by place, warnings, counts."""
+    """What one block holds besides the records that templates find: texts and faults by place, warnings, counts."""
 
     def __init__(self) -> None:
         """Create an empty one."""
@@ -168,7 +168,7 @@ class RecordBlocks:
         self, text: bytes, start: int, end: int, parts: Iterable[tuple[Part, Hit | None]], found: Found,
         records: FoundRecords | None = None,
     ) -> None:  # fmt: skip
-        """Take records one by one, learning new templates if there are many; what stands between them passes."""
+        """Take records one by one, learning new templates if there are many; what is between them passes."""
         at, line, counted = start, 0, 0
         for part, known in parts:
             if part.begin > at:

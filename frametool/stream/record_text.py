@@ -204,7 +204,7 @@ def nulled(text: str, *, json: bool) -> str | None:
 
 
 def null_of(record: bytes, *, json: bool) -> bytes:
-    """Return what stands for a record without a result: its keys with null in the place of ours, or null."""
+    """Return what replaces a record without a result: its keys with null in the place of ours, or null."""
     body = record.rstrip(b"\r\n")
     try:
         text = nulled(body.decode(), json=json)
@@ -214,7 +214,7 @@ def null_of(record: bytes, *, json: bool) -> bytes:
 
 
 def column_in(text: bytes, place: int) -> int:
-    """Return the column, from 1, at which a place stands in its line."""
+    """Return the column, from 1, at which a place is in its line."""
     return len(text[text.rfind(b"\n", 0, place) + 1 : place].decode("utf-8", "replace")) + 1
 
 

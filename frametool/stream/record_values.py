@@ -45,7 +45,7 @@ SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
 LOST = "lost"  # rule of frames that results cannot name
-MOST_TOLD = 3  # of what is odd by one rule in one text
+MOST_TOLD = 3  # of what is invalid by one rule in one text
 
 
 def read_poses(source: Source, asked: Request) -> list[Pose]:
@@ -58,7 +58,7 @@ def read_poses(source: Source, asked: Request) -> list[Pose]:
 
 
 def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
-    """Return every pose of a text as `read_poses` does, and the keys that stand beside any of them."""
+    """Return every pose of a text as `read_poses` does, and the keys that come with any of them."""
     request = Request(
         asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize, gathered=asked.gathered
     )
@@ -112,7 +112,7 @@ def pose_of(record: Record, request: Request) -> Pose:
 
 
 class Teller:
-    """Tell what is odd in documents, with its place: of one rule the first `most`, and at the end how many more."""
+    """Report problems of documents, with their places: of one rule the first `most`, and at the end how many more."""
 
     def __init__(self, most: int = MOST_TOLD) -> None:
         """Begin with nothing told."""
@@ -135,7 +135,7 @@ class Teller:
 
 
 def read_text(source: Source, request: Request) -> RecordText:
-    """Read the records of a text, and warn of what is odd in them, with its place."""
+    """Read the records of a text, and warn of what is invalid in them, with its place."""
     teller = Teller()
     known = RecordText(source, request, json=False, note=partial(teller.tell, source))
     teller.end(source.name)
@@ -156,7 +156,7 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
 def values_of_text(known: RecordText, style: Style, memory: Memory, own: Teller) -> Iterator[Value]:
     """Yield the results of the records of a text.
 
-    memory: of the records before; own: tells what is odd.  Raises FormatError for a record without a result.
+    memory: of the records before; own: reports what is invalid.  Raises FormatError for a record without a result.
     """
     made = [each for entry in known.entries if (each := _answer(known, entry, memory, own)) is not None]
     units: dict[Path, list[Answer]] = {}
@@ -208,7 +208,7 @@ class _WrittenBack:
         self.known, self.answers = known, answers
 
     def at(self, path: Path) -> Any:
-        """Return what stands at a path as a plain value, its numbers as floats."""
+        """Return what is at a path as a plain value, its numbers as floats."""
         root, numbers, mark = self._read
         return plain(root.at(path), lambda text: numbers[int(text[: -len(mark)])] if text.endswith(mark) else None)
 
@@ -261,7 +261,7 @@ def values_of_unit(
 
 
 def _stays(node: Node, kind: str, style: Style) -> bool:
-    """Tell whether what is no pose is written as the mapping it is: in no table, and as a message only if it is one."""
+    """Return True if what is not a pose is written unchanged: in no table, and as a message only if it is one."""
     if style.format == "csv" or has_no_text(style.format) or kind in PARTS:
         return kind in PARTS and style.format != "csv" and not has_no_text(style.format)
     return style.format != "text" and (style.format not in ("ros1", "ros2") or "header" in (node.value or ()))
@@ -335,7 +335,7 @@ def at_time(value: Value, timed: dict[str, Any]) -> Value:
 
 
 def stamp_key(members: dict[str, Any]) -> str:
-    """Return the key of a mapping's own stamp, "" where there is none."""
+    """Return the key of a mapping's own stamp, "" if absent."""
     keys = [key for key, value in members.items() if value is not None and type(value) is not list]
     at = None if "stamp_ns" in keys else stamp_column(keys)
     return "stamp_ns" if "stamp_ns" in keys else "" if at is None else keys[at]
@@ -358,7 +358,7 @@ def used_keys(record: Record) -> set[str]:
 
 
 def _says_no_more(record: Record, documents: dict[int, Any], unit: Path) -> bool:
-    """Tell whether a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
+    """Return True if a unit is one pose with its frames and nothing else, so that its text need not be walked again."""
     value = value_at(documents, unit)
     if record.path != unit or record.shape.kind != POSE or type(value) is not dict:
         return False
@@ -367,7 +367,7 @@ def _says_no_more(record: Record, documents: dict[int, Any], unit: Path) -> bool
 
 
 def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
-    """Return what a record and the mappings around it say beside the pose, its frames and its stamp.
+    """Return what a record and the mappings around it say besides the pose, its frames and its stamp.
 
     node: the thing that the record's result is; unit: the path of that
     """

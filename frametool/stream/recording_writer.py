@@ -36,7 +36,7 @@ class RecordingWriter:
     """Write blocks of poses or points as messages of one topic, or of several that go side by side."""
 
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the messages; kind: what a row is; extras: the numbers beside each; placed: poses have a position.
+        """Choose the messages; kind: what a row is; extras: the numbers with each; placed: poses have a position.
 
         Raises ValueInvalid for rows and notations that no message holds, FileProblem without the extra.
         """
@@ -67,7 +67,7 @@ class RecordingWriter:
         self.is_named = True  # whether all rows say what they are seen from
 
     def _usual(self) -> tuple[str, ...]:
-        """Return the messages where nobody says which; those of points depend on the frame they are given in."""
+        """Return the messages where nobody says which; those of points depend on the frame they are expressed in."""
         if self.style.place is not None:
             return ("fix",)
         asked = self.style.recording
@@ -101,7 +101,7 @@ class RecordingWriter:
         return b""
 
     def end(self) -> Iterator[bytes]:
-        """Yield the recording, and tell what was left out or made up."""
+        """Yield the recording, and warn of what was left out or made up."""
         if self.path:
             self._write_path()
         form = self.style.format

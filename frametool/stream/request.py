@@ -44,21 +44,21 @@ class Formula(Protocol):
 
     @property
     def reads_row(self) -> bool:
-        """Tell whether it reads the row's own point or pose."""
+        """Return True if it reads the row's own point or pose."""
 
     @property
     def needs_time(self) -> bool:
-        """Tell whether it reads the row's own time."""
+        """Return True if it reads the row's own time."""
 
     @property
     def adds(self) -> bool:
-        """Tell whether rows stay as they are and results stand beside them."""
+        """Return True if rows keep their columns and results are added."""
 
     def kind(self, row: str) -> str:
         """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
 
     def extras(self, row: str) -> tuple[str, ...]:
-        """Name the numbers that come beside a pose or point."""
+        """Name the numbers that come with a pose or point."""
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
         """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
@@ -70,10 +70,10 @@ class Formula(Protocol):
 
 
 class Shown(NamedTuple):
-    """How the numbers of a formula are written beside a row; nan is an empty cell, or null.
+    """How the numbers of a formula are written in a row; nan is an empty cell, or null.
 
-    words: in tables, the words that a number stands for, by its place
-    members: in records, what stands under each key: a text, a word, or the places of its numbers
+    words: in tables, the words that a number encodes, by its place
+    members: in records, what is under each key: a text, a word, or the places of its numbers
     replaces: columns and members of these names give way, where no prefix makes others of them
     """
 
@@ -117,11 +117,11 @@ class Operation(NamedTuple):
     fixed: the pose that "first" and "second" need
     moves: the row is moved rather than composed: points and vectors are allowed
     turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
-    mirrors: the row is seen in a mirror across y, before all that stands on its left
+    mirrors: the row is seen in a mirror across y, before all that is on its left
     formula: an expression, instead of all this; it is given points that are moved by their edge, or that edge alone
     shown: how its numbers are written
     uncertain: what moves rows, each by its frame or its time, has a covariance that counts
-    similar: a scale beside a pose counts, and is that of the result; multiples: so is that of a matrix s R
+    similar: a scale with a pose counts, and is that of the result; multiples: so is that of a matrix s R
     Poses are seven components, and may have a covariance or a scale behind them, as `geometry.placed` has it.
     """
 
@@ -141,7 +141,7 @@ class Operation(NamedTuple):
     shown: Shown | None = None
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
-        """Name the numbers that come beside the result of a row, and have no place in the row as it was read."""
+        """Name the numbers that come with the result of a row, and have no place in the row as it was read."""
         if self.formula is not None:
             return self.formula.extras(shape.kind)
         compared = RELATIVE_EXTRAS + VELOCITY * self.velocity if self.of and shape.kind == POSE else ()
@@ -169,32 +169,32 @@ class Operation(NamedTuple):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Name the columns whose numbers are read beside those of points and poses."""
+        """Name the columns whose numbers are read with those of points and poses."""
         return () if self.formula is None else self.formula.columns
 
     @property
     def only_adds(self) -> bool:
-        """Tell whether rows stay as they are and results stand beside them."""
+        """Return True if rows keep their columns and results are added."""
         return self.formula is not None and self.formula.adds
 
     @property
     def keeps_child(self) -> bool:
-        """Tell whether a result is the pose of what its row is the pose of: of a camera with the same axes."""
+        """Return True if a result is the pose of what its row is the pose of: of a camera with the same axes."""
         return not (self.inverse or self.right or self.formula) and self.of in ("", "first", START, PREVIOUS)
 
     @property
     def looks_back(self) -> bool:
-        """Tell whether a row's result depends on the rows before it."""
+        """Return True if a row's result depends on the rows before it."""
         return self.of in (START, PREVIOUS)
 
     @property
     def takes_points(self) -> bool:
-        """Tell whether points and vectors have a result: where they are moved, and where they get other axes."""
+        """Return True if points and vectors have a result: where they are moved, and where they get other axes."""
         return self.moves or self.turns
 
     @property
     def changes_nothing(self) -> bool:
-        """Tell whether rows only change their notation."""
+        """Return True if rows only change their notation."""
         changed = self.left or self.right or self.of or self.moves or self.mirrors
         return not (changed or self.inverse)
 
@@ -211,12 +211,12 @@ class Operation(NamedTuple):
 
     @property
     def keeps_frames(self) -> bool:
-        """Tell whether records stay in the frames they name."""
+        """Return True if records stay in the frames they name."""
         return self.shown is not None or (self.changes_nothing and (self.formula is None or self.formula.adds))
 
     @property
     def keeps_position(self) -> bool:
-        """Tell whether positions stay as they are written."""
+        """Return True if positions stay as they are written."""
         return self.changes_nothing or (self.turns and self.left is None and not (self.mirrors or self.inverse))
 
     @property
@@ -225,7 +225,7 @@ class Operation(NamedTuple):
         return rigid.inverse(*self.right[0]) if self.right else None
 
     def move(self, shape: Shape, own: Components, beside: Components, edge: Components | None) -> Components:
-        """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes beside it stays."""
+        """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes with it stays."""
         mover = self._of_body if shape.kind == RATE else edge or self.left
         if self.mirrors:
             own = (own[0], -own[1], *own[2:])
@@ -249,7 +249,7 @@ class Operation(NamedTuple):
         seconds: Callable[[], Number],
         times_ns: Number = None,
     ) -> Components:
-        """Return what becomes of one thing of a shape, or of a column of them, and then what comes beside it.
+        """Return what becomes of one thing of a shape, or of a column of them, and then what comes with it.
 
         rotation: makes the checked quaternion of a thing's own numbers
         compared: adds to a pose what it is compared with
@@ -363,14 +363,14 @@ class Request(NamedTuple):
     notations: those of the result; none means as read
     by_default: nobody asked for these notations, so that what has no rotation gets none
     columns: which columns are ours, one entry a pose
-    keep, prefix: results stand beside what they come from, under other names
+    keep, prefix: results are added to the input, under other names
     frames: columns that name a row's frame
-    pose_from_frame: the pose that moves a record given in a frame
+    pose_from_frame: the pose that moves a record expressed in a frame
     timed: the poses that do so at the row's own time
     rename: turns a record's (parent, name) into those of its result
     frame_is_counter: a decimal `frame` is a counter, because no frame is called so
     unwrap: angles go on beyond half a turn
-    extra_column: the column or key of a stamp or weight that is read beside the pose; "" is the usual stamp
+    extra_column: the column or key of a stamp or weight that is read with the pose; "" is the usual stamp
     gathered: takes the poses, nothing is written then
     all_numbers: all numbers of a result are wanted, also those that do not change
     canonical: results are written anew rather than in the text of their records
@@ -421,13 +421,13 @@ class Request(NamedTuple):
 
     @property
     def in_order(self) -> bool:
-        """Tell whether a row's result depends on the rows before it."""
+        """Return True if a row's result depends on the rows before it."""
         takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
         return self.unwrap or self.operation.looks_back or self.gathered is not None or takes_first
 
     @property
     def keeps_position(self) -> bool:
-        """Tell whether positions stay as they are written."""
+        """Return True if positions stay as they are written."""
         return self.operation.keeps_position and self.place is None
 
     def target(self, shape: Shape) -> Target:
@@ -472,28 +472,28 @@ class Request(NamedTuple):
         return 1.0 if own is not None and self.all_numbers and (self.notations or shape.notation is None) else own
 
     def _is_scaled(self, shape: Shape, notations: Sequence[Notation]) -> bool:
-        """Tell whether the scale of results is in the one matrix that is written of each."""
+        """Return True if the scale of results is in the one matrix that is written of each."""
         is_matrix = len(notations) == 1 and notations[0].representation.whole is not None
         return is_matrix and self.operation.carried(shape) == (SCALE,)
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
-        """Name the numbers that come beside a result as columns or keys of their own."""
+        """Name the numbers that come with a result as columns or keys of their own."""
         extras = self.operation.extras(shape)
         return extras[:-1] if self.target(shape).scaled and extras[-1:] == (SCALE,) else extras
 
     def result_size(self, shape: Shape, target: Target) -> int:
-        """Count the numbers of a result of a shape, with what comes beside it."""
+        """Count the numbers of a result of a shape, with what comes with it."""
         in_place = 0 if shape.rewritten else sum(shape.covariance)
         return target.size + len(self.extras(shape)) + in_place
 
     @property
     def by_row(self) -> bool:
-        """Tell whether each row has its own pose that moves it."""
+        """Return True if each row has its own pose that moves it."""
         return bool(self.frames) or self.timed is not None
 
     @property
     def shifts(self) -> bool:
-        """Tell whether things without a position may have one afterwards."""
+        """Return True if things without a position may have one afterwards."""
         operation = self.operation
         fixed = (operation.left, *operation.right, operation.fixed)
         by_row = self.by_row or operation.formula is not None
@@ -501,7 +501,7 @@ class Request(NamedTuple):
 
     @property
     def _only_turns_around(self) -> bool:
-        """Tell whether things without a rotation have none afterwards."""
+        """Return True if things without a rotation have none afterwards."""
         operation = self.operation
         bare = operation.left is None and not operation.right and not operation.of and operation.formula is None
         return (bare or operation.turns) and not self.by_row
@@ -514,11 +514,11 @@ class Request(NamedTuple):
         return self._replace(rename=lambda parent, name: formula.rename(kind, parent, name))
 
     def counts(self, frame: str) -> bool:
-        """Tell whether what stands under `frame` is a counter rather than a frame's name."""
+        """Return True if what is under `frame` is a counter rather than a frame's name."""
         return self.frame_is_counter and frame.isdecimal()
 
     def in_degrees(self, form: Notation) -> bool:
-        """Tell whether a notation's angles are degrees: its own word wins."""
+        """Return True if a notation's angles are degrees: its own word wins."""
         return self.degrees if form.degrees is None else form.degrees
 
 
@@ -540,7 +540,7 @@ class Memory:
         return [before, pose]
 
     def step(self, stamp_ns: int) -> float | None:
-        """Return the seconds since the row before, None for the first; raises ValueInvalid if time stands still."""
+        """Return the seconds since the row before, None for the first; raises ValueInvalid if time does not advance."""
         before, self.stamp_ns = self.stamp_ns, stamp_ns
         if before is None:
             return None
@@ -550,7 +550,7 @@ class Memory:
 
 
 def no_step(before: int, stamp_ns: int) -> str:
-    """Say why there is no velocity between two stamps."""
+    """Return the reason why there is no velocity between two stamps."""
     from frametool.frames.stamps import format_stamp
 
     what = "is that of the row before" if stamp_ns == before else f"is before {format_stamp(before)}, of the row before"

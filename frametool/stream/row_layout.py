@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", "wrench", "accel"
 ROTATION = "rotation"  # without a position, which no move gives it
 RATE = "rate"  # a vector along the axes of a body
-ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a world that stands
+ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a fixed world
 TURNED = (POSE, ROTATION, ATTITUDE)
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
 SIX = tuple(PARTS)  # two vectors, linear part first
@@ -39,7 +39,7 @@ MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbe
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
-AS_READ = "lat lon alt as read"  # beside a point of ecef: of its row, for what is written of them again
+AS_READ = "lat lon alt as read"  # of a point of ecef: of its row, for what is written of them again
 FLAT = 1e-9  # radians, metres: what a number without a column may be
 LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
 # how many make a metre, where they differ of x, y, z each; or how positions on the Earth are written
@@ -117,20 +117,20 @@ class Shape(NamedTuple):
 
     @property
     def rotation_at(self) -> tuple[int, ...]:
-        """Return where in a row the rotation's numbers stand."""
+        """Return where in a row the rotation's numbers are."""
         if self.joined:
             return tuple(self.joined.split(range(self.own_size))[1])
         return tuple(range(self.position_size, self.own_size))
 
     def number_at(self, index: int) -> int:
-        """Return where in a row a number of the rotation stands that has a column."""
+        """Return where in a row a number of the rotation is that has a column."""
         if self.joined:
             return self.rotation_at[index]
         full = index + count_of(self.unit)
         return full - sum(each < full for each in self.absent)
 
     def in_degrees(self, place: int) -> bool | None:
-        """Tell whether a row's number is an angle in degrees; None if it is no angle."""
+        """Return True if a row's number is an angle in degrees; None if it is no angle."""
         if place >= self.own_size:
             return None
         there = [each for each in range(self._full) if each not in self.absent]
@@ -140,7 +140,7 @@ class Shape(NamedTuple):
         return self.degrees and index not in self.radians_at
 
     def in_metres(self, place: int) -> bool:
-        """Tell whether a row's number is a length in metres, of a point, a vector or a position."""
+        """Return True if a row's number is a length in metres, of a point, a vector or a position."""
         if self.place is not None or place >= self.position_size:
             return False
         there = [each for each in range(3) if each not in self.absent]
@@ -224,7 +224,7 @@ class Target(NamedTuple):
         return list("xyz" if self.place is None else self.place.columns) if self.unit is not None else []
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
-        """Return all numbers of a result: those of the thing itself, then what comes beside it as it is."""
+        """Return all numbers of a result: those of the thing itself, then what comes with it as it is."""
         own = 6 if self.plain else 3 if self.three or len(parts) == 3 else 7
         full = self._full(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
         if self.absent:
@@ -341,7 +341,7 @@ def checked_rotation(
 
 
 def wrong_tail(wanted: Sequence[float], found: Sequence[float]) -> str:
-    """Say that the last row of a 4x4 matrix is not what it always is."""
+    """Return the message that the last row of a 4x4 matrix is not what it always is."""
     expected, given = (" ".join(f"{value:g}" for value in row) for row in (wanted, found))
     return f"the last row of a 4x4 pose is {expected}, found {given}"
 

@@ -40,11 +40,11 @@ class RowPoses(NamedTuple):
     """What became of the rows of a block: the good ones, in their order.
 
     numbers: (n, k) the results, position first; nan in a row without one that is kept
-    stamps_ns: (n,) or None where rows have none; NO_STAMP in a row whose own is none
+    stamps_ns: (n,) or None where rows have none; NO_STAMP in a row without a stamp
     lines: (n,) from 0
     parents, names: one a row, one for all, or none
     extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
-    given: the frames that the rows of the input are given in
+    given: the frames that the rows of the input are expressed in
     read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
     """
 
@@ -122,7 +122,7 @@ def block_of(results: Sequence[Result], *, placed: bool = True) -> RowPoses:
 def block_of_points(records: Sequence[Mapping[str, Any]]) -> tuple[str, RowPoses]:
     """Return mappings of points, vectors, twists or wrenches as a block, and what they are.
 
-    Raises ValueInvalid for what is none of them, or several of them.
+    Raises ValueInvalid for no such column, or several of them.
     """
     found = [_components(record) for record in records]
     kinds = sorted({kind for kind, _, _ in found})

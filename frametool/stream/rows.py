@@ -37,17 +37,17 @@ class Block(NamedTuple):
 
     numbers: (n, c) the cells with our numbers
     parts: spans (n,) that pieces refer to
-    places: (n,) where each row stands among all that the block holds
+    places: (n,) where each row is among all that the block holds
     line_of: the line of a row, from 0
     odd: place and text of what passes as it is
     broken: rows that have no numbers
-    frames: the name of the frame each row is given in, if rows say so
+    frames: the name of the frame each row is expressed in, if rows say so
     stamps: for each shape the spans (n,) of its stamp: one, or seconds and nanoseconds; none where it has none
     bad: rows whose names do not fit: column and reason
     lost: the first row whose result cannot name a frame, and that frame
     values, times: (n, c) and (n,) the numbers and the stamps in nanoseconds themselves, where they are no text
-    weights: (n,) the numbers beside them, where they are no text
-    sources: for each shape the name of the frame each row is given in, or one for all
+    weights: (n,) the numbers with them, where they are no text
+    sources: for each shape the name of the frame each row is expressed in, or one for all
     place_of: line, from 0, and column, from 1, of one of a row's numbers, where columns have no names
     """
 

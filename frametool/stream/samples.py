@@ -52,7 +52,7 @@ MOST_NAMED = 5
 class HandEyeSamples(NamedTuple):
     """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
 
-    places: where each stands; names: of base, gripper, camera and target, None where nothing says one
+    places: where each is; names: of base, gripper, camera and target, None where nothing says one
     files: what they are called; taken: how a form's own words were taken; told: sentences on what has no partner
     placed: whether they have positions; else these are 0
     """
@@ -113,7 +113,7 @@ def read_samples(
 
 
 def _of_table(file: InputFile, form: str, columns: Sequence[str], *, normalize: bool) -> HandEyeSamples:
-    """Read the poses of gripper and target that stand side by side in the rows of a table."""
+    """Read the poses of gripper and target that are side by side in the rows of a table."""
     text = file.stream.read()
     names = open_table(text, form, header=True, source=file.name)[0].names or ()
     for first, others in () if columns else PARTNERS.items():
@@ -200,7 +200,7 @@ def _one_name(names: Sequence[str | None], places: Sequence[str]) -> str | None:
 class Points(NamedTuple):
     """Points of a file, (n, 3), metres.
 
-    ids, weights: of each, None where the file has none; places: where each stands; frame: the one they are given in
+    ids, weights: of each, None where the file has none; places: where each is; frame: the one they are expressed in
     """
 
     file: str

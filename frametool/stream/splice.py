@@ -1,4 +1,4 @@
-"""What changes in the text of a record: numbers where they stand, members that are replaced, added or left out.
+"""What changes in the text of a record: numbers where they are, members that are replaced, added or left out.
 
 Everything else stays as it is, byte for byte.  Knows the syntax of JSON and YAML only as far as members go: what
 stands between them, and how one is written.
@@ -39,7 +39,7 @@ OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angula
 
 
 class Edit(NamedTuple):
-    """A stretch of the text and what stands there instead; an empty stretch is an insertion."""
+    """A stretch of the text and what replaces it; an empty stretch is an insertion."""
 
     start: int
     end: int
@@ -47,14 +47,14 @@ class Edit(NamedTuple):
 
 
 def target_of(record: Record, request: Request) -> Target:
-    """Choose how the result of a record is written; conventions of Euler angles share a key and stand together."""
+    """Choose how the result of a record is written; conventions of Euler angles share a key and are together."""
     names = [form.representation.name for form in request.notations]
     together = sorted(request.notations, key=lambda form: names.index(form.representation.name))
     return request._replace(notations=tuple(together)).target(record.shape)
 
 
 def null_edits(node: Node) -> list[Edit]:
-    """Put null in the place of every number that is ours, wherever in a record it stands; the rest stays."""
+    """Put null in the place of every number that is ours, wherever in a record it is; the rest stays."""
     if type(node.value) is list:
         return [edit for item in node.value for edit in null_edits(item)]
     if type(node.value) is not dict:
@@ -124,16 +124,16 @@ class Splicer:
         return self.edits
 
     def _stays_a_list(self) -> bool:
-        """Tell whether a result has the numbers of the bare list it comes from and no others."""
+        """Return True if a result has the numbers of the bare list it comes from and no others."""
         has_place = self.target.unit is None or self.record.shape.unit is not None
         told = self.request.extras(self.record.shape)
         return self._same_rotation() and has_place and not told
 
     def _same_rotation(self) -> bool:
-        """Tell whether the rotation is written as it was read, number by number."""
+        """Return True if the rotation is written as it was read, number by number."""
         shape, target = self.record.shape, self.target
         same = [(shape.notation, shape.degrees)] == list(target.notations) if shape.notation else not target.notations
-        is_alone = self.record.flat == QUATERNION and target.unit is not None  # x y z w stand for nothing beside xyz
+        is_alone = self.record.flat == QUATERNION and target.unit is not None  # x y z w mean nothing with xyz
         return same and shape.whole == target.whole and not (self.record.shape.inverse or is_alone)
 
     def _numbers(self, slots: Sequence[int], first: int) -> list[Edit]:
@@ -148,7 +148,7 @@ class Splicer:
         return self.edits
 
     def _position(self) -> None:
-        """Write the position where it stands, or as a member of its own; a whole matrix takes it in."""
+        """Write the position where it is, or as a member of its own; a whole matrix takes it in."""
         key, target = self.record.key, self.target
         if self.record.shape.unit is None:
             if target.unit is not None:
@@ -187,7 +187,7 @@ class Splicer:
         )  # fmt: skip
 
     def _rotation(self) -> None:
-        """Write the rotation where it stands, or its members anew."""
+        """Write the rotation where it is, or its members anew."""
         shape, target = self.record.shape, self.target
         first = 0 if target.unit is None else 3 - sum(place < 3 for place in target.absent)
         first = first if target.place is None else target.place.size
@@ -301,7 +301,7 @@ class Splicer:
         return "parent" if self.request.operation.result_kind(self.record.shape.kind) == POSE else "frame"
 
     def _is_local(self) -> bool:
-        """Tell whether a result on the Earth says no frame: a point that says its place, or axes of an origin."""
+        """Return True if a result on the Earth says no frame: a point that says its place, or axes of an origin."""
         place = self.target.place
         says = place is not None and place.name not in EARTH_FRAMES and self._parent_key() == "frame"
         return says or (place is not None and place.origin is not None)
@@ -384,7 +384,7 @@ class Splicer:
         return self.edits
 
     def _all_members(self) -> list[tuple[Piece, ...]]:
-        """Return the members of a result: position, rotation, what comes beside."""
+        """Return the members of a result: position, rotation, extra numbers."""
         kind = self.request.operation.result_kind(self.record.shape.kind)
         position = [self._place("xyz" if kind == POSE else kind)] if self.target.unit is not None else []
         return [*position, *self._members(count_of(self.target.unit)), *self._extras(self.target.size)]

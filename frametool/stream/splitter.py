@@ -1,4 +1,4 @@
-"""Where the records of a text stand: YAML documents, JSON lines, JSON values over several lines, arrays of them.
+"""Where the records of a text are: YAML documents, JSON lines, JSON values over several lines, arrays of them.
 
 Knows the syntax around records and none of their meaning.  What is no record is a part of its own with the problem
 it has, so that nothing passes unseen.  Behind a broken line the next one is read; an array, or a value over several
@@ -80,7 +80,7 @@ class Splitter:
         return ended[-1] if ended else 0
 
     def _has_ended(self, text: bytes, part: Part) -> bool:
-        """Tell whether a text can be cut behind a record so that either piece means what it meant."""
+        """Return True if a text can be cut behind a record so that either piece means what it meant."""
         if part.final or self.layout != ARRAY:
             return part.final or part.after < len(text) or text.endswith(b"\n")
         return bool(_BEHIND_ITEM.match(text, part.end))
@@ -136,7 +136,7 @@ def _with_separator(text: bytes, start: int, end: int, problem: str = "") -> Par
 
 
 def _layout_of(text: bytes, *, final: bool) -> str:
-    """Tell how JSON is laid out by its first lines; "" where they have not come yet."""
+    """Return how JSON is laid out by its first lines; "" where they have not come yet."""
     body = text.removeprefix(MARK).lstrip()
     if body.startswith(b"["):
         following = body[1:].lstrip(b" \t\r")[:1]
@@ -154,7 +154,7 @@ def _layout_of(text: bytes, *, final: bool) -> str:
 
 
 def _layout_of_cut(body: bytes, rest: bytes, *, final: bool) -> str:
-    """Tell whether a first line that ends within a value goes on in the rest, or is broken."""
+    """Return True if a first line that ends within a value goes on in the rest, or is broken."""
     second, end, _ = rest.partition(b"\n")
     if not (end or final):
         return ""

@@ -1,4 +1,4 @@
-"""What the rows of a block say beside their poses: stamps, weights, and the poses that move each of them.
+"""What the rows of a block say besides their poses: stamps, weights, and the poses that move each of them.
 
 Stamps are read in bulk, decimal seconds or nanoseconds to integer nanoseconds, never through a float.
 """
@@ -79,7 +79,7 @@ def _parse_plain(data: Bytes, starts: Ints, ends: Ints, *, in_ns: int) -> tuple[
 
 
 def _point(data: Bytes, starts: Ints, ends: Ints) -> Ints:
-    """Return how many characters stand before the point; all of them where there is none."""
+    """Return how many characters are before the point; all of them if absent."""
     characters = windows(data, _LONGEST)[starts].view("<u8").reshape(-1, _WORDS)
     before = first_point(characters[:, _WORDS - 1])
     for word in reversed(range(_WORDS - 1)):
@@ -129,7 +129,7 @@ def stamps_of(block: Block, name: str, blame: Blame) -> Ints:
 
 
 def seconds_before(stamps: Ints, good: Sequence[int], before_ns: int | None, name: str, blame: Blame) -> Floats:
-    """Return the seconds since the good row before each row; a row at which time stands still or turns back is bad.
+    """Return the seconds since the good row before each row; a row at which time does not advance is bad.
 
     before_ns: the stamp of the last good row of the block before; None for the first block, whose first row gets 1.
     """

@@ -1,4 +1,4 @@
-"""Rows that are moved each at its own time: where their stamps stand, how they are read, who knows the poses then."""
+"""Rows that are moved each at its own time: where their stamps are, how they are read, who knows the poses then."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ HEADER = "header.stamp"
 
 
 class Timed(NamedTuple):
-    """Where the stamps of rows stand, and the poses that move from a frame (None: the one SOURCE) at such times.
+    """Where the stamps of rows are, and the poses that move from a frame (None: the one SOURCE) at such times.
 
     name: the column or key of the stamps; "" for the stamp in the header of each message
     many: columns of poses at an array of nanoseconds, nan where there is no data
     one: a pose at one time, or the reason raised
-    moves: tells whether what lies between a frame and the target depends on the time
+    moves: True if what lies between a frame and the target depends on the time
     width: how many numbers such a pose has, with its covariance if that counts
     """
 
@@ -40,7 +40,7 @@ class Timed(NamedTuple):
 
     @classmethod
     def of_rows(cls, name: str) -> Timed:
-        """Say where the stamps of rows stand for an expression, which knows by itself what they are for."""
+        """Return where the stamps of rows stand for an expression, which knows by itself what they are for."""
         return cls(name, _by_expression, _by_expression, lambda _: True)
 
     @property
@@ -54,7 +54,7 @@ class Timed(NamedTuple):
         return self.name or HEADER
 
     def pose(self, frame: str | None, stamp_ns: int) -> Components:
-        """Return the pose at one time, to the bit as `many` does; raises FrametoolError where there is none."""
+        """Return the pose at one time, to the bit as `many` does; raises FrametoolError if absent."""
         found = tuple(float(column[0]) for column in self.many(frame, [stamp_ns]))
         return found if found[0] == found[0] else self.one(frame, stamp_ns)
 

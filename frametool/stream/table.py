@@ -45,7 +45,7 @@ COUNTER = "frame"  # such a column often counts pictures
 class BlockNames(NamedTuple):
     """The names of a block's rows.
 
-    frames: the one each row is given in, or for look-ups the two, parted by NUL
+    frames: the one each row is expressed in, or for look-ups the two, parted by NUL
     spans: the names of the results, by role
     bad: rows whose names do not fit: column and reason
     lost: the first row whose result cannot name a frame, and that frame
@@ -108,7 +108,7 @@ class Naming:
         return self.counts is not None and self.counts(name)
 
     def _breaks(self, parents: Sequence[str]) -> dict[int, tuple[str, str]]:
-        """Find the rows that are given in another frame than the first."""
+        """Find the rows that are expressed in another frame than the first."""
         if self.before is None and parents:
             self.before = parents[0]
         reason = f"given in another frame than {self.before!r}, as the rows before are"
@@ -126,7 +126,7 @@ class Naming:
         return parent if counter else new[0] or "", new[1] or ""
 
     def _lost(self, pair: Texts, result: Texts | FrametoolError) -> str:
-        """Return the frame that a cell named and the result does not; "" if there is none."""
+        """Return the frame that a cell named and the result does not; "" if absent."""
         named = zip(self.places, pair, _named(result, pair), strict=True)
         return next((old for place, old, new in named if place is not None and old and not new), "")
 
@@ -166,7 +166,7 @@ def rename_of(request: Request) -> Rename | None:
 
 
 def unnamed(request: Request, shape: Shape) -> Names:
-    """Return the frames of results whose rows name none: what is placed on the Earth is given in its frame."""
+    """Return the frames of results whose rows name none: what is placed on the Earth is expressed in its frame."""
     own = EARTH_FRAMES[0] if shape.place is not None else None
     rename = rename_of(request.for_kind(shape.kind))
     return (own, None) if rename is None else rename(own, None)
@@ -203,7 +203,7 @@ def _text(cell: bytes) -> str:
 
 
 def _is_constant(column: Spans) -> bool:
-    """Tell whether all cells hold the same bytes."""
+    """Return True if all cells hold the same bytes."""
     length = int(column.ends[0] - column.starts[0])
     if length > MARGIN or (column.ends - column.starts != length).any():
         return False
@@ -212,7 +212,7 @@ def _is_constant(column: Spans) -> bool:
 
 
 def as_trajectory(table: Table, form: str, request: Request, source: str) -> Table:
-    """Say the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
+    """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
 
     Raises FormatError for a count of columns that the form does not have.
     """
@@ -285,7 +285,7 @@ class Table(NamedTuple):
         return self.names[place] if self.names else f"column {place + 1}"
 
     def opening(self, layout: Layout) -> bytes:
-        """Return what stands before the first row of the output: the header as it was where no column changes."""
+        """Return what is before the first row of the output: the header as it was where no column changes."""
         if not self.header:
             names = [each.name if isinstance(each, ADDED) else self.name(each.place) for each in layout.columns]
             grown = self.names and len(names) > self.width  # what was known by its count is not any more
@@ -298,7 +298,7 @@ class Table(NamedTuple):
 def open_table(
     block: bytes, form: str, *, header: bool, source: str, given: object = None
 ) -> tuple[Table, bytes]:
-    """Look at the first block; return the table and the block without what stands before the first row.
+    """Look at the first block; return the table and the block without what is before the first row.
 
     given: what --from says of numbers without names
     """
@@ -343,7 +343,7 @@ def _named_comment(
 ) -> tuple[bytes, tuple[bytes, ...], bytes, bytes] | None:
     """Take the last comment for the header if it has a word for each column and one of them is a name of ours.
 
-    Returns what stands before its words, the words, their line, and what follows up to the first row.
+    Returns what is before its words, the words, their line, and what follows up to the first row.
     """
     lines = [line for line in comments.splitlines(keepends=True) if line.strip()]
     if not lines:
@@ -450,7 +450,7 @@ def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) ->
 
 
 def _stretch(cells: Cells, first: int, last: int, begin: str, end: str) -> Spans:
-    """Return the span from one cell to another in every row, with what stands before or after as told."""
+    """Return the span from one cell to another in every row, with what is before or after."""
     if begin == "line":
         starts = cells.line_starts[cells.rows]
     else:

@@ -84,7 +84,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     name = None if stays else _first_called(NAME_KEYS, table)
     moves_each = on_earth or request.frames or (frames and request.operation.moves)
     edge_of = request.pose_from_frame if moves_each else None
-    asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # an empty cell is none
+    asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
     words, marked = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none))
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
     poses = [_written(pose) for pose in poses] if on_earth else poses
@@ -147,7 +147,7 @@ def _find(table: Table, request: Request, source: str) -> list[PoseColumns]:
 
 
 def _find_named(names: Sequence[str], request: Request, source: str) -> list[PoseColumns]:
-    """Find points, poses, a twist or a wrench by their names; beside a pose a twist is another column."""
+    """Find points, poses, a twist or a wrench by their names; with a pose a twist is another column."""
     six = find_six(names, request.kind if request.kind in SIX else "")
     if request.kind in SIX and six is None:
         wanted = " ".join(six_names(request.kind))
@@ -161,7 +161,7 @@ def _find_named(names: Sequence[str], request: Request, source: str) -> list[Pos
     if six is not None and (request.kind in SIX or not has_pose_column(others)):
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
-        others = list(names)  # what a pose has beside it would no longer be true
+        others = list(names)  # what a pose has with it would no longer be true
     if request.poses == 1 and (request.given_place or any(map(may_be_on_earth, names))):
         from frametool.stream.earth_columns import find_pose
 
@@ -206,7 +206,7 @@ def _find_if_read(table: Table, request: Request, source: str) -> list[PoseColum
 
 
 def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple[Shape, ...]:
-    """Say what the numbers of a row mean; those an expression asks for come last."""
+    """Return what the numbers of a row mean; those an expression asks for come last."""
     kinds = request.kinds or (request.kind,) * len(poses)
     shapes = tuple(row_shape(pose, request._replace(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
     if request.operation.formula is None:
@@ -250,7 +250,7 @@ def _written(pose: PoseColumns) -> PoseColumns:
 
 
 def _frame_columns(table: Table, request: Request, source: str, *, on_earth: bool) -> tuple[int, ...]:
-    """Find the columns that name frames: for look-ups those named, else the one a row is given in."""
+    """Find the columns that name frames: for look-ups those named, else the one a row is expressed in."""
     names = table.names or ()
     if on_earth:
         return tuple(place for place, name in enumerate(names) if name == PARENT_KEYS[0])[:1]
@@ -269,7 +269,7 @@ def _frame_columns(table: Table, request: Request, source: str, *, on_earth: boo
 
 
 def _first_called(names: Sequence[str], table: Table) -> int | None:
-    """Find the column of one of some names, the first of them that is there; a message's path may stand before it."""
+    """Find the column of one of some names, the first of them that is there; a message's path may be before it."""
     for name in names:
         for place, column in enumerate(table.names or ()):
             if column == name or ("_id" in name and column.endswith(f".{name}")):
@@ -383,7 +383,7 @@ def _several(
 
 
 def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request) -> bool:
-    """Tell whether each number of the result stands where one of the input did."""
+    """Return True if each number of the result is where one of the input did."""
     if request.poses != 1:
         return False
     same = not target.notations or shape.notation is None or _same(pose, target)
@@ -393,7 +393,7 @@ def _in_place(pose: PoseColumns, shape: Shape, target: Target, request: Request)
 
 
 def _same(pose: PoseColumns, target: Target) -> bool:
-    """Tell whether a rotation is written in the notation it was read in."""
+    """Return True if a rotation is written in the notation it was read in."""
     return pose.rotation is not None and [notation for notation, _ in target.notations] == [pose.rotation.notation]
 
 

@@ -2,7 +2,7 @@
 
 stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
 stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
-parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that stand still
+parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that are static
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _nameless(block: RowPoses, roles: Sequence[int]) -> dict[int, int]:
 def _pieces(
     block: RowPoses, times: Sequence[int] | None, line: int, form: Poses, options: Options
 ) -> Iterator[Edge | Samples]:
-    """Yield the poses of a block: as samples of one frame after the other, or as edges that stand still."""
+    """Yield the poses of a block: as samples of one frame after the other, or as edges that are static."""
     columns: Components = tuple(block.numbers.T)
     if len(columns) == len("xyzw"):
         columns = (*[columns[0] * 0.0] * 3, *columns)

@@ -157,7 +157,7 @@ class PlannedRows:
         return run
 
     def notes_of(self, run: Run, frames: Sequence[str | None]) -> list[RowNote]:
-        """Return warnings about the rows of a block; frames: that they are given in."""
+        """Return warnings about the rows of a block; frames: that they are expressed in."""
         notes = notes_of(run, run.block)
         if self.unasked is not None and run.count and moves_in_time(self.unasked, {*frames} or {None}):
             remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
@@ -213,7 +213,7 @@ class TablePoses(TableRows):
         if layout.time is None:
             time, below = stamp_places(table.names)
             if not table.names and not request.columns and min(layout.places, default=0) == 1:
-                time = 0  # what stands before the numbers that --from speaks of
+                time = 0  # what is before the numbers that --from speaks of
             layout = layout._replace(time=None if time in layout.frames else time, below=below)
         self.stamp_at = layout.time
         used = {layout.time, layout.below, *layout.places, *self.naming.places}
@@ -277,7 +277,7 @@ def stamps_for(block: RowPoses, file: StampFile | None, form: Poses, before: int
 
 
 def moves_in_time(timed: Timed, frames: set[str | None]) -> bool:
-    """Tell whether the way from one of some frames depends on the time; rows of unknown frames say so themselves."""
+    """Return True if the way from one of some frames depends on the time; rows of unknown frames say so themselves."""
     for frame in frames:
         with suppress(FrametoolError):
             if timed.moves(frame):

@@ -57,10 +57,10 @@ FRAME = {
 SINGLE_QUOTED = r"'[^'\x00-\x1f]*'"
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
 NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # as a covariance begins of which nothing is known
-# scalars under these keys decide what a record is, wherever in it they stand ..
+# scalars under these keys decide what a record is, wherever in it they are ..
 OF_PLACES = ("no-alt", "band-s", "stays", "left-out")  # the rules of notes on places, which rows do not tell
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_KEYS, *NAME_KEYS))
-# .. and these in the mappings that hold the record; a number alone under a word of others is none
+# .. and these in the mappings that hold the record, unless a number alone is under them
 _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
 )  # fmt: skip
@@ -79,7 +79,7 @@ class NamedFrames(NamedTuple):
 class Template:
     """The text of records, and what holds for all that are written alike.
 
-    stretches: where each part of the text stands
+    stretches: where each part of the text is
     numbers: the stretches that hold our numbers, in order; regular: whether all of them are written plainly
     stamps: the stretches of each entry's stamp
     frames: the stretches of the names of each entry's frames, parent and name; None where they are the same in all
@@ -121,7 +121,7 @@ class Template:
         self.line = text.count("\n", 0, min(self._numbers, default=(0, 0))[0])
 
     def _cuts(self) -> tuple[set[Span], dict[Span, str]]:
-        """Return where numbers, stamps, names and what else is read stand, and what else may stand there."""
+        """Return where numbers, stamps, names and what else is read are, and what else may be there."""
         text, root = self.text, self._root
         number = JSON_NUMBER if self.json else YAML_NUMBER
         is_number = re.compile(number).fullmatch
@@ -181,18 +181,18 @@ class Template:
 
     @property
     def beside(self) -> str:
-        """Return the last key that leads to what is read beside the numbers."""
+        """Return the last key that leads to what is read with the numbers."""
         return next((str(entry.stamp[0][-1]) for entry in self.entries if entry.stamp), "")
 
     def timed(self, request: Request) -> Timed | None:
-        """Return where stamps stand; a key that nobody named but was found says by its own name what they are."""
+        """Return where stamps are; a key that nobody named but was found says by its own name what they are."""
         found = next((entry.stamp[0][-1] for entry in self.entries if len(entry.stamp) == 1), "")
         if request.timed is None or request.timed.name or request.operation.formula is None:
             return request.timed
         return request.timed._replace(name=str(found))
 
     def places(self) -> list[tuple[int, int]]:
-        """Return where each stretch stands in the record that was learned, in bytes."""
+        """Return where each stretch is in the record that was learned, in bytes."""
         sizes = [len(self.text[start:end].encode()) for start, end in self.stretches]
         ends = list(accumulate(sizes))
         return list(zip([0, *ends[:-1]], ends, strict=True))
@@ -268,7 +268,7 @@ class Template:
         return "".join(groups).encode()
 
     def _cut_leaves(self, cuts: Collection[Span], patterns: dict[Span, str]) -> list[tuple[Span, Node]]:
-        """Return the scalars that decide nothing, without their quotes, and add what may stand there."""
+        """Return the scalars that decide nothing, without their quotes, and add what may be there."""
         found: list[tuple[Span, Node]] = []
         for node, pattern in self._free_leaves():
             span, quotes = (node.start, node.end), len(node.quote or "")
@@ -329,7 +329,7 @@ class Template:
 
 
 def _stem(key: str) -> str:
-    """Return a key without its unit: beside our numbers its scalar may be one of them or change what they mean."""
+    """Return a key without its unit: with our numbers its scalar may be one of them or change what they mean."""
     return re.split(r"[^a-z0-9_]|_(?:deg|rad|mm)", key.casefold(), maxsplit=1)[0]
 
 
@@ -365,5 +365,5 @@ def _as_frame(node: Node | None, *, json: bool) -> Node | None:
 
 
 def _text_of(node: Node) -> Span:
-    """Return where the text of a scalar stands, without its quotes."""
+    """Return where the text of a scalar is, without its quotes."""
     return node.start + bool(node.quote), node.end - bool(node.quote)

@@ -117,7 +117,7 @@ def read_trajectory(
 def split_name(text: str) -> tuple[str, list[str]]:
     """Take FILE:TOPIC or FILE:TARGET:SOURCE apart; the file is the longest beginning that is one.
 
-    Names with a colon stand in quotes.  Raises FileProblem.
+    Names with a colon are in quotes.  Raises FileProblem.
     """
     ends = [len(text), *(found.start() for found in reversed([*re.finditer(":", text)]))]
     end = next((end for end in ends if text[:end] == "-" or os.path.exists(text[:end])), None)
@@ -216,7 +216,7 @@ def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows) -
     found: list[tuple[RowPoses, Ints]] = []
 
     def outcomes() -> Iterator[Outcome]:
-        line = int(converter.is_table)  # what lists poses says itself where they stand
+        line = int(converter.is_table)  # what lists poses says itself where they are
         for poses, outcome in converter.steps(stream):
             if len(poses.numbers):
                 found.append((poses, poses.lines + line))

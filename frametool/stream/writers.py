@@ -70,7 +70,7 @@ MARK = "@@{}@@"
 
 
 def target_in(style: Style, kind: str, *, placed: bool) -> Target:
-    """Say which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
+    """Return which numbers of a result of some kind are written in a style; placed: whether poses have a position."""
     place: Any = style.place
     if kind != POSE:
         return Target(None, (), plain=True) if kind in SIX else Target(place or 1.0, (), three=True)
@@ -85,7 +85,7 @@ class TextWriter:
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
         """Choose how the form of a style is written.
 
-        kind: pose, point or vector; extras: the numbers beside each; placed: whether poses have a position
+        kind: pose, point or vector; extras: the numbers with each; placed: whether poses have a position
         Raises ValueInvalid for what the form does not hold, and for notations that it does not have.
         """
         if kind in SIX and style.format not in LEARNED:
@@ -143,7 +143,7 @@ class TextWriter:
         place.settle(*self._own(tuple(block.numbers.T))[:3])
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last pose, and tell what was left out."""
+        """Yield what comes behind the last pose, and warn of what was left out."""
         if self.fixed is None or self.dropped_fields is None:
             if self.dropped:
                 warn(f"{self.style.format}: {listing(self.dropped, MOST_NAMED)} left out")
@@ -253,7 +253,7 @@ class TextWriter:
         return self._filled(self.rows, block)
 
     def _own(self, columns: Components) -> Components:
-        """Return seven components and what comes beside them; a pose without a position is at 0."""
+        """Return seven components and what comes with them; a pose without a position is at 0."""
         own = tuple(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part for part in columns)
         return own if self.placed or self.kind != POSE else (*[own[0] * 0.0] * 3, *own)
 
@@ -356,7 +356,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 
 def _numbers(numbers: Spans, first: int, piece: Numbers) -> list[Spans]:
-    """Return the spans of neighbouring numbers, with what stands between them."""
+    """Return the spans of neighbouring numbers, with what is between them."""
     last = first + piece.size
     ends = numbers.ends[:, first:last].copy()
     if len(piece.between) == 1:

@@ -1,4 +1,4 @@
-"""Poses and records as they are written, for derivations: the numbers of a notation beside what they are."""
+"""Poses and records as they are written, for derivations: the numbers of a notation with what they are."""
 
 from __future__ import annotations
 
