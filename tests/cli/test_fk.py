@@ -164,6 +164,7 @@ def test_joints_without_a_column_are_told_by_options(run: Run) -> None:
         ((), "1,2,3,4\n", 1, "no names"),
         (("--no-header",), "1,2,3,4\n", 1, "the columns have no names"),
         ((), "", 1, "stdin: nothing in it"),
+        (("-j", "elbow=1"), "", 2, f"for one posture, frametool lookup {ARM} arm_base tool -j elbow=1;"),
         ((), "[1, 2]\n", 1, "expected a mapping with a key for each joint"),
         (("--columns", "1-3"), table(), 2, "--columns has no effect here"),
         (("--joints", "m.csv"), table(), 2, "--joints: elbow moves over time; stream that file with -i"),

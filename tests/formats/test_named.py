@@ -117,6 +117,14 @@ def test_frames_are_named_by_keys_beside_the_pose_or_by_its_own(run: Run, text: 
     assert tree(run, text) == f"frames:\n  - {{name: base}}\n  - {POSE}\n"
 
 
+def test_an_entry_of_a_list_without_a_name_is_told_the_keys(run: Run) -> None:
+    files = {"e.yaml": "transforms:\n- {from: base_link, to: camera, x: 1, y: 2, z: 3}\n"}
+    done = run("tree", "e.yaml", "--in", "named", files=files)
+    keys = "child_frame, child_frame_id, child; of its parent: parent_frame, parent_frame_id, frame_id, parent"
+    said = f"missing child; in a list an entry names its frame; keys: {keys}"
+    assert (done.status, said in done.err) == (1, True), done.err
+
+
 def test_what_was_assumed_is_told_and_changed_by_frames(run: Run) -> None:
     text = "lidar: {x: 1, y: 0, z: 0, topic: /scan}\ncam: {parent: lidar, x: 0, y: 1, z: 0}\n"
     done = run("lookup", "e.yaml", "base", "cam", files={"e.yaml": text})

@@ -165,7 +165,7 @@ REFUSED = {
         "0.yaml:1:34: frames below one with a pose are under children: {c: ..}",
     "frames: {a: {b: {children: [1]}}}": "0.yaml:1:28: expected the children as a mapping by name, found a list",
     "{frams: {}}":
-        "0.yaml:1:1: no frame tree: expected frames:, transforms: or an entry with name: and parent:; found the keys 'frams'",
+        "0.yaml:1:1: no frame tree: expected frames:, transforms: or an entry with name: and parent:; found the keys 'frams' (frametool help frames)",
     "{frames: {}, angels: deg}": "0.yaml:1:14: unknown key 'angels' next to frames; expected angles",
     "transforms: [{child_frame_id: b, header: {frame_id: a}}]":
         "0.yaml:1:14: missing transform; a TransformStamped has header, child_frame_id, transform",

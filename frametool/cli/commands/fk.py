@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from click import UsageError
+
 from frametool.cli.command import FILE, Inputs, argument, command_named, refuse
 from frametool.cli.options import STREAMED, reading_options, result_options, whole_pose_options
 from frametool.cli.output import Output
@@ -42,6 +44,9 @@ def command(inputs: Inputs) -> int:
     mimic joint follows its leader. For a single posture use `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
     stream, output = Stream(inputs), Output(inputs, "poses")
+    if (given := inputs.peek("joints")) and not stream.path and not stream.has_input():
+        posture = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in given)))
+        raise UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {posture}")
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
     rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))

@@ -95,7 +95,8 @@ def _entry(
     parent, child = (_frame(fields, keys) for keys in (PARENTS, CHILDREN))
     child = child or (None if type(name) is int else str(name))
     if child is None:
-        raise Misfit("missing child; in a list an entry names its frame")
+        accepted = f"{', '.join(CHILDREN)}; of its parent: {', '.join(PARENTS)}"
+        raise Misfit(f"missing child; in a list an entry names its frame; keys: {accepted}")
     for key in [key for key, value in fields.items() if _is_remark(key, value)]:
         left[key] = fields.pop(key)
     read = read_loose_pose(fields, reading, order=options.answers.order)

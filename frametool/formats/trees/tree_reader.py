@@ -91,7 +91,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
     else:
         raise Misfit(
             f"no frame tree: expected frames:, transforms: or an entry with name: and parent:; "
-            f"found the keys {shown_keys(value)}",
+            f"found the keys {shown_keys(value)} (frametool help frames)",
         )
 
 
