@@ -45,8 +45,8 @@ def command(inputs: Inputs) -> int:
     """
     stream, output = Stream(inputs), Output(inputs, "poses")
     if (given := inputs.peek("joints")) and not stream.path and not stream.has_input():
-        posture = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in given)))
-        raise UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {posture}")
+        words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in given)))
+        raise UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)
     rows = JointRows(robot, posture, frame_name(inputs.base, robot), frame_name(inputs.tip, robot))
