@@ -139,13 +139,13 @@ class SeveralClouds:
         refuse("-" in self.paths, "-i - among several: standard input holds one cloud; name files")
         if bags := [path for path in self.paths if is_bag(path)]:
             raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
-        forms = inputs().input_formats
-        told = [form for form in forms if "arrays" in FORMATS[form].reads]
+        formats = inputs().input_formats
+        told = [fmt for fmt in formats if "arrays" in FORMATS[fmt].reads]
         if len(told) not in (0, 1, len(self.paths)):
             raise click.UsageError(f"--in is given {len(told)} times for {len(self.paths)} clouds; once, or once each")
-        self.forms = told * (len(self.paths) if len(told) == 1 else 1) or [""] * len(self.paths)
+        self.formats = told * (len(self.paths) if len(told) == 1 else 1) or [""] * len(self.paths)
         self.frames = [name.strip() for text in inputs().named_frames for name in text.split(",")]
-        inputs().leave(input_formats=[form for form in forms if form not in told], named_frames=())
+        inputs().leave(input_formats=[fmt for fmt in formats if fmt not in told], named_frames=())
         if self.frames and len(self.frames) != len(self.paths):
             raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
 
@@ -168,18 +168,18 @@ class SeveralClouds:
         on_error = self.stream.inputs.on_error
         with ExitStack() as opened:
             planned = []
-            for path, told, frame in zip(self.paths, self.forms, self.frames or [""] * len(self.paths), strict=True):
+            for path, told, frame in zip(self.paths, self.formats, self.frames or [""] * len(self.paths), strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
-                file.format = form = told or detect(file.head(), "records", "rows", "arrays", name=path)[0]
-                if "arrays" not in FORMATS[form].reads:
+                file.format = fmt = told or detect(file.head(), "records", "rows", "arrays", name=path)[0]
+                if "arrays" not in FORMATS[fmt].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
-                    raise FormatError(f"{FORMATS[form].summary}, no cloud; {hint}", source=path)
+                    raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)
                 reading = Options(Diagnostics(), Topics(), answers=answers())
-                columns = import_module(FORMATS[form].reader).open_columns(file, reading)
+                columns = import_module(FORMATS[fmt].reader).open_columns(file, reading)
                 request = Request(Operation(left=way.from_frame(frame or None, None), moves=True), on_error=on_error)
                 planned.append((columns, request, path))
-            into = self.output.chosen or form
+            into = self.output.chosen or fmt
             refuse(not holds_arrays(into), f"several clouds become one cloud: -o all.ply, or -f; formats: {_WRITTEN}")
             refuse(self.output.path is self.output.chosen is None, "several clouds become one file: give -o all.ply")
             merged = MergedClouds(planned, self.output.style.with_format(into))

@@ -452,8 +452,8 @@ def _say_not_needed(given: Inputs) -> None:
     """Report on stderr which options change nothing, where only what was read or is written shows whether they do."""
     for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
         if chosen and not given.quiet and not any(ask in asks for _, asks in given.formats_read):
-            forms = " and ".join(dict.fromkeys(form for form, _ in given.formats_read if form))
-            why = f": {forms} specifies its {'own frames' if ask == 'frames' else 'camera axes'}" if forms else " here"
+            read = " and ".join(dict.fromkeys(fmt for fmt, _ in given.formats_read if fmt))
+            why = f": {read} specifies its {'own frames' if ask == 'frames' else 'camera axes'}" if read else " here"
             say(f"note: --{ask.replace('_', '-')} has no effect{why}")
 
 

@@ -95,7 +95,7 @@ trajectory_options = option("--on-error", "bad rows", (STOP, "skip"), default=ST
 
 
 def trajectory(
-    argument: str, on_error: str, form: str = "", *, normalize: bool = False
+    argument: str, on_error: str, fmt: str = "", *, normalize: bool = False
 ) -> tuple[Trajectory, str, bool]:
     """Read a trajectory of the command line; return it with what it is called, and whether rows were skipped."""
     from os.path import basename
@@ -110,7 +110,7 @@ def trajectory(
 
     known = answers()
     found = read_trajectory(
-        argument, form=form, topics=running().topics, answers=known._replace(time_offset=0), policy=policy,
+        argument, form=fmt, topics=running().topics, answers=known._replace(time_offset=0), policy=policy,
         normalize=normalize,
     )  # fmt: skip
     if found.stamps_ns is not None:
@@ -123,9 +123,9 @@ def trajectory(
 
 def formats_of(files: int) -> list[str]:
     """Return the format of each of several files as --in says, the last for the rest; "" where it says none."""
-    forms = list(running().input_formats)
-    refuse(len(forms) > files, f"--in is given {len(forms)} times for {files} files")
-    return forms + (forms[-1:] * (files - len(forms)) or [""] * files)
+    formats = list(running().input_formats)
+    refuse(len(formats) > files, f"--in is given {len(formats)} times for {files} files")
+    return formats + (formats[-1:] * (files - len(formats)) or [""] * files)
 
 
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
@@ -133,11 +133,11 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     from frametool.fit.comparison import compare
 
     refuse([ref, *ests].count("-") > 1, "standard input can be read once; only one trajectory may be -")
-    on_error, forms, chosen = inputs.on_error, formats_of(1 + len(ests)), _settings(inputs)
-    reference, ref_name, skipped = trajectory(ref, on_error, forms[0])
+    on_error, formats, chosen = inputs.on_error, formats_of(1 + len(ests)), _settings(inputs)
+    reference, ref_name, skipped = trajectory(ref, on_error, formats[0])
     found = []
-    for argument, form in zip(ests, forms[1:], strict=True):
-        estimate, name, some = trajectory(argument, on_error, form)
+    for argument, fmt in zip(ests, formats[1:], strict=True):
+        estimate, name, some = trajectory(argument, on_error, fmt)
         skipped |= some
         if (reference.stamps_ns is None) != (estimate.stamps_ns is None):
             lacking = ref_name if reference.stamps_ns is None else name

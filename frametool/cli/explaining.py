@@ -47,8 +47,8 @@ class PoseTask:
     def __init__(self, inputs: Inputs, *what: str) -> None:
         """Look at what the options say; `what` are the results that the command writes."""
         self.inputs = inputs
-        self._form: str = inputs.explain or ""
-        self.derives = bool(self._form)
+        self._format: str = inputs.explain or ""
+        self.derives = bool(self._format)
         self.normalize: bool = inputs.normalize
         self.stream = Stream(inputs)
         self.output = Output(inputs, *what or ("poses",))
@@ -146,7 +146,7 @@ class PoseTask:
 
     def write(self, explanation: Explanation) -> int:
         """Write a derivation where the result would go."""
-        self.output.text(explanation.render(self._form))
+        self.output.text(explanation.render(self._format))
         return 0
 
 

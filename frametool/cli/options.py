@@ -60,9 +60,9 @@ class Notations(Text):
 
     def read(self, text: str) -> tuple[Notation, ...]:
         """Look each name up."""
-        chosen = tuple(form for spec in text.split(",") for form in notations(spec.strip()))
-        for form in chosen:
-            form.bound_axes()  # euler without its axes is refused before any work
+        chosen = tuple(each for spec in text.split(",") for each in notations(spec.strip()))
+        for each in chosen:
+            each.bound_axes()  # euler without its axes is refused before any work
         return chosen
 
     def offers(self, ctx: click.Context, incomplete: str) -> Mapping[str, str]:  # noqa: ARG002
@@ -152,10 +152,10 @@ def _names_in(path: str) -> list[str]:
     try:
         with open(path, "rb") as file:
             head = file.read(HEAD)
-        form, _ = detect(head, "rows", "records", name=path)
-        if not FORMATS[form].is_table:
+        fmt, _ = detect(head, "rows", "records", name=path)
+        if not FORMATS[fmt].is_table:
             return sorted(".".join(each) for each in Beginning(head).json_paths)
-        return list(open_table(head, form, header=True, source=path)[0].names or ())
+        return list(open_table(head, fmt, header=True, source=path)[0].names or ())
     except (OSError, FrametoolError):
         return []  # nothing to offer, and a completion must not print
 
@@ -191,32 +191,32 @@ UTF8 = Utf8()
 
 # --- inputs --------------------------------------------------------------------------------------------------------
 
-_of_files, _of_times, _of_rotations, _of_results, _of_forms = (
+_of_files, _of_times, _of_rotations, _of_results, _of_formats = (
     partial(option, under=heading) for heading in ("Files", "Time", "Rotations", "Result", "Formats")
 )
 verbose_option = _of_files("-v --verbose", "report the detected format of each input")
 _IN = "format of the input (`frametool formats`), once per file"
 in_option = _of_files("--in FORM", _IN, FormatName(READ, "read"), name="input_formats", multiple=True)
-_CAMERA_AXES = _of_forms(
+_CAMERA_AXES = _of_formats(
     "--camera-axes", "axes of the cameras in a file; converts nothing  [default: those of its format]",
     CAMERA_AXES,
 )  # fmt: skip
-_STAMPS = _of_forms("--stamps FILE", "timestamps for poses without any, one per line")
-_EDGES = _of_forms("--edges", "read the edges of a g2o graph instead of its vertices")
+_STAMPS = _of_formats("--stamps FILE", "timestamps for poses without any, one per line")
+_EDGES = _of_formats("--edges", "read the edges of a g2o graph instead of its vertices")
 _TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)
-_ORDER = _of_forms("--from", "order of quaternions in lists of numbers", ORDERS, name="order")
+_ORDER = _of_formats("--from", "order of quaternions in lists of numbers", ORDERS, name="order")
 # of streams about trajectories: the topic of a bag, the times of their poses, the axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
 _READING = (
-    _of_forms("-j --joint NAME=VALUE", "value of a robot's joint: radians or metres, 30deg, 2cm, a POSE; "
+    _of_formats("-j --joint NAME=VALUE", "value of a robot's joint: radians or metres, 30deg, 2cm, a POSE; "
               "may be repeated", JointSetting(), name="joints", multiple=True),
-    _of_forms("--joints FILE", "joint values: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
+    _of_formats("--joints FILE", "joint values: a map, JointState messages, CSV, MJCF:KEY", name="joint_files",
               multiple=True),
-    _of_forms("--frames WORLD,BODY", "frame names that a format does not store; may be repeated, "
+    _of_formats("--frames WORLD,BODY", "frame names that a format does not store; may be repeated, "
               "in the order of the files", name="named_frames", multiple=True),
-    _of_forms("--direction", "direction of matrices whose key does not say it", DIRECTIONS),
+    _of_formats("--direction", "direction of matrices whose key does not say it", DIRECTIONS),
     _CAMERA_AXES,
-    _of_forms("--dh", "convention of Denavit-Hartenberg parameters", DH),
+    _of_formats("--dh", "convention of Denavit-Hartenberg parameters", DH),
     _STAMPS,
 )  # fmt: skip
 
@@ -240,10 +240,10 @@ def input_formats(*, streams: bool = False) -> tuple[list[str], str]:
 
     streams: there is a stream; its format is the last one that can be streamed, "" if there is none
     """
-    forms = list(inputs().input_formats)
-    streamed = [at for at, form in enumerate(forms) if streams and not {*STREAMED}.isdisjoint(FORMATS[form].reads)]
-    of_stream = forms.pop(streamed[-1]) if streamed else ""
-    return forms, of_stream
+    formats = list(inputs().input_formats)
+    streamed = [at for at, fmt in enumerate(formats) if streams and not {*STREAMED}.isdisjoint(FORMATS[fmt].reads)]
+    of_stream = formats.pop(streamed[-1]) if streamed else ""
+    return formats, of_stream
 
 
 def say_if_verbose(text: str) -> None:
@@ -285,9 +285,9 @@ frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, name="record
 
 def result_options(*what: str) -> Adds:
     """Add to a command the options that shape and place its result; `what` it writes decides the formats."""
-    forms = writers(*what)
-    recording = [] if set(forms).isdisjoint(writers("recording")) else _RECORDING
-    kind = FormatName(("text", *forms), "written here")
+    formats = writers(*what)
+    recording = [] if set(formats).isdisjoint(writers("recording")) else _RECORDING
+    kind = FormatName(("text", *formats), "written here")
     chosen = option("-f --format FORMAT", "of the result (frametool formats)", kind, name="format_name")
     return together(chosen, *_PLACE, PRECISION, *recording)
 
@@ -297,8 +297,8 @@ def list_options(*more: str) -> Adds:
 
     more: formats besides text and those of reports
     """
-    forms = "text", *writers("report"), *more
-    return together(option("-f --format", "of the result  [default: text]", forms, name="format_name"), *_PLACE)
+    formats = "text", *writers("report"), *more
+    return together(option("-f --format", "of the result  [default: text]", formats, name="format_name"), *_PLACE)
 
 
 _TO = together(

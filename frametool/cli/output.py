@@ -69,26 +69,26 @@ class Output:
 
             notations, place = places_of(notations)
         self.notations: tuple[Notation, ...] = notations
-        self._form_is_default = not (self.chosen or otherwise)
-        form = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
-        self._holds_arrays = table.holds_arrays(form)
-        self.is_trajectory = table.is_trajectory(form)  # of the poses of one frame over time
-        self._in_blocks = self.is_trajectory or self._holds_arrays or table.is_recording(form)
-        self.holds_all = self._in_blocks or form == "csv"  # rows, of which there may be many
+        self._format_is_default = not (self.chosen or otherwise)
+        fmt = self.chosen or otherwise or ("text" if self.path is None and sys.stdout.isatty() else "yaml")
+        self._holds_arrays = table.holds_arrays(fmt)
+        self.is_trajectory = table.is_trajectory(fmt)  # of the poses of one frame over time
+        self._in_blocks = self.is_trajectory or self._holds_arrays or table.is_recording(fmt)
+        self.holds_all = self._in_blocks or fmt == "csv"  # rows, of which there may be many
         if self._holds_arrays and self.path is None and sys.stdout.isatty():
-            raise ValueInvalid(f"{form} is no text for a terminal; give -o FILE, or pipe it")
-        usual = () if form in ("text", "dot", "mermaid") else (notation("quaternion"),)  # drawings choose their own
+            raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
+        usual = () if fmt in ("text", "dot", "mermaid") else (notation("quaternion"),)  # drawings choose their own
         digits = inputs.peek("precision")
         self.style = Style(
-            form, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
+            fmt, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
             full=digits is not None, keep_sign=bool(inputs.keep_sign),
         )  # fmt: skip
         self.style.screen = self.chosen in (None, "text") and self.path is None and sys.stdout.isatty()
         self.style.put_at(place)
-        if table.is_recording(form):
+        if table.is_recording(fmt):
             from frametool.cli.recording import recorded
 
-            self.style.recording = recorded(inputs, form, self.path)
+            self.style.recording = recorded(inputs, fmt, self.path)
 
     def check_target(self, target: str) -> None:
         """Stop where places are asked for of what is seen from another frame than the Earth's."""
@@ -118,7 +118,7 @@ class Output:
         self.marks += seen, rf"\(maps points in (?P<green>{source}) to points in (?P<cyan>{target})\)"
 
     def _refuse_place(self) -> None:
-        """Stop where a form has no place for latitude and longitude."""
+        """Stop where a format has no place for latitude and longitude."""
         if self.style.place is not None and self.style.format not in WITH_PLACES:
             names = ", ".join(each.name for each in (self.style.place, *self.style.place.more))
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
@@ -249,7 +249,7 @@ class Output:
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""
-        if tree.drawn and self._form_is_default:
+        if tree.drawn and self._format_is_default:
             self.style = self.style.with_format("text")
         if tree.drawn and self.style.format != "text":
             raise ValueInvalid(f"{tree.name} has no poses to write as {self.style.format}; -f text shows its frames")
@@ -278,7 +278,7 @@ class Output:
 
     def report_lock(self, poses: Sequence[Pose]) -> None:
         """Report that the Euler angles of a single result are not unique."""
-        if len(poses) == 1 and any(is_locked(poses[0], form) for form in self.style.notations):
+        if len(poses) == 1 and any(is_locked(poses[0], each) for each in self.style.notations):
             say("note: gimbal lock: the angles are not unique; the third was set to 0")
 
     def points(self, records: Iterable[dict[str, Any]]) -> None:
@@ -331,18 +331,18 @@ class Output:
         """Open the place where results go."""
         return opened_place(self.style.format, self.path, force=self.force)
 
-    def report_suffix(self, form: str = "") -> None:
+    def report_suffix(self, fmt: str = "") -> None:
         """Report the format of a file whose suffix names none, where none was chosen.
 
-        form: of a stream, which keeps that of its input: a suffix of any text, or its own, goes without a note
+        fmt: of a stream, which keeps that of its input: a suffix of any text, or its own, goes without a note
         """
-        if not self._form_is_default or not self.path or self._inputs.peek("quiet"):
+        if not self._format_is_default or not self.path or self._inputs.peek("quiet"):
             return
         suffix = splitext(self.path)[1]
-        usual = (*OF_TEXT, f".{form}", *table.FORMATS[form].suffixes) if form else ()
+        usual = (*OF_TEXT, f".{fmt}", *table.FORMATS[fmt].suffixes) if fmt else ()
         if suffix.lower() not in ("", *usual) and not is_special(self.path):
             none = f"no format written here has the suffix {shown(suffix)}"
-            say(f"note: {self.path}: {none}; it holds {form or self.style.format}, -f says another")
+            say(f"note: {self.path}: {none}; it holds {fmt or self.style.format}, -f says another")
 
     def text(self, text: str) -> None:
         """Write text."""
@@ -368,16 +368,16 @@ def _in_blocks(rows: BlockResults) -> Iterator[list[Value] | RowPoses]:
     return _batched(rows.in_order()) if posed is None else iter([posed])
 
 
-def _only_mover(tree: FrameTree | TransformBuffer, form: str) -> str:
+def _only_mover(tree: FrameTree | TransformBuffer, fmt: str) -> str:
     """Return the one frame of a tree that has a parent; raise ValueInvalid for several."""
     children = [track.child for track in tree.tracks()]
     if len(children) != 1:
         frames = first_of(children, 8, quote=shown) or "none"
-        instead = f"name two: lookup TREE TARGET SOURCE -f {form}"
-        raise ValueInvalid(f"{form} holds one frame, the tree has {frames}; {instead}")
+        instead = f"name two: lookup TREE TARGET SOURCE -f {fmt}"
+        raise ValueInvalid(f"{fmt} holds one frame, the tree has {frames}; {instead}")
     return children[0]
 
 
-def opened_place(form: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
+def opened_place(fmt: str, path: str | None, *, force: bool) -> AbstractContextManager[Write]:
     """Open the place where results of a format go."""
-    return filling(path, force=force) if table.is_folder(form) and path is not None else writing(path, force=force)
+    return filling(path, force=force) if table.is_folder(fmt) and path is not None else writing(path, force=force)

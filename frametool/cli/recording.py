@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from frametool.cli.command import Inputs
 
 
-def recorded(chosen: Inputs, form: str, output: str | None) -> Recorded:
+def recorded(chosen: Inputs, fmt: str, output: str | None) -> Recorded:
     """Return what of results a recording of a format holds, as options say; raises UsageError."""
-    place = _place(form, output)
+    place = _place(fmt, output)
     told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
     frames = tuple(name.strip() for name in told.split(",")) if told else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
@@ -30,15 +30,15 @@ def recorded(chosen: Inputs, form: str, output: str | None) -> Recorded:
     return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 
-def _place(form: str, output: str | None) -> str:
+def _place(fmt: str, output: str | None) -> str:
     """Return where a recording is written; raises UsageError where it cannot be."""
     if output is None or output == "-":
-        raise UsageError(f"{form} is no text; give -o {'FOLDER' if is_folder(form) else 'FILE'}")
-    if is_folder(form) and output.endswith(FORMATS[form].suffixes):
-        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {form} -o FOLDER")
-    named = None if is_folder(form) else by_name(output, writers("recording"))
-    if named not in (None, form):
-        raise UsageError(f"-o {output} is the name of {named}, -f says {form}; give -o NEW{FORMATS[form].suffixes[0]}")
+        raise UsageError(f"{fmt} is no text; give -o {'FOLDER' if is_folder(fmt) else 'FILE'}")
+    if is_folder(fmt) and output.endswith(FORMATS[fmt].suffixes):
+        raise UsageError(f"-o {output}: a ROS 2 bag is written as a folder of MCAP; give -f {fmt} -o FOLDER")
+    named = None if is_folder(fmt) else by_name(output, writers("recording"))
+    if named not in (None, fmt):
+        raise UsageError(f"-o {output} is the name of {named}, -f says {fmt}; give -o NEW{FORMATS[fmt].suffixes[0]}")
     return output
 
 
@@ -48,8 +48,8 @@ def folder_of(place: str) -> str:
     return folder if os.path.isdir(folder) else ""
 
 
-def copied_as(form: str, path: str, output: str | None, told: str | None) -> tuple[str, str]:
-    """Return the form that a recording of some form is copied in, and its place; raises UsageError where none can be.
+def copied_as(fmt: str, path: str, output: str | None, told: str | None) -> tuple[str, str]:
+    """Return the format in which a recording is copied, and its place; raise UsageError where none can be.
 
     told: the format, where the name of the place does not say it
     """
@@ -57,10 +57,10 @@ def copied_as(form: str, path: str, output: str | None, told: str | None) -> tup
     copy = told or by_name(output, writers("recording")) or folder
     if copy is None:
         unknown = f"-o {output} names no format; " if output else ""
-        raise UsageError(f"{unknown}give {'-o NEW.bag' if form == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")
+        raise UsageError(f"{unknown}give {'-o NEW.bag' if fmt == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")
     place = _place(copy, output)
-    if "bag1" in (form, copy) and form != copy:
-        what = f"{path} is copied as {'a ROS 1 bag' if form == 'bag1' else 'mcap or bag2'}, not as {copy}"
+    if "bag1" in (fmt, copy) and fmt != copy:
+        what = f"{path} is copied as {'a ROS 1 bag' if fmt == 'bag1' else 'mcap or bag2'}, not as {copy}"
         raise UsageError(f"{what}; rosbags-convert --src {path} --dst {output} makes that of it")
     return copy, place
 

@@ -203,8 +203,8 @@ def style_of(inputs: Inputs) -> Style:
     """Choose the format: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe."""
     output, precision = inputs.output, inputs.precision
     is_text = suffix_of(output or "") == ".txt" or (output is None and sys.stdout.isatty())
-    form = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
-    return Style(form, precision=None if precision == FULL else precision)
+    fmt = inputs.format_name or by_suffix(output, ("yaml", "json", "csv")) or ("text" if is_text else "yaml")
+    return Style(fmt, precision=None if precision == FULL else precision)
 
 
 def leader_of(inputs: Inputs) -> MakeLeader:

@@ -131,8 +131,8 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
 
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
-        form, columns, normalize = formats_of(1)[0], inputs.columns or (), inputs.normalize
-        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, form=form, columns=columns)
+        fmt, columns, normalize = formats_of(1)[0], inputs.columns or (), inputs.normalize
+        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, form=fmt, columns=columns)
     else:
         samples = _paired(inputs, files)
     named = [each or name for each, name in zip(samples.names, NAMES, strict=True)]
@@ -168,7 +168,7 @@ def _paired(inputs: Inputs, files: Sequence[str]) -> HandEyeSamples:
     from frametool.fit.alignment import paired_samples
 
     named, gap = zip(files, formats_of(2), strict=True), inputs.max_gap_ns
-    read = [trajectory(file, STOP, form, normalize=inputs.normalize)[:2] for file, form in named]
+    read = [trajectory(file, STOP, fmt, normalize=inputs.normalize)[:2] for file, fmt in named]
     (gripper, first), (target, second) = read
     for each, name in read:
         refuse(gap is not None and each.stamps_ns is None, f"--max-gap is not used: {name} has no stamps")
@@ -184,7 +184,7 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
         return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
 
     named = zip(files, formats_of(2), strict=True)
-    a, b = (read_points(file, form=form, answers=answers(), policy=policy) for file, form in named)
+    a, b = (read_points(file, form=fmt, answers=answers(), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
     names = target, source = tuple(inputs.names or found_names)
     pairs = matched(a, b)

@@ -84,10 +84,10 @@ class Stream:
             if not self._opened.seekable():
                 from frametool.text.lines import arrived
 
-                self._opened = arrived(self._opened, self._shows_form, HEAD)
+                self._opened = arrived(self._opened, self._shows_format, HEAD)
         return self._opened
 
-    def _shows_form(self, begin: bytes) -> bool:
+    def _shows_format(self, begin: bytes) -> bool:
         """Return True if what comes later does not change the format that is found."""
         if has_record(begin):
             return True
@@ -120,14 +120,14 @@ class Stream:
     def read_clouds_as_rows(self) -> None:
         """Let the points of a cloud be rows of CSV, which has room for more columns."""
         begin = self.opened().peek()
-        form = "" if self.within else self.chosen_format() or (_signed(begin, self.name) if begin else "")
-        if holds_arrays(form):
+        fmt = "" if self.within else self.chosen_format() or (_signed(begin, self.name) if begin else "")
+        if holds_arrays(fmt):
             from frametool.text.lines import Pieces
 
             opened = self.opened()
-            self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(form, opened), opened)), "csv"
+            self._opened, self.within = BufferedReader(Pieces(self._rows_of_cloud(fmt, opened), opened)), "csv"
 
-    def _rows_of_cloud(self, form: str, opened: BufferedReader) -> Iterator[bytes]:
+    def _rows_of_cloud(self, fmt: str, opened: BufferedReader) -> Iterator[bytes]:
         from frametool.cli.trees import answers
         from frametool.grammar.result import Style
         from frametool.stream.as_poses import FormatConverter
@@ -135,7 +135,7 @@ class Stream:
 
         bad, row = self.policy(self.name, "row"), 1
         request = Request(on_error=self.inputs.on_error, by_default=True)
-        for made in FormatConverter(form, request, Style("csv", ()), self.name, answers()).outcomes(opened):
+        for made in FormatConverter(fmt, request, Style("csv", ()), self.name, answers()).outcomes(opened):
             bad.take([fault._replace(line=fault.line + row) for fault in made.faults])
             row += made.lines
             if made.text:
@@ -159,7 +159,7 @@ class Stream:
         What can be read once only, as `<(command)`, is streamed whatever it holds.
         """
         once = os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path))
-        is_rows = once or _may_be_bag(path) or (self.chosen_format() or _form_of(path)) not in ("", *RECORDS)
+        is_rows = once or _may_be_bag(path) or (self.chosen_format() or _format_of(path)) not in ("", *RECORDS)
         if path == "-" or not is_rows:
             return False
         self.path = path
@@ -167,11 +167,11 @@ class Stream:
 
     def chosen_format(self) -> str:
         """Return the format that --in names for the stream, "" if it names none."""
-        others, form = options.input_formats(streams=True)
+        others, fmt = options.input_formats(streams=True)
         if others and not self.inputs.reads_trees:
-            both = f"--in {others[0]} and --in {form}: there is one stream"
-            raise click.UsageError(both if form else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
-        return form
+            both = f"--in {others[0]} and --in {fmt}: there is one stream"
+            raise click.UsageError(both if fmt else f"--in {others[0]} is not streamed; streams are {_STREAMS}")
+        return fmt
 
     @property
     def name(self) -> str:
@@ -194,44 +194,44 @@ class Stream:
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever format it is."""
-        form = self.within or self.chosen_format()
-        signed = form or _signed(stream.peek(), self.name)
+        fmt = self.within or self.chosen_format()
+        signed = fmt or _signed(stream.peek(), self.name)
         is_listed = is_trajectory(signed) or holds_arrays(signed)
-        if not (form or tables_only or self._says_columns() or is_listed):
+        if not (fmt or tables_only or self._says_columns() or is_listed):
             from frametool.cli.poses import pasted_stream
 
             pasted, stream = pasted_stream(stream, self.name, request, self.given, self.given_place)
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
-        form = form or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
-        if form == "kitti" and self.given and not self.chosen_format():
-            form = "columns"  # --from says what the numbers are, and nothing of pictures
+        fmt = fmt or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
+        if fmt == "kitti" and self.given and not self.chosen_format():
+            fmt = "columns"  # --from says what the numbers are, and nothing of pictures
         if request.poses:
-            self.inputs.ask("camera_axes", *FORMATS[form].required_options)
-        if output.chosen is None and (output.path or "").endswith(".bin") and not form.endswith("-bin"):
+            self.inputs.ask("camera_axes", *FORMATS[fmt].required_options)
+        if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
-        refuse(tables_only and form in RECORDS, f"frames are looked up for the rows of a table, not of {form}")
-        request = self._completed(request, output, form)
-        if request.offset_ns and form in RECORDS:
+        refuse(tables_only and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
+        request = self._completed(request, output, fmt)
+        if request.offset_ns and fmt in RECORDS:
             from frametool.stream.record_stream import at_other_times
 
-            stream = at_other_times(stream, form, request.offset_ns)
-        elif request.offset_ns and "arrays" in FORMATS[form].reads:
-            raise click.UsageError(f"--time-offset is for text, {form} holds numbers; convert it to csv first")
-        output.take_axes(FORMATS[form].poses.axes, request.operation)
-        if is_trajectory(form) and not output.notations:
+            stream = at_other_times(stream, fmt, request.offset_ns)
+        elif request.offset_ns and "arrays" in FORMATS[fmt].reads:
+            raise click.UsageError(f"--time-offset is for text, {fmt} holds numbers; convert it to csv first")
+        output.take_axes(FORMATS[fmt].poses.axes, request.operation)
+        if is_trajectory(fmt) and not output.notations:
             request = request._replace(notations=())  # its rows stay what they are
-        if form in RECORDS and (output.chosen or form) != form and request.gathered is None:
-            return self._run_as_values(stream, form, request, output)
-        way = self._way(form, request, output)
-        asked = tuple(ask for ask in FORMATS[form].required_options if way != self._as_text or ask == "camera_axes")
-        self.inputs.formats_read = (*self.inputs.formats_read, (form, asked))
-        outcomes, about = way(stream, form, request, output)
-        bad = self.policy(self.name, "row" if holds_arrays(form) else "line")
+        if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:
+            return self._run_as_values(stream, fmt, request, output)
+        way = self._way(fmt, request, output)
+        asked = tuple(ask for ask in FORMATS[fmt].required_options if way != self._as_text or ask == "camera_axes")
+        self.inputs.formats_read = (*self.inputs.formats_read, (fmt, asked))
+        outcomes, about = way(stream, fmt, request, output)
+        bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
         outcomes = outcomes if request.gathered is None else request.gathered.placing(outcomes, bad.place)
         status = self._write(outcomes, output, bad, gathers=request.gathered is not None)
         if output.path and request.gathered is None:
-            output.report_suffix(_kept(form, output) if way == self._as_poses else form)
+            output.report_suffix(_kept(fmt, output) if way == self._as_poses else fmt)
         if about is not None and (assumed := about()) and not self.inputs.quiet:
             say(f"{self.name}: {assumed}")
         return status
@@ -240,31 +240,31 @@ class Stream:
         """Find the format of the stream by what it begins with, and by its name."""
         from frametool.formats.detect import detect
 
-        form, known_by = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
+        fmt, known_by = detect(begin, *options.STREAMED, name=self.path or "", otherwise="columns" if is_table else "")
         if known_by and not quiet:
-            options.say_if_verbose(f"{self.name}: read as {form} ({FORMATS[form].summary}), known by {known_by}")
-        return form
+            options.say_if_verbose(f"{self.name}: read as {fmt} ({FORMATS[fmt].summary}), known by {known_by}")
+        return fmt
 
-    def _way(self, form: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
+    def _way(self, fmt: str, request: Request, output: Output) -> Callable[..., tuple[Generator[Outcome], About]]:
         """Choose how rows become results: their text edited, as columns of numbers, or as poses in another format."""
         from frametool.formats.rows.pose_rows import is_turned
         from frametool.stream.row_layout import POSE, Shape
 
         gathers = request.gathered is not None
-        if holds_arrays(form) and (gathers or output.chosen is None or holds_arrays(output.chosen)):
+        if holds_arrays(fmt) and (gathers or output.chosen is None or holds_arrays(output.chosen)):
             return self._as_columns
-        listed = holds_arrays(form) or (is_trajectory(form) and not FORMATS[form].is_table)
-        is_kindred = output.chosen == "csv" and form in ("tsv", "semicolon")
-        if gathers or form in RECORDS or is_kindred:
+        listed = holds_arrays(fmt) or (is_trajectory(fmt) and not FORMATS[fmt].is_table)
+        is_kindred = output.chosen == "csv" and fmt in ("tsv", "semicolon")
+        if gathers or fmt in RECORDS or is_kindred:
             return self._as_poses if gathers and listed else self._as_text
         # a trajectory has no room for more columns, or for other ones
         no_room = output.is_trajectory and bool(request.extras(Shape(POSE)) or output.notations)
         no_room |= output.is_trajectory and output.style.place is not None
         turns = bool(output.style.axes) and not output.notations
-        no_room |= turns and is_turned(output.style.with_format(output.chosen or form))
-        return self._as_poses if listed or no_room or output.chosen not in (None, form) else self._as_text
+        no_room |= turns and is_turned(output.style.with_format(output.chosen or fmt))
+        return self._as_poses if listed or no_room or output.chosen not in (None, fmt) else self._as_text
 
-    def _as_columns(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
+    def _as_columns(self, stream: Any, fmt: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write columns of numbers in the format they came in, or in another that holds such."""
         from importlib import import_module
 
@@ -274,42 +274,42 @@ class Stream:
         from frametool.stream.column_stream import run_columns
 
         if output.path is None and request.gathered is None and sys.stdout.isatty():
-            raise click.UsageError(f"{form} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
-        module: Any = import_module(FORMATS[form].reader)
+            raise click.UsageError(f"{fmt} is no text for a terminal; give -o FILE, or -f csv, or pipe it")
+        module: Any = import_module(FORMATS[fmt].reader)
         file = InputFile(self.path or "-", stream)
-        file.format = form
+        file.format = fmt
         opened = module.open_columns(file, Options(Diagnostics(), Topics(), answers=answers()))
         into: Any = module
         if output.chosen is not None and request.gathered is None:
             into = import_module(FORMATS[output.chosen].writer)
-        style = output.style.with_format(output.chosen or form)
+        style = output.style.with_format(output.chosen or fmt)
         request = request._replace(by_default=not output.notations)
         return run_columns(opened, request, style, source=self.name, into=None if into is module else into), None
 
-    def _as_poses(self, stream: Any, form: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
+    def _as_poses(self, stream: Any, fmt: str, request: Request, output: Output) -> tuple[Generator[Outcome], About]:
         """Write the results of rows, or of poses that no table holds, in another format."""
         from frametool.cli.trees import answers
         from frametool.stream.as_poses import FormatConverter
 
-        target = output.chosen or _kept(form, output)
+        target = output.chosen or _kept(fmt, output)
         if target not in FORMATS:
-            raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {form}")
+            raise click.UsageError(f"--format {target} is for single results and records, not for a stream of {fmt}")
         request = request._replace(by_default=not output.notations)
-        converted = FormatConverter(form, request, output.style.with_format(target), self.name, answers())
+        converted = FormatConverter(fmt, request, output.style.with_format(target), self.name, answers())
         outcomes = converted.outcomes(stream, header=self.inputs.header)
         return outcomes, lambda: converted.tally.assumed
 
-    def _as_text(self, stream: Any, form: str, request: Request, _output: Output) -> tuple[Generator[Outcome], None]:
+    def _as_text(self, stream: Any, fmt: str, request: Request, _output: Output) -> tuple[Generator[Outcome], None]:
         """Put the results where the numbers stood; all other text stays."""
         if request.gathered is not None:
             request = request._replace(notations=())
-        if form in RECORDS:
+        if fmt in RECORDS:
             from frametool.stream.record_stream import run_records
 
-            return run_records(stream, form, request, source=self.name), None
+            return run_records(stream, fmt, request, source=self.name), None
         from frametool.stream.table_stream import run_table
 
-        return run_table(stream, form, request, source=self.name, header=self.inputs.header), None
+        return run_table(stream, fmt, request, source=self.name, header=self.inputs.header), None
 
     def _says_columns(self) -> bool:
         """Return True if an option says that the stream is a table."""
@@ -328,7 +328,7 @@ class Stream:
         output.values(results(source, request, output.style))
         return 0
 
-    def _run_as_values(self, stream: Any, form: str, request: Request, output: Output) -> int:
+    def _run_as_values(self, stream: Any, fmt: str, request: Request, output: Output) -> int:
         """Write the results of records in another format than theirs."""
         from frametool.stream.record_results import stream_rows
 
@@ -338,31 +338,31 @@ class Stream:
         request = request._replace(by_default=has_no_text(output.chosen or "") and not output.notations)
         if is_recording(output.chosen or ""):
             request = request._replace(place=None)  # a fix is made of ecef, unless of what was read
-        output.rows(_then_closed(self.opened(), stream_rows(stream, form, request, output.style, bad)))
+        output.rows(_then_closed(self.opened(), stream_rows(stream, fmt, request, output.style, bad)))
         return ROWS_SKIPPED if bad.count else 0
 
     def policy(self, name: str, counted: str = "line") -> BadRows:
         """Return what reports and counts the bad rows of a source."""
         return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=self._tell, counted=counted)
 
-    def _completed(self, request: Request, output: Output, form: str) -> Request:
+    def _completed(self, request: Request, output: Output, fmt: str) -> Request:
         """Add what the stream's options say to the request."""
         told = self.inputs
         adds = bool(request.poses) or request.operation.formula is None  # look-ups add by themselves
-        if form not in RECORDS and output.chosen not in RECORDS and adds and request.gathered is None:
+        if fmt not in RECORDS and output.chosen not in RECORDS and adds and request.gathered is None:
             request = request._replace(keep=told.keep)
-        if (form not in RECORDS or request.operation.only_adds) and request.gathered is None:
+        if (fmt not in RECORDS or request.operation.only_adds) and request.gathered is None:
             request = request._replace(prefix=told.prefix)
         if request.poses:
             told.ask("given")
             request = request._replace(columns=told.columns)
-        several = form in RECORDS and "," in ",".join(request.columns)
+        several = fmt in RECORDS and "," in ",".join(request.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
-        if not has_no_text(output.chosen or form):
+        if not has_no_text(output.chosen or fmt):
             told.ask("precision")
         return request._replace(
             given=request.given or self.given, notations=request.notations or output.notations,
-            place=output.style.with_format(output.chosen or form).place, given_place=self.given_place,
+            place=output.style.with_format(output.chosen or fmt).place, given_place=self.given_place,
             precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=told.on_error,
         )  # fmt: skip
 
@@ -382,9 +382,9 @@ class Stream:
             return run(outcomes, write, bad, progress.advance)
 
 
-def _kept(form: str, output: Output) -> str:
+def _kept(fmt: str, output: Output) -> str:
     """Return the format in which poses that no table holds are written, if none is chosen."""
-    return form if "poses" in FORMATS[form].writes and not output.notations else "csv"
+    return fmt if "poses" in FORMATS[fmt].writes and not output.notations else "csv"
 
 
 def _then_closed(stream: Any, results: Iterable[Any]) -> Iterator[Any]:
@@ -402,8 +402,8 @@ def _signed(begin: bytes, name: str) -> str:
     """Return the format that a stream shows, if it is no single row of a pose, which may have been pasted."""
     from frametool.formats.detect import by_sign
 
-    form = by_sign(begin, *options.STREAMED, name=name) or ""
-    return "" if form == "kitti" else form
+    fmt = by_sign(begin, *options.STREAMED, name=name) or ""
+    return "" if fmt == "kitti" else fmt
 
 
 def _opened(path: str | None) -> BufferedReader:
@@ -421,7 +421,7 @@ def _opened(path: str | None) -> BufferedReader:
         raise FileProblem(f"{path or repr(path)}: {(error.strerror or str(error)).lower()}") from None
 
 
-def _form_of(path: str) -> str:
+def _format_of(path: str) -> str:
     """Return the format of a file by what is in it; "" where nothing tells, or it cannot be read."""
     from frametool.formats.detect import detect
 

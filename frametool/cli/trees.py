@@ -132,8 +132,8 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
 
     key = tuple(named), f"{options} {[given.peek(name) for name in OF_FILES]}"
     files = [each for each in named if not is_inline(each) and os.path.exists(each)]
-    value, forms, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
-    given.formats_read = (*before, *forms)
+    value, formats, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
+    given.formats_read = (*before, *formats)
     given.ask(*asked)
     return value
 
@@ -169,22 +169,22 @@ def opened(
         raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
     chosen = inputs()
     chosen.reads_trees = True
-    forms, named = input_formats(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
+    formats, named = input_formats(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
     reads = ("tree", "drawing") if drawings else ("tree",)
-    if other := [form for form in forms if {*reads}.isdisjoint(FORMATS[form].reads)]:
+    if other := [fmt for fmt in formats if {*reads}.isdisjoint(FORMATS[fmt].reads)]:
         raise click.UsageError(f"--in {other[0]}: no frames are read from that; `frametool formats` lists what is")
     files = of or len(arguments)
-    for option, values in (("--in", forms), ("--frames", named)):
+    for option, values in (("--in", formats), ("--frames", named)):
         if not streams and len(values) > files:
             times = f"{len(values)} times for {files} file{'s' * (files != 1)}"
             raise click.UsageError(f"{option} is given {times}")
-    form_of_next, general = iter(forms[behind:] or forms), answers()
+    format_of_next, general = iter(formats[behind:] or formats), answers()
     found = opened_together(
         FrameFile.inline(source_of(each))
         if is_inline(each)
         else FrameFile(
             tree_file(each),
-            fmt=next(form_of_next, None),
+            fmt=next(format_of_next, None),
             topics=chosen.topics,
             answers=general,
             reads=reads,

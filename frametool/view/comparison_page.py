@@ -62,7 +62,7 @@ class Curve(NamedTuple):
         return [*zip(self.times, values[self.chosen].tolist(), strict=True)]
 
 
-def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
+def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
     """Return a self-contained report: `svg` of one comparison, or `html` of any number."""
     curves = [_curve(each, at, len(found)) for at, each in enumerate(found)]
     numbers = [each.as_dict() for each in found]
@@ -73,7 +73,7 @@ def write_report(found: Sequence[Comparison], form: str, command: str) -> str:
     columns = ({"path": _path(curves, map_chart, seen), **figures[0]}, {"errors": _stacked(charts), **figures[1]})
     what = curves[0].name if len(curves) == 1 else f"{len(curves)} estimates"
     title = f"{what} against {printable(found[0].names[0])}"
-    if form == "svg":
+    if fmt == "svg":
         return _side_by_side(f"{title}: ate {numbers[0]['ate']['m']['rmse']:.4g} m", columns)
     drawn = "".join(
         f"<div>{''.join(f'<figure id={name}>{svg_element(each)}</figure>' for name, each in column.items())}</div>\n"

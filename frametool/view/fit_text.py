@@ -353,25 +353,25 @@ def _table_row(found: dict[str, Any]) -> list[Any]:
     ]  # fmt: skip
 
 
-def write_table(found: Sequence[dict[str, Any]], form: str = "text") -> str:
+def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
     """Write one row per comparison: `csv`, or `text`, `markdown`, `latex` with the best value of each column marked."""
     rows = [_table_row(each) for each in found]
-    if form == "csv":
+    if fmt == "csv":
         lines = [CSV_TITLES, *(["" if cell is None else str(cell) for cell in row] for row in rows)]
         return "".join(f"{','.join(map(quoted, line))}\n" for line in lines)
     best = _best(rows)
-    marked = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[form]
+    marked = {"text": "{}*", "markdown": "**{}**", "latex": r"\textbf{{{}}}"}[fmt]
     shown = []
     for row in rows:
         texts = [*map(_cell, row)]
-        if form == "latex":
+        if fmt == "latex":
             texts = ["".join(_LATEX.get(letter, letter) for letter in text) for text in texts]
         is_best = (cell is not None and cell == best[at] for at, cell in enumerate(row))
         shown.append([marked.format(text) if best else text for text, best in zip(texts, is_best, strict=True)])
-    if form == "markdown":
+    if fmt == "markdown":
         lines = [TITLES, ["---", *["---:"] * (len(TITLES) - 1)], *shown]
         return "".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in line)} |\n" for line in lines)
-    if form == "latex":
+    if fmt == "latex":
         body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *shown))
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
     table: list[Sequence[str]] = [TITLES, *shown]

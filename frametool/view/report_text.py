@@ -194,7 +194,7 @@ def short(name: str, width: int) -> str:
 LIST_LABEL = 15  # columns, the indent included
 
 
-def form_entry(name: str) -> dict[str, Any]:
+def format_entry(name: str) -> dict[str, Any]:
     """Return the table row of a format as plain values."""
     row = FORMATS[name]
     return {
@@ -210,7 +210,7 @@ def option_of(ask: str) -> str:
     return f"--{name}{' ' * bool(choices)}{choices}"
 
 
-def write_forms(entries: Iterable[dict[str, Any]]) -> str:
+def write_formats(entries: Iterable[dict[str, Any]]) -> str:
     """Return the list of formats, those that are only written last."""
     parts: dict[str, list[str]] = {}
     for entry in entries:
@@ -226,7 +226,7 @@ def write_forms(entries: Iterable[dict[str, Any]]) -> str:
 _READ, _WRITTEN = "read", "only written"
 
 
-def write_form(entry: dict[str, Any]) -> str:
+def write_format(entry: dict[str, Any]) -> str:
     """Describe one format, with the example of its module if there is one."""
     name = entry["name"]
     facts = {

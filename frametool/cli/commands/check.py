@@ -45,7 +45,7 @@ class CheckCommand(Command):
 
 @command_named("check", cls=CheckCommand)
 @argument("files", FILE, nargs=-1, required=True)
-@option("-f --format", "format of the findings", (*WRITERS,), name="form", default="text")
+@option("-f --format", "format of the findings", (*WRITERS,), name="fmt", default="text")
 @option("--strict", "exit with 1 for warnings too")
 @option("--measured FILE", "compare these measurements (help solve) too", excludes=("each",), multiple=True)
 @option("--tolerance LENGTH,ANGLE", "their allowed deviation  [3 sigmas, or 10mm,1deg]", requires=("measured",),
@@ -66,7 +66,7 @@ def command(inputs: Inputs) -> int:
     --strict also for a warning; notes never fail. - is standard input, also what `ros2 topic echo /tf` prints.
     """
     files, measured, normalize = inputs.files, inputs.measured, inputs.normalize
-    form, strict = inputs.form, inputs.strict
+    fmt, strict = inputs.fmt, inputs.strict
     refuse_two_readers((*files, *measured))
     if inputs.each:
         findings = _one_by_one(files, normalize=normalize)
@@ -76,13 +76,13 @@ def command(inputs: Inputs) -> int:
         recordings = opened(files, of=count)
         findings = _with_loops(recordings, rows, inputs.tolerance, normalize=normalize)
         state(recordings)
-    text = WRITERS[form](findings)
+    text = WRITERS[fmt](findings)
     with writing(None) as write:
-        is_seen = form == "text" and sys.stdout.isatty()
+        is_seen = fmt == "text" and sys.stdout.isatty()
         write(in_colour("\n".join(map(folded, text.split("\n"))), TROUBLE) if is_seen else text)
     counts = {kind: sum(level(each) == kind for each in findings) for kind in ("error", "warning", "note")}
     summary = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items() if count)
-    if summary or (form == "text" and sys.stdout.isatty()):
+    if summary or (fmt == "text" and sys.stdout.isatty()):
         say(summary or f"{listing(files)}: no findings ({len(RULES)} rules)")
     return FAILED if counts["error"] or (strict and counts["warning"]) else 0
 

@@ -27,7 +27,7 @@ TABLES = ("csv", "markdown", "latex")
 REPORTS = {".html": "html", ".htm": "html", ".svg": "svg"}
 
 
-def _form_of(path: str | None) -> str:
+def _format_of(path: str | None) -> str:
     """Return the format of a report by its suffix, "" for anything else."""
     return REPORTS.get(suffix_of(path or ""), "")
 
@@ -63,11 +63,11 @@ def command(inputs: Inputs) -> int:
     """
     path, told, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
     limits, est = inputs.limits, inputs.est
-    instead = path if told is None and _form_of(path) else None
+    instead = path if told is None and _format_of(path) else None
     for name in filter(None, (report, instead)):
         refuse_existing(name, force=inputs.force)
     refuse(instead and rows, "--rows are CSV or JSON, no picture; write them with -f, or leave them out")
-    if len(est) > 1 and "svg" in (_form_of(report), _form_of(instead)):
+    if len(est) > 1 and "svg" in (_format_of(report), _format_of(instead)):
         raise click.UsageError("an SVG shows one comparison; write .html for several")
     if explain and (rows or instead or told not in (None, "text")):
         raise click.UsageError("--explain writes text; leave --rows, -f and pictures out")
@@ -103,7 +103,7 @@ def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> Non
     from frametool.view.comparison_page import write_report
 
     with writing(path, force=force) as write:
-        write(write_report(found, _form_of(path), shlex.join(["frametool", *sys.argv[1:]])))
+        write(write_report(found, _format_of(path), shlex.join(["frametool", *sys.argv[1:]])))
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
@@ -111,15 +111,15 @@ def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], ro
     from frametool.fit.numbers import rows as rows_of
     from frametool.view.fit_text import write_comparison, write_table
 
-    form = output.style.format
+    fmt = output.style.format
     if rows:
         several = len(found) > 1
         records = [{"est": each.names[1]} | row if several else row for each in found for row in rows_of(each, rows)]
-        output.style = output.style.with_format("csv" if form == "text" else form)
+        output.style = output.style.with_format("csv" if fmt == "text" else fmt)
         output.report(records)
-    elif form in TABLES or (form == "text" and len(every) > 1):
-        output.text(write_table(every, form))
-    elif form == "text":
+    elif fmt in TABLES or (fmt == "text" and len(every) > 1):
+        output.text(write_table(every, fmt))
+    elif fmt == "text":
         output.text(write_comparison(every[0]))
     else:
         output.report(every)

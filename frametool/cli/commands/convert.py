@@ -80,8 +80,8 @@ def command(inputs: Inputs) -> int:
     from frametool.stream.request import Operation
 
     operation = Operation() if axes is None and world is None else _change_of_axes(axes, world)
-    forms = output.notations or (notation("quaternion"),)
-    request = task.request(operation=operation, notations=forms, window=window, extra_column=inputs.time_column)
+    wanted = output.notations or (notation("quaternion"),)
+    request = task.request(operation=operation, notations=wanted, window=window, extra_column=inputs.time_column)
     if operation.turns and (values or stream.path or stream.has_input()):
         _say_other_side(axes, world)
         _say_of_engines(world, request.given, output, is_anew=bool(values) and values != ("-",))
@@ -193,8 +193,8 @@ def _say_of_engines(world: str | None, given: Notation | None, output: Output, *
         say(f"note: Unreal counts in centimetres: xyz {here}")
     if out_of == IN_CENTIMETRES:
         say("note: Unreal counts in centimetres: xyz is read as metres, xyz_cm and x_cm say them")
-    for engine, forms in ((into, output.notations), (out_of, (given,) if given else ())):
-        if engine in ENGINE_ANGLES and any(each.representation.name == "rpy" for each in forms):
+    for engine, wanted in ((into, output.notations), (out_of, (given,) if given else ())):
+        if engine in ENGINE_ANGLES and any(each.representation.name == "rpy" for each in wanted):
             say(f"warning: rpy is not what {engine.title()} calls its angles; {ENGINE_ANGLES[engine]} is")
 
 

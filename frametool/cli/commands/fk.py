@@ -58,17 +58,17 @@ def _added(stream: Stream, output: Output, rows: JointRows, file: FrameFile) -> 
     """Write the rows of a stream with their poses; the file is that of the robot."""
     inputs, name = stream.inputs, stream.path or "stdin"
     begin = stream.opened().peek()
-    form = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")[0]
-    refuse(holds_arrays(form), f"rows of joints are a table of text, records or messages, not {form}")
-    names = names_in(begin, form, name, header=inputs.header)
+    fmt = stream.chosen_format() or detect(begin, *STREAMED, name=stream.path or "")[0]
+    refuse(holds_arrays(fmt), f"rows of joints are a table of text, records or messages, not {fmt}")
+    names = names_in(begin, fmt, name, header=inputs.header)
     rows.bind(names, name, fixed=frozenset(file.answers.joints))
     file.tally.assumed = ""  # rows say where each joint on the way is
     state([file])
-    echo_form = "" if form in RECORDS else echoed(begin)
-    if not echo_form:
+    echo_format = "" if fmt in RECORDS else echoed(begin)
+    if not echo_format:
         operation = Operation(moves=True, formula=rows)
         return stream.run(Request(operation, poses=0, degrees=inputs.deg, normalize=inputs.normalize), output)
     bad = stream.policy(name)
     with stream.opened() as source:
-        output.poses_as_they_come(joint_poses(source, rows, bad, numbered=echo_form == "csv1"))
+        output.poses_as_they_come(joint_poses(source, rows, bad, numbered=echo_format == "csv1"))
     return ROWS_SKIPPED if bad.count else 0

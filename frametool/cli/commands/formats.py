@@ -7,7 +7,7 @@ from frametool.cli.options import FormatName, list_options
 from frametool.cli.output import Output
 from frametool.cli.sink import show
 from frametool.formats.table import FORMATS
-from frametool.view.report_text import form_entry, write_form, write_forms
+from frametool.view.report_text import format_entry, write_format, write_formats
 
 
 @command_named("formats")
@@ -26,9 +26,9 @@ def command(inputs: Inputs) -> None:
     with an example if there is one. `frametool help formats` explains the options that files need.
     """
     output, name = Output(inputs, "report", otherwise="text"), inputs.name
-    entries = list(map(form_entry, FORMATS if name is None else [name]))
+    entries = list(map(format_entry, FORMATS if name is None else [name]))
     if output.style.format == "text":
-        text = write_forms(entries) if name is None else write_form(entries[0])
+        text = write_formats(entries) if name is None else write_format(entries[0])
         show(text, paged=True) if output.path is None else output.text(text)
         return
     if output.style.format == "csv":  # a list is one cell

@@ -118,17 +118,17 @@ def _search(ctx: click.Context, name: str) -> str:
             return topic(each)
     about = sorted((each for each in known if holds(f"{each} {topic(each)}")), key=lambda each: not holds(known[each]))
     calls = [each for each, one in _commands(ctx).items() if each != "help" and any(map(holds, _texts(one, ctx)))]
-    forms = [each for each, row in FORMATS.items() if holds(f"{each} {row.summary}")]
+    formats = [each for each, row in FORMATS.items() if holds(f"{each} {row.summary}")]
     titles = sorted((each for each in asked if holds(f"{each} {asked[each]}")), key=lambda each: not holds(each))
-    if about and not (about[1:] or calls or forms or titles):
+    if about and not (about[1:] or calls or formats or titles):
         return topic(about[0])
-    if not (about or calls or forms or titles):
+    if not (about or calls or formats or titles):
         hint = any_near(name.lower(), [*known, *MADE, *COMMANDS], "`frametool help` lists all topics")
         raise click.UsageError(f"no topic, command or text has {shown(name)}{hint}")
     return _joined({
         f"Topics with {shown(name)} (frametool help TOPIC):\n\n{_listed({each: known[each] for each in about})}": about,
         _wrapped(f"Commands (frametool help COMMAND): {', '.join(calls)}"): calls,
-        _wrapped(f"File formats (frametool formats NAME): {', '.join(forms)}"): forms,
+        _wrapped(f"File formats (frametool formats NAME): {', '.join(formats)}"): formats,
         _titles(f"Cookbook (frametool help cookbook {name})", titles): titles,
     })  # fmt: skip
 
@@ -196,7 +196,7 @@ class Topic(Text):
 
 @command_named("help")
 @argument("words", Topic(), nargs=-1, metavar="[TOPIC | COMMAND | WORD ..]")
-@option("-f --format", "json: options, values and exit codes of all commands or one", ("text", "json"), name="form",
+@option("-f --format", "json: options, values and exit codes of all commands or one", ("text", "json"), name="fmt",
     default="text")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, inputs: Inputs) -> None:
@@ -213,7 +213,7 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
     words = inputs.words
     name = " ".join(words)
     named = _commands(ctx).get(name) if words[:1] and words[0] in COMMANDS else None
-    if inputs.form == "json":
+    if inputs.fmt == "json":
         text = _json(ctx, name, named)
     elif named and name not in topics():  # calc and formats are subjects too
         shared.show_help(click.Context(named, parent=ctx.parent, info_name=name), paged=True)
@@ -237,14 +237,14 @@ def command(ctx: click.Context, inputs: Inputs) -> None:
 
 def _json(ctx: click.Context, name: str, named: click.Command | None) -> str:
     from frametool.documents.json import dump
-    from frametool.view.report_text import form_entry
+    from frametool.view.report_text import format_entry
 
     if name and not named:
         hint = any_near(name, COMMANDS, "`frametool help` lists all")
         raise click.UsageError(f"-f json is about commands, and {shown(name)} is not one{hint}")
     every = [described(each, one, ctx) for each, one in ({name: named} if named else _commands(ctx)).items()]
     whole = {
-        "version": __version__, "topics": topics() | MADE, "commands": every, "formats": [*map(form_entry, FORMATS)],
+        "version": __version__, "topics": topics() | MADE, "commands": every, "formats": [*map(format_entry, FORMATS)],
         "exit_codes": _exit_codes(EXIT_CODES),
     }  # fmt: skip
     return f"{dump(every[0] if named else whole)}\n"

@@ -104,9 +104,9 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
     if output.style.place is not None:
         name = output.style.place.name
         raise click.UsageError(f"--to {name}: the covariance is along the axes of ecef; leave one of the two out")
-    form = output.chosen if by_row else output.style.format
-    if form not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(form):
-        raise click.UsageError(f"{form} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
+    fmt = output.chosen if by_row else output.style.format
+    if fmt not in (None, "text", *WITH_COVARIANCE) and not holds_arrays(fmt):
+        raise click.UsageError(f"{fmt} has no place for a covariance; {', '.join(WITH_COVARIANCE)} have")
 
 
 def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tuple[int, int] | None) -> int:

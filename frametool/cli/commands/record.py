@@ -80,8 +80,8 @@ def command(inputs: Inputs) -> int:
     path = tree_file(inputs.tree)
     if path == "-":
         raise FileProblem("stdin: a recording cannot be read from a pipe; name its file")
-    form = _form_of(path)
-    copy, place = copied_as(form, path, inputs.output, inputs.format_name)
+    fmt = _format_of(path)
+    copy, place = copied_as(fmt, path, inputs.output, inputs.format_name)
     refuse_input(place, (path, *map(tree_file, more)))
     tally, edges = Diagnostics(), load_tree(more[0], more[1:], Rules(normalize=normalize)) if more else None
     if edges is not None and (resting := [name for *_, names in edges.robots for name in names]):
@@ -124,7 +124,7 @@ def _bare(frame: str) -> str:
     return frame[is_slashed(frame) :]
 
 
-def _form_of(path: str) -> str:
+def _format_of(path: str) -> str:
     """Return the format of a recording; raises FormatError for anything else."""
     source = FrameFile(path)
     source.close()

@@ -95,8 +95,8 @@ def follow(inputs: Inputs) -> None:
 def _explain(inputs: Inputs) -> None:
     """Write the derivation of one control step of the followers."""
     scene = scene_of(inputs, leader_of(inputs))
-    form = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
-    refuse(form not in (None, "text"), f"--explain-step derives one step in words; leave the format {form} out")
+    fmt = inputs.format_name or by_suffix(inputs.output, ("yaml", "json", "csv"))
+    refuse(fmt not in (None, "text"), f"--explain-step derives one step in words; leave the format {fmt} out")
     from frametool.explain.derive import DerivationStyle, derive_follow
     from frametool.sim.followed import follow_steps
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, not solvable or undecided, 2 usage, 5 file."
 SHAPES = ("hand_eye", "points")
-FORMS_OF_SCALE = ("text", "yaml", "json", "csv")
+FORMATS_OF_SCALE = ("text", "yaml", "json", "csv")
 
 
 def _read_names(text: str) -> list[str]:
@@ -80,7 +80,7 @@ def command(inputs: Inputs) -> None:
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
     output = Output(inputs, "tree", "trajectory")
-    if points and inputs.scale and output.style.format not in FORMS_OF_SCALE:
+    if points and inputs.scale and output.style.format not in FORMATS_OF_SCALE:
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     from frametool.cli import solving
 

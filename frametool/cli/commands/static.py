@@ -42,7 +42,7 @@ def command(inputs: Inputs) -> None:
       frametool static 0.1 0 0.2 1.5 0 0 base camera --format json
 
     A tree is written one line per edge, static2 (flags) unless --format says static1 (x y z qx qy qz qw PARENT CHILD)
-    or another form. With --to rpy angles are written: --roll --pitch --yaw, and yaw pitch roll in static1, in radians.
+    or another. With --to rpy angles are written: --roll --pitch --yaw, and yaw pitch roll in static1, in radians.
     Arguments that are read, in either spelling, become a tree entry: the pose of the child in its parent. Their angles
     are in radians, like the tool's; --deg applies to the result.
     """

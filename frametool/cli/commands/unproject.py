@@ -113,12 +113,12 @@ def _names(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     stream = task.stream
     stream.read_clouds_as_rows()
     begin = stream.opened().peek()
-    form = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")[0]
-    if "records" in FORMATS[form].reads:
-        return keys_in(begin, form, stream.name, WANTED)
+    fmt = stream.within or stream.chosen_format() or detect(begin, *STREAMED, name=stream.name, otherwise="columns")[0]
+    if "records" in FORMATS[fmt].reads:
+        return keys_in(begin, fmt, stream.name, WANTED)
     from frametool.stream.table import open_table
 
-    table, _ = open_table(begin, form, header=stream.inputs.header, source=stream.name)
+    table, _ = open_table(begin, fmt, header=stream.inputs.header, source=stream.name)
     return table.names or tuple(map(str, range(1, table.width + 1)))
 
 

@@ -48,7 +48,7 @@ def _eye(text: str) -> Eye:
 @option("--path", "only the frames between TARGET and SOURCE", name="path_only")
 @option("--from EYE", "slanted, front, side, top, or AZ,EL in degrees", _eye, name="eye", default="slanted")
 @moving_options
-@option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="form")
+@option("-f --format", "format of the picture  [default: by the suffix of --output, else text]", FORMS, name="fmt")
 @option("-o --output FILE", "write to this file instead of stdout, atomically")
 @option("--force", "let --output overwrite a file", requires=("output",), under="Result")
 @option("--overlay", "compare TREE with a second tree, given as TARGET: what has moved?")
@@ -71,7 +71,7 @@ def command(inputs: Inputs) -> None:
     FRAMETOOL_TREE names.
     """
     tree, target, source, output = inputs.tree, inputs.target, inputs.source, inputs.output
-    chosen = _form(inputs.form, output, opens=inputs.opens)
+    chosen = _format(inputs.fmt, output, opens=inputs.opens)
     refuse_existing(output, force=inputs.force)
     if chosen == "png":
         from frametool.view.pictures import require_matplotlib
@@ -116,10 +116,10 @@ def command(inputs: Inputs) -> None:
         webbrowser.open(Path(path).absolute().as_uri())
 
 
-def _form(form: str | None, output: str | None, *, opens: bool) -> str:
+def _format(fmt: str | None, output: str | None, *, opens: bool) -> str:
     """Choose the format: that of --format, else by the file's suffix, else text; a browser shows pages."""
     suffix = os.path.splitext(output or "")[1].lower()
-    chosen = form or SUFFIXES.get(suffix) or ("html" if opens else None)
+    chosen = fmt or SUFFIXES.get(suffix) or ("html" if opens else None)
     if chosen is None and suffix and output != "-":
         raise click.UsageError(f"no format has the suffix {shown(suffix)}; give --format {'|'.join(FORMS)}")
     refuse(opens and (chosen != "html" or output == "-"), "--open shows a page: give -o FILE.html, or no -o")
@@ -127,22 +127,22 @@ def _form(form: str | None, output: str | None, *, opens: bool) -> str:
 
 
 def _content(
-    scene: FrameScene, form: str, tree: str, eye: Eye, before: FrameScene | None, before_tree: str, *, sliders: bool,
+    scene: FrameScene, fmt: str, tree: str, eye: Eye, before: FrameScene | None, before_tree: str, *, sliders: bool,
 ) -> str | bytes:  # fmt: skip
     """Return the picture in a format, and say what a still one does not show."""
     title, other_title = (os.path.basename(each) if len(each) < 200 else "tree" for each in (tree, before_tree))
-    if form == "html":
+    if fmt == "html":
         from frametool.view.exports import write_page
 
         return write_page(
             scene, title=title, file=tree, eye=eye, other=before, other_title=other_title, sliders=sliders,
             solids=_solids(tree) if scene.tree.robots and not before else (),
         )  # fmt: skip
-    if form == "glb":
+    if fmt == "glb":
         from frametool.view.exports import write_glb
 
         return write_glb(scene)
-    if form == "text":
+    if fmt == "text":
         from frametool.view.terminal import TerminalPicture
 
         return TerminalPicture(scene, *get_terminal_size(PIPE_SIZE), eye).text()
@@ -153,7 +153,7 @@ def _content(
         say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
     if still.hidden:
         say(f"note: {still.hidden} names found no place")
-    return write_picture(still.picture, f".{form}")
+    return write_picture(still.picture, f".{fmt}")
 
 
 def _solids(tree: str) -> list[Solid]:
