@@ -87,8 +87,8 @@ class BagOfClouds:
                     bad.take([Fault(cloud.line, "", cloud.message)])
                     continue
                 points += self._write(cloud, way, bad)
-            for told in self.tally.findings():
-                once(f"{self.path}: {told.message}", told.rule, FrametoolWarning)
+            for finding in self.tally.findings():
+                once(f"{self.path}: {finding.message}", finding.rule, FrametoolWarning)
         if not count:
             raise FormatError(f"no messages on {', '.join(self.topics)}", source=self.path)
         if not self.stream.inputs.quiet:
@@ -129,7 +129,7 @@ class BagOfClouds:
 
 
 class SeveralClouds:
-    """Clouds of several -i that become one: each is given in a frame of its own, or all in SOURCE."""
+    """Clouds of several -i that become one: each is expressed in a frame of its own, or all in SOURCE."""
 
     def __init__(self, output: Output, stream: Stream) -> None:
         """Take --frames and the --in of clouds; the tree may not have them too.  Raises click.UsageError."""
@@ -140,12 +140,12 @@ class SeveralClouds:
         if bags := [path for path in self.paths if is_bag(path)]:
             raise click.UsageError(f"{bags[0]} is a bag, whose clouds become files of their own; give it alone")
         formats = inputs().input_formats
-        told = [fmt for fmt in formats if "arrays" in FORMATS[fmt].reads]
-        if len(told) not in (0, 1, len(self.paths)):
-            raise click.UsageError(f"--in is given {len(told)} times for {len(self.paths)} clouds; once, or once each")
-        self.formats = told * (len(self.paths) if len(told) == 1 else 1) or [""] * len(self.paths)
+        named = [fmt for fmt in formats if "arrays" in FORMATS[fmt].reads]
+        if len(named) not in (0, 1, len(self.paths)):
+            raise click.UsageError(f"--in is given {len(named)} times for {len(self.paths)} clouds; once, or once each")
+        self.formats = named * (len(self.paths) if len(named) == 1 else 1) or [""] * len(self.paths)
         self.frames = [name.strip() for text in inputs().named_frames for name in text.split(",")]
-        inputs().leave(input_formats=[fmt for fmt in formats if fmt not in told], named_frames=())
+        inputs().leave(input_formats=[fmt for fmt in formats if fmt not in named], named_frames=())
         if self.frames and len(self.frames) != len(self.paths):
             raise click.UsageError(f"--frames names {len(self.frames)} frames for {len(self.paths)} clouds; one each")
 
@@ -168,10 +168,10 @@ class SeveralClouds:
         on_error = self.stream.inputs.on_error
         with ExitStack() as opened:
             planned = []
-            for path, told, frame in zip(self.paths, self.formats, self.frames or [""] * len(self.paths), strict=True):
+            for path, named, frame in zip(self.paths, self.formats, self.frames or [""] * len(self.paths), strict=True):
                 file = InputFile(path)
                 opened.callback(file.close)
-                file.format = fmt = told or detect(file.head(), "records", "rows", "arrays", name=path)[0]
+                file.format = fmt = named or detect(file.head(), "records", "rows", "arrays", name=path)[0]
                 if "arrays" not in FORMATS[fmt].reads:
                     hint = f"make one of it: frametool convert -i {path} -o NEW.pcd"
                     raise FormatError(f"{FORMATS[fmt].summary}, no cloud; {hint}", source=path)

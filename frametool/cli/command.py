@@ -1,6 +1,6 @@
 """What a command is: its inputs, its arguments and options as data, its help, and how click parses it.
 
-An option that was given, and that nobody has asked for when the first result is written, would be ignored: it is a
+An option that was passed, and that nobody has asked for when the first result is written, would be ignored: it is a
 usage error, and nothing is written.
 """
 
@@ -29,7 +29,7 @@ NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translat
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
 EVERYTHING = "frametool.everything"  # a key in a context's `meta`
 INPUTS = "frametool.inputs"  # the key in a context's `meta`
-TOLD = "frametool.told"  # the same: the options on the command line
+PASSED = "frametool.passed"  # the same: the options on the command line
 # what stands for an option of several values in a command without it
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options that any way may ignore: they are about what is said, not about what is done
@@ -45,7 +45,7 @@ class Inputs:
     """
 
     def __init__(self, values: Mapping[str, Any], idle: dict[str, str] | None = None) -> None:
-        """Keep the values; idle: the options that were given, each as it is called."""
+        """Keep the values; idle: the options that were passed, each as it is called."""
         self._values = {**values}
         self._idle = {} if idle is None else idle
         self.formats_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
@@ -69,7 +69,7 @@ class Inputs:
             self._idle.pop(name, None)
 
     def leave(self, **values: Any) -> None:
-        """Put what other readers have left in the place of what was given."""
+        """Put what other readers have left in the place of what was passed."""
         self._values |= values
 
     def but(self, **values: Any) -> Inputs:
@@ -77,11 +77,11 @@ class Inputs:
         return Inputs(self._values | values, self._idle)
 
     def idle(self) -> set[str]:
-        """Return the options that were given and that nobody has asked for."""
+        """Return the options that were passed and that nobody has asked for."""
         return {*self._idle}
 
     def refuse_idle(self) -> None:
-        """Raise a usage error for options that were given and that nobody has asked for."""
+        """Raise a usage error for options that were passed and that nobody has asked for."""
         if self._idle:
             has = "has" if len(self._idle) == 1 else "have"
             raise click.UsageError(f"{', '.join(self._idle.values())} {has} no effect here")
@@ -101,10 +101,10 @@ class Option(click.Option):
         self.excludes, self.requires, self.under = excludes, requires, under
 
 
-def _check_together(context: click.Context, told: Sequence[Option]) -> None:
+def _check_together(context: click.Context, passed: Sequence[Option]) -> None:
     """Raise a usage error for options that do not belong together."""
-    called = {each.name: each.opts[-1] for each in told}
-    for each in told:
+    called = {each.name: each.opts[-1] for each in passed}
+    for each in passed:
         name = each.opts[-1]
         if others := called.keys() & {*each.excludes}:
             first = min(others, key=each.excludes.index)
@@ -360,15 +360,15 @@ class Command(WithHelp):
     """
 
     def make_parser(self, ctx: click.Context) -> Any:
-        """Make click's parser, which notes the options that are given; of one value twice, one would not be used."""
+        """Make click's parser, which notes the options that are passed; of one value twice, one would not be used."""
         parser: Any = super().make_parser(ctx)
         parse = parser.parse_args
 
         def parse_noting(args: list[str]) -> Any:
             found = parse(args=args)
-            told = ctx.meta[TOLD] = [each for each in found[2] if isinstance(each, Option)]
-            for each in told:
-                if told.count(each) > 1 and not (each.multiple or each.is_flag or ctx.resilient_parsing):
+            passed = ctx.meta[PASSED] = [each for each in found[2] if isinstance(each, Option)]
+            for each in passed:
+                if passed.count(each) > 1 and not (each.multiple or each.is_flag or ctx.resilient_parsing):
                     raise click.UsageError(f"{each.opts[-1]} is given twice; only one can be used", ctx)
             return found
 
@@ -386,21 +386,21 @@ class Command(WithHelp):
             args = _with_value(args, name, *OPTIONAL[name])
         rest = super().parse_args(ctx, args)
         if not ctx.resilient_parsing:
-            _check_together(ctx, ctx.meta[TOLD])
+            _check_together(ctx, ctx.meta[PASSED])
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command on its inputs, then report if --camera-axes was of no use: only a result shows that."""
-        idle = {each.name: each.opts[-1] for each in ctx.meta[TOLD] if each.name not in OF_MESSAGES}
-        given = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
+        idle = {each.name: each.opts[-1] for each in ctx.meta[PASSED] if each.name not in OF_MESSAGES}
+        passed = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
         try:
-            with checked_by(given.refuse_idle):
-                result = ctx.invoke(self.callback or (lambda _: 0), given)
+            with checked_by(passed.refuse_idle):
+                result = ctx.invoke(self.callback or (lambda _: 0), passed)
         except FormatError as error:
             error.message = _without_others(error.message, self)
             raise
-        given.refuse_idle()
-        _say_not_needed(given)
+        passed.refuse_idle()
+        _say_not_needed(passed)
         return result
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -448,11 +448,11 @@ def _with_value(args: list[str], option: str, *values: str) -> list[str]:
     return joined
 
 
-def _say_not_needed(given: Inputs) -> None:
+def _say_not_needed(passed: Inputs) -> None:
     """Report on stderr which options change nothing, where only what was read or is written shows whether they do."""
-    for ask, chosen in (("frames", given.named_frames), ("camera_axes", given.camera_axes)):
-        if chosen and not given.quiet and not any(ask in asks for _, asks in given.formats_read):
-            read = " and ".join(dict.fromkeys(fmt for fmt, _ in given.formats_read if fmt))
+    for ask, chosen in (("frames", passed.named_frames), ("camera_axes", passed.camera_axes)):
+        if chosen and not passed.quiet and not any(ask in asks for _, asks in passed.formats_read):
+            read = " and ".join(dict.fromkeys(fmt for fmt, _ in passed.formats_read if fmt))
             why = f": {read} specifies its {'own frames' if ask == 'frames' else 'camera axes'}" if read else " here"
             say(f"note: --{ask.replace('_', '-')} has no effect{why}")
 

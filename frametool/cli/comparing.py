@@ -149,20 +149,20 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
 
 
 def _settings(inputs: Inputs) -> Settings:
-    """Take what the options say; those not given are as evo has them, or as we do."""
+    """Take what the options say; those not passed are as evo has them, or as we do."""
     from frametool.fit.comparison import EVO, Settings
 
-    given = {name: value for name in Settings._fields if (value := getattr(inputs, name)) is not None}
-    if "offset" in given:
-        given["offset"], limit = given["offset"]
-        given |= {} if limit is None else {"offset_limit_s": limit}
-    if "mount" in given:
-        given["mount"] = _mount(given["mount"])
+    passed = {name: value for name in Settings._fields if (value := getattr(inputs, name)) is not None}
+    if "offset" in passed:
+        passed["offset"], limit = passed["offset"]
+        passed |= {} if limit is None else {"offset_limit_s": limit}
+    if "mount" in passed:
+        passed["mount"] = _mount(passed["mount"])
     base = EVO if inputs.like else Settings()
-    chosen = base._replace(**given)
-    if "max_diff_ns" in given and chosen.match != "nearest":
+    chosen = base._replace(**passed)
+    if "max_diff_ns" in passed and chosen.match != "nearest":
         raise click.UsageError("--max-diff is of --match nearest; --max-gap is of interpolation")
-    if "max_gap_ns" in given and chosen.match == "nearest":
+    if "max_gap_ns" in passed and chosen.match == "nearest":
         raise click.UsageError("--max-gap is of --match interpolate; --max-diff is of nearest")
     return chosen
 

@@ -65,8 +65,8 @@ class PoseTask:
         said = [self.inputs.peek(name) or () for name in ("values", "poses", "pose", "a", "b")]
         texts = [text for each in said for text in ([each] if isinstance(each, str) else each)]
         if rest.get("poses") != 0 and not (texts and all(map(_says_all, texts))):
-            self.inputs.ask("given")
-        own = {"given": self.stream.given, "degrees": self.output.style.degrees, "normalize": self.normalize}
+            self.inputs.ask("from_rep")
+        own = {"given": self.stream.notation, "degrees": self.output.style.degrees, "normalize": self.normalize}
         made = self.at_places(Request(offset_ns=offset_ns, **own, **rest))
         self.output.take_axes("", made.operation)
         return made
@@ -74,16 +74,16 @@ class PoseTask:
     def at_places(self, request: Request) -> Request:
         """Add what the options say of places on the Earth, where they say anything."""
         place = self.output.style.place
-        if not (place or self.stream.given_place or any(map(self.inputs.peek, ("origin", "local_axes", "zone")))):
+        if not (place or self.stream.place or any(map(self.inputs.peek, ("origin", "local_axes", "zone")))):
             return request
         from frametool.cli.earth import earth
 
         usual = request.by_default or not self.output.notations
-        return request._replace(place=place, given_place=self.stream.given_place, earth=earth(), by_default=usual)
+        return request._replace(place=place, given_place=self.stream.place, earth=earth(), by_default=usual)
 
     def has_table(self, argument: str) -> bool:
         """Return True if an argument is a file of rows; it is then what -i FILE would be."""
-        return not is_pasted(argument, self.stream.given) and self.stream.takes_rows(argument)
+        return not is_pasted(argument, self.stream.notation) and self.stream.takes_rows(argument)
 
     def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
         """Ask for what is said of files, where arguments are all that is read and one of them may be a file."""
@@ -114,8 +114,8 @@ class PoseTask:
         from frametool.explain.derive import DerivationStyle
 
         if self.output.chosen not in (None, "text"):
-            told = f"{', '.join(FORMS)}, not {self.output.chosen}"
-            raise click.UsageError(f"--explain writes {told}; leave one of them out")
+            written = f"{', '.join(FORMS)}, not {self.output.chosen}"
+            raise click.UsageError(f"--explain writes {written}; leave one of them out")
         return DerivationStyle(self.output.style, significant(self.inputs.precision))
 
     def written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:

@@ -436,9 +436,9 @@ _COLOR = "colour of the text; auto: on terminals, unless NO_COLOR is set"
 color_option = _of_results("--color", _COLOR, ("auto", "always", "never"), default="auto")
 
 
-def window_of(given: Inputs) -> tuple[int, int] | None:
+def window_of(passed: Inputs) -> tuple[int, int] | None:
     """Return the first and the last nanosecond that --start and --stop leave, None without either; nobody asks yet."""
-    start, stop = given.peek("start"), given.peek("stop")
+    start, stop = passed.peek("start"), passed.peek("stop")
     refuse(start is not None and stop is not None and start > stop, "--start is after --stop")
     if start is stop is None:
         return None
@@ -447,13 +447,13 @@ def window_of(given: Inputs) -> tuple[int, int] | None:
     return -FURTHEST_NS if start is None else start, FURTHEST_NS if stop is None else stop
 
 
-def rules(given: Inputs) -> Rules:
+def rules(passed: Inputs) -> Rules:
     """Collect what the options say about how frames are taken."""
-    keep_ns = given.cache
+    keep_ns = passed.cache
     refuse(keep_ns is not None and keep_ns < 0, "--cache takes seconds, not less than 0")
     from frametool.formats.load import Rules
 
-    return Rules(moving=bool(given.moving), keep_ns=keep_ns, normalize=bool(given.normalize))
+    return Rules(moving=bool(passed.moving), keep_ns=keep_ns, normalize=bool(passed.normalize))
 
 
 def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int]:

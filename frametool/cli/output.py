@@ -57,12 +57,12 @@ class Output:
         self._inputs = inputs
         self.path: str | None = inputs.output
         self.force: bool = self.path is not None and inputs.force
-        told: str | None = inputs.format_name
-        if self.path is not None and told is None:
+        named: str | None = inputs.format_name
+        if self.path is not None and named is None:
             from frametool.formats.unsupported import refuse_suffix
 
             refuse_suffix(self.path)
-        self.chosen = told or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
+        self.chosen = named or (table.by_name(self.path, table.writers(*what)) if self.path is not None else None)
         notations, place = inputs.notations or (), None
         if inputs.peek("origin") is not None or any(each.representation.on_earth for each in notations):
             from frametool.cli.earth import places_of

@@ -45,7 +45,7 @@ def is_inline(text: str) -> bool:
     return text.startswith(("{", "["))
 
 
-def is_pasted(text: str, given: Notation | None = None) -> bool:
+def is_pasted(text: str, notation: Notation | None = None) -> bool:
     """Distinguish a text with a pose in it from a file's name; what exists is a file.
 
     Raises FormatError for a text that is known and cannot be taken.
@@ -57,24 +57,24 @@ def is_pasted(text: str, given: Notation | None = None) -> bool:
     if _inverted(text):
         return True
     has_key = "\n" in text or re.match(r"\w+: *[\[{]", text) is not None
-    return has_key or rewritten(Source(INLINE, text), given) is not None
+    return has_key or rewritten(Source(INLINE, text), notation) is not None
 
 
 def rewritten(
-    source: Source, given: Notation | None = None, *, normalize: bool = False, points: bool = False
+    source: Source, notation: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
     is_short = source.name == INLINE and len(source.text) <= LONGEST_REMEMBERED
-    return (_rewritten_argument if is_short else _rewritten)(source, given, normalize=normalize, points=points)
+    return (_rewritten_argument if is_short else _rewritten)(source, notation, normalize=normalize, points=points)
 
 
-def _rewritten(source: Source, given: Notation | None, *, normalize: bool, points: bool) -> Source | None:
+def _rewritten(source: Source, notation: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
     with inline_misuse():
-        return in_grammar(source, given, normalize=normalize, points=points)
+        return in_grammar(source, notation, normalize=normalize, points=points)
 
 
 _rewritten_argument = lru_cache(8)(_rewritten)  # an argument is looked at before it is read
@@ -92,22 +92,22 @@ def rejoined(values: Sequence[str]) -> tuple[str, ...]:
 
 
 def pasted_stream(
-    stream: BufferedReader, name: str, request: Request, given: Notation | None, place: str
+    stream: BufferedReader, name: str, request: Request, notation: Notation | None, place: str
 ) -> tuple[Source | None, BufferedReader]:
     """Return what was pasted into a stream as text of the grammar, and the stream, with all that is in it if not.
 
     Only a beginning with which no stream of rows or records has a result is read to its end.
-    given, place: the notation, or the position on the Earth, that --from names
+    notation, place: the notation, or the position on the Earth, that --from names
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
-    if (re.match(_PLAIN, head) and not re.match(_NO_HEADER, head)) or _has_rows(head, given, place):
+    if (re.match(_PLAIN, head) and not re.match(_NO_HEADER, head)) or _has_rows(head, notation, place):
         return None, stream
     from frametool.grammar.pasted import begins_freely
     from frametool.ros.pasted_blocks import MOST_PASTED, in_grammar, may_be_pasted
 
     moves, alone = request.operation.moves, request.poses == 1 and request.operation.keeps_position
-    given = None if moves else request.given or given
-    is_free = may_be_pasted(head) and begins_freely(head, given, moves=moves, alone=alone)
+    notation = None if moves else request.given or notation
+    is_free = may_be_pasted(head) and begins_freely(head, notation, moves=moves, alone=alone)
     if is_free is None:
         raise Misused("three rows of three numbers may be a rotation or positions; give --from matrix, or --in columns")
     if not is_free:
@@ -116,15 +116,15 @@ def pasted_stream(
     if len(data) > MOST_PASTED:
         raise FormatError(f"begins as what is pasted, which is {MOST_PASTED} bytes at most; give --in", source=name)
     source = Source(name, decode(data, name))
-    found = in_grammar(source, given, normalize=request.normalize, points=request.operation.moves)
+    found = in_grammar(source, notation, normalize=request.normalize, points=request.operation.moves)
     return found, BufferedReader(BytesIO(data))
 
 
-def _has_rows(head: str, given: Notation | None, place: str) -> bool:
+def _has_rows(head: str, notation: Notation | None, place: str) -> bool:
     """Return True for rows with commas of what --from names, without a header; the rows of a matrix are pasted."""
-    if not (found := re.match(_COMMAS, head)) or place or given is None:
+    if not (found := re.match(_COMMAS, head)) or place or notation is None:
         return bool(found and place)
-    rep = given.representation
+    rep = notation.representation
     return rep.whole is None and found[0].count(",") + 1 - len(rep.columns) in (0, 3)
 
 
@@ -277,7 +277,7 @@ class ArgumentPoses(NamedTuple):
         return self.poses
 
 
-def _given(argument: str | Source, request: Request) -> ArgumentPoses:
+def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
     """Read all poses of one of several arguments; warnings are kept, not told."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
@@ -292,11 +292,11 @@ def _given(argument: str | Source, request: Request) -> ArgumentPoses:
     return found[0]
 
 
-def _several(given: Sequence[ArgumentPoses | None]) -> list[int]:
+def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:
     """Return where the argument that holds several poses stands; raise ValueInvalid if another one does too."""
-    found = [at for at, each in enumerate(given) if each and len(each.poses) > 1]
+    found = [at for at, each in enumerate(read) if each and len(each.poses) > 1]
     if len(found) > 1:
-        named = " and ".join(f"{each.source.name} ({len(each.poses)})" for each in given if each and each.poses[1:])
+        named = " and ".join(f"{each.source.name} ({len(each.poses)})" for each in read if each and each.poses[1:])
         raise ValueInvalid(f"only one argument may hold several poses, found {named}")
     return found
 
@@ -323,27 +323,27 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
         files = " and ".join(bare[at] for at in streams)
         raise click.UsageError(f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")
     stream = streams[0] if streams else None
-    given = [None if at == stream else _given(each, request) for at, each in enumerate(arguments)]
-    says_more = [at for at, each in enumerate(given) if each and each.beside]
-    at = [0, *says_more, *_several(given)][-1] if stream is None else stream
-    _warn_of_twins(bare, given)
-    rows, timed = given[at], None
+    read = [None if at == stream else _read_argument(each, request) for at, each in enumerate(arguments)]
+    says_more = [at for at, each in enumerate(read) if each and each.beside]
+    at = [0, *says_more, *_several(read)][-1] if stream is None else stream
+    _warn_of_twins(bare, read)
+    rows, timed = read[at], None
     if rows is not None and len(rows.poses) == 1:
         from frametool.grammar.pose_algebra import shared_stamp
 
-        timed = shared_stamp(pose for each in given if each for pose in each.poses)
+        timed = shared_stamp(pose for each in read if each for pose in each.poses)
     before, behind = (
         [_only(each.only_poses(timed=timed is not None), each.source) for each in side if each]
-        for side in (given[:at], given[at + 1 :])
+        for side in (read[:at], read[at + 1 :])
     )
     streamed = "inv(-)" if without_inverse(arguments[at])[1] else "-"
     return Rows(at, rows.source if rows else streamed, before, behind, timed)
 
 
-def _warn_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | None]) -> None:
+def _warn_of_twins(arguments: Sequence[str], read: Sequence[ArgumentPoses | None]) -> None:
     """Report that the same uncertain pose twice counts as two that are independent."""
     uncertain = [
-        argument for argument, each in zip(arguments, given, strict=True)
+        argument for argument, each in zip(arguments, read, strict=True)
         if each and any(pose.covariance is not None for pose in each.poses)
     ]  # fmt: skip
     if twice := [each for each in dict.fromkeys(uncertain) if uncertain.count(each) > 1]:
@@ -352,16 +352,16 @@ def _warn_of_twins(arguments: Sequence[str], given: Sequence[ArgumentPoses | Non
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:
     """Read one pose from each argument; one of them may hold several, which are then taken one after another."""
-    given = [_given(each, request) for each in arguments]
-    several = _several(given)
-    read = [each.only_poses(timed=True) for each in given]
+    found = [_read_argument(each, request) for each in arguments]
+    several = _several(found)
+    read = [each.only_poses(timed=True) for each in found]
     most = len(read[several[0]]) if several else 1
     return [tuple(poses[at if len(poses) > 1 else 0] for poses in read) for at in range(most)]
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
     """Read the one pose of an argument; warn of what else stands there."""
-    return _only(_given(argument, request).only_poses(timed=False), argument)
+    return _only(_read_argument(argument, request).only_poses(timed=False), argument)
 
 
 def _only(poses: list[Pose], argument: str | Source) -> Pose:

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 def recorded(chosen: Inputs, fmt: str, output: str | None) -> Recorded:
     """Return what of results a recording of a format holds, as options say; raises UsageError."""
     place = _place(fmt, output)
-    told = chosen.recorded_frames or next(iter(chosen.named_frames), "")
-    frames = tuple(name.strip() for name in told.split(",")) if told else ()
+    names = chosen.recorded_frames or next(iter(chosen.named_frames), "")
+    frames = tuple(name.strip() for name in names.split(",")) if names else ()
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
-        raise UsageError(f"--frames takes WORLD,BODY; found {shown(told)}")
-    refuse(len({*frames}) < len(frames), f"--frames {told}: no frame is its own parent; give two names")
+        raise UsageError(f"--frames takes WORLD,BODY; found {shown(names)}")
+    refuse(len({*frames}) < len(frames), f"--frames {names}: no frame is its own parent; give two names")
     chosen.formats_read = (*chosen.formats_read, *[("", ("frames",))] * bool(chosen.named_frames))
     return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
@@ -48,13 +48,13 @@ def folder_of(place: str) -> str:
     return folder if os.path.isdir(folder) else ""
 
 
-def copied_as(fmt: str, path: str, output: str | None, told: str | None) -> tuple[str, str]:
+def copied_as(fmt: str, path: str, output: str | None, named: str | None) -> tuple[str, str]:
     """Return the format in which a recording is copied, and its place; raise UsageError where none can be.
 
-    told: the format, where the name of the place does not say it
+    named: the format, where the name of the output does not say it
     """
     folder = "bag2" if os.path.isdir(path) and output and not os.path.splitext(output)[1] else None
-    copy = told or by_name(output, writers("recording")) or folder
+    copy = named or by_name(output, writers("recording")) or folder
     if copy is None:
         unknown = f"-o {output} names no format; " if output else ""
         raise UsageError(f"{unknown}give {'-o NEW.bag' if fmt == 'bag1' else '-o NEW.mcap or -f bag2 -o FOLDER'}")

@@ -47,7 +47,7 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     is.  Anything else is written to a file without a name in the same folder, which takes the file's place, mode and
     owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
     system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
-    Raises FileProblem if the file exists and `force` is not given, or cannot be written; BrokenPipeError if the reader
+    Raises FileProblem if the file exists and `force` is not set, or cannot be written; BrokenPipeError if the reader
     of a pipe is gone; what a check finds wrong.
     """
     if path in (None, "-", "/dev/stdout"):

@@ -34,7 +34,7 @@ RECORDS = readers("records")
 
 _of_rows = partial(option, under="Rows")
 _ROWS = (
-    option("--from REP", "representation of bare numbers", options.Notations(), name="given", under="Rotations"),
+    option("--from REP", "representation of bare numbers", options.Notations(), name="from_rep", under="Rotations"),
     _of_rows("--columns NAME,..", "pose columns by name or number, once per pose; or one key of records, a.b",
              options.ColumnNames(), multiple=True),
     _of_rows("--keep", "append result columns, keep the input's"),
@@ -62,19 +62,19 @@ class Stream:
         """Look at what the options say; each is asked for where it counts."""
         self._tell = partial(say_error, in_json=inputs.peek("format_name") == "json")
         self.inputs = inputs
-        given = inputs.peek("input_path")
-        self.paths: Sequence[str] = given if isinstance(given, tuple) else () if given is None else (given,)
+        path = inputs.peek("input_path")
+        self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
         self.path: str | None = self.paths[0] if self.paths else None
         if self.path == "-":
             self.path = None
         self._opened: BufferedReader | None = None
         self.within = ""  # the format of the records in a bag
-        told: Any = inputs.peek("given") or (None,)
-        refuse(len(told) > 1, "--from takes one representation")
-        self.given: Any = told[0]
-        self.given_place = ""
-        if self.given is not None and self.given.representation.is_place:
-            self.given, self.given_place = None, self.given.representation.name
+        notations: Any = inputs.peek("from_rep") or (None,)
+        refuse(len(notations) > 1, "--from takes one representation")
+        self.notation: Any = notations[0]
+        self.place = ""
+        if self.notation is not None and self.notation.representation.is_place:
+            self.notation, self.place = None, self.notation.representation.name
 
     def opened(self) -> BufferedReader:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
@@ -183,12 +183,12 @@ class Stream:
         from frametool.formats.detect import refuse_robots, with_hint
 
         self.inputs.ask("input_path", "on_error", "max_errors")
-        with self.opened() as given:
-            head = given.peek()
+        with self.opened() as source:
+            head = source.peek()
             if head.lstrip()[:1] == b"<":
                 refuse_robots(head, self.name)
             try:
-                return self._run_opened(given, request, output, tables_only=tables_only)
+                return self._run_opened(source, request, output, tables_only=tables_only)
             except FormatError as error:
                 raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
 
@@ -200,11 +200,11 @@ class Stream:
         if not (fmt or tables_only or self._says_columns() or is_listed):
             from frametool.cli.poses import pasted_stream
 
-            pasted, stream = pasted_stream(stream, self.name, request, self.given, self.given_place)
+            pasted, stream = pasted_stream(stream, self.name, request, self.notation, self.place)
             if pasted is not None:
                 return self._run_pasted(pasted, request, output)
         fmt = fmt or self._detected(stream.peek(), is_table=tables_only or self._says_columns())
-        if fmt == "kitti" and self.given and not self.chosen_format():
+        if fmt == "kitti" and self.notation and not self.chosen_format():
             fmt = "columns"  # --from says what the numbers are, and nothing of pictures
         if request.poses:
             self.inputs.ask("camera_axes", *FORMATS[fmt].required_options)
@@ -320,7 +320,7 @@ class Stream:
         """Write the results of a text that was pasted."""
         from frametool.stream.record_values import read_poses, results
 
-        self.inputs.ask("given")
+        self.inputs.ask("from_rep")
         if request.gathered is not None:
             request.gathered.add(read_poses(source, request), source.name)
             return 0
@@ -347,23 +347,23 @@ class Stream:
 
     def _completed(self, request: Request, output: Output, fmt: str) -> Request:
         """Add what the stream's options say to the request."""
-        told = self.inputs
+        inputs = self.inputs
         adds = bool(request.poses) or request.operation.formula is None  # look-ups add by themselves
         if fmt not in RECORDS and output.chosen not in RECORDS and adds and request.gathered is None:
-            request = request._replace(keep=told.keep)
+            request = request._replace(keep=inputs.keep)
         if (fmt not in RECORDS or request.operation.only_adds) and request.gathered is None:
-            request = request._replace(prefix=told.prefix)
+            request = request._replace(prefix=inputs.prefix)
         if request.poses:
-            told.ask("given")
-            request = request._replace(columns=told.columns)
+            inputs.ask("from_rep")
+            request = request._replace(columns=inputs.columns)
         several = fmt in RECORDS and "," in ",".join(request.columns)
         refuse(several, "--columns names one key of records, as detections.pose")
         if not has_no_text(output.chosen or fmt):
-            told.ask("precision")
+            inputs.ask("precision")
         return request._replace(
-            given=request.given or self.given, notations=request.notations or output.notations,
-            place=output.style.with_format(output.chosen or fmt).place, given_place=self.given_place,
-            precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=told.on_error,
+            given=request.given or self.notation, notations=request.notations or output.notations,
+            place=output.style.with_format(output.chosen or fmt).place, given_place=self.place,
+            precision=output.style.precision, keep_sign=output.style.keep_sign, on_error=inputs.on_error,
         )  # fmt: skip
 
     def _write(self, outcomes: Generator[Outcome], output: Output, bad: BadRows, *, gathers: bool) -> int:

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 # field of Answers -> the parameters that say it; what moves is asked whether --time-offset counts
 ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name != "time_offset"}
-ANSWERED |= {"frames": ("named_frames",), "order": ("order", "given")}
-OF_FILES = (*Answers._fields, "named_frames", "given", "input_formats", "topics", "quiet", "verbose")
+ANSWERED |= {"frames": ("named_frames",), "order": ("order", "from_rep")}
+OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topics", "quiet", "verbose")
 
 
 def load_tree(
@@ -122,19 +122,19 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     cache = None if context is None else context.find_object(ReadCache)
     if context is None or cache is None:
         return read()
-    given = inputs()
-    given.reads_trees = True
+    passed = inputs()
+    passed.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    before, idle = given.formats_read, given.idle()
+    before, idle = passed.formats_read, passed.idle()
 
     def read_all() -> tuple[Value, Any, Any]:
-        return read(), given.formats_read[len(before) :], idle - given.idle()
+        return read(), passed.formats_read[len(before) :], idle - passed.idle()
 
-    key = tuple(named), f"{options} {[given.peek(name) for name in OF_FILES]}"
+    key = tuple(named), f"{options} {[passed.peek(name) for name in OF_FILES]}"
     files = [each for each in named if not is_inline(each) and os.path.exists(each)]
     value, formats, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
-    given.formats_read = (*before, *formats)
-    given.ask(*asked)
+    passed.formats_read = (*before, *formats)
+    passed.ask(*asked)
     return value
 
 
@@ -214,8 +214,8 @@ def answers() -> Answers:
     """Return what the options say about all files whose format leaves it open."""
     chosen = inputs()
     named = {name: chosen.peek(name) for name in Answers._fields if name not in ("joints", "frames")}
-    given = chosen.peek("given")
-    named["order"] = named["order"] or next((each.spec for each in given or () if each.spec in ORDERS), "")
+    notations = chosen.peek("from_rep")
+    named["order"] = named["order"] or next((each.spec for each in notations or () if each.spec in ORDERS), "")
     return SaidAnswers(joints=_joints(chosen.peek("joints")), **{name: value for name, value in named.items() if value})
 
 

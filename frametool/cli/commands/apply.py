@@ -67,7 +67,7 @@ def command(inputs: Inputs) -> int:
     stream, output, plan = task.stream, task.output, task.plan
     clouds = clouds_of(stream, output)
     if inputs.pose is None:
-        way, rest = way_by_tree(inputs, numbers=bool(stream.given_place))
+        way, rest = way_by_tree(inputs, numbers=bool(stream.place))
     else:
         way, rest = _way_by_pose(inputs, task), inputs.arguments
     is_stream = rest in ((), ("-",))
@@ -89,9 +89,9 @@ def command(inputs: Inputs) -> int:
         status = stream.run(request, output)
     else:
         task.only_arguments(rest)
-        if stream.given_place:
-            inputs.ask("given")
-        output.values(values_of(list(sources_of(rest, kind, stream.given_place)), request, output))
+        if stream.place:
+            inputs.ask("from_rep")
+        output.values(values_of(list(sources_of(rest, kind, stream.place)), request, output))
     way.tell()
     return status
 
@@ -117,9 +117,9 @@ def _kind(inputs: Inputs) -> str | None:
 
 
 class Way(NamedTuple):
-    """Where records go, and the transform that takes them there from the frame they are given in.
+    """Where records go, and the transform that takes them there from the frame they are expressed in.
 
-    target: the frame they are then given in, if it has a name
+    target: the frame they are then expressed in, if it has a name
     from_frame: the transform from a frame (None: the one SOURCE), at a time or the latest
     at_times: columns of such transforms, nan where there is no data; None where the time does not matter
     moves: tells whether the transform from a frame depends on the time
@@ -211,7 +211,7 @@ def way_by_tree(inputs: Inputs, *, numbers: bool) -> tuple[Way, tuple[str, ...]]
 
 
 def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
-    """Move everything by one pose; where it names its frames, records must be given in its name."""
+    """Move everything by one pose; where it names its frames, records must be expressed in that one."""
     from frametool.stream.request import COMBINED
 
     uncertain = inputs.covariance
@@ -234,7 +234,7 @@ def _way_by_pose(inputs: Inputs, task: PoseTask) -> Way:
 
 
 def _settled(own: str | None, source: str | None) -> str | None:
-    """Decide which frame a record is given in: where both it and the command say, they must agree."""
+    """Decide which frame a record is expressed in: where both it and the command say, they must agree."""
     if own and source is not None and own != source and not {own, source} <= {*EARTH_FRAMES}:
         remedy = "leave SOURCE out to use each record's own frame"
         raise ValueInvalid(f"a record is given in {shown(own)}, not in {shown(source)}; {remedy}")
@@ -257,7 +257,7 @@ def _is_apart(argument: str) -> bool:
 
 
 def sources_of(arguments: Sequence[str], kind: str | None, place: str = "") -> Iterator[str | Source]:
-    """Yield the texts of records: bare numbers in threes become points, the rest is as it was given."""
+    """Yield the texts of records: bare numbers in threes become points, the rest is unchanged."""
     if place and not any(map(is_record, arguments)):
         from frametool.cli.earth import mapping_of
 

@@ -153,7 +153,7 @@ def print_as_json(name: str, context: click.Context) -> None:
     params["format_name"] = "json"
 
 
-FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows, as it was told to, has come to its end
+FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows, as --on-error says, has come to its end
 ENDLESS = ("--realtime", "--live", "teleop", "--duration=inf")
 NO_INPUT = "standard input is not for the lines of a batch; name a file, or keep a result by NAME = and give $NAME"
 

@@ -75,14 +75,14 @@ def command(inputs: Inputs) -> int:
         from frametool.cli.earth import earth
 
         scope.earth = earth()
-    given = list(_given(inputs.arguments, inputs.expressions, scope))
-    lines = [read_line(text) for text, _ in given]
+    texts = list(_expressions(inputs.arguments, inputs.expressions, scope))
+    lines = [read_line(text) for text, _ in texts]
     scope.tree = _tree(inputs.trees, lines)
     if not lines:
         inputs.ask("origin", "local_axes", "zone")  # whatever comes
         return _without_expression(stream, output, scope)
     if stream.path is not None or any(mentions_row(line.tree) for line in lines):
-        formula = _over_rows(lines, [is_option for _, is_option in given], scope, output)
+        formula = _over_rows(lines, [is_option for _, is_option in texts], scope, output)
         formula.check((inputs.kind,) if inputs.kind else ("pose", "point", "vector"))
         request = _request(formula, inputs)
         return stream.run(request, output)
@@ -90,7 +90,7 @@ def command(inputs: Inputs) -> int:
     return 0
 
 
-def _given(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -> Iterator[tuple[str, bool]]:
+def _expressions(arguments: Iterable[str], expressions: Iterable[str], scope: Scope) -> Iterator[tuple[str, bool]]:
     """Yield the expressions in order, and whether -e gave them; names of files are bound."""
     for text in () if tuple(arguments) == ("-",) else arguments:  # a lone - is standard input, read in any case
         if file_named_in(text, scope) is None:

@@ -61,15 +61,15 @@ def command(inputs: Inputs) -> int:
 
     REF and EST are trajectories or positions in any format (help trajectories).
     """
-    path, told, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
+    path, chosen, rows, explain, report = inputs.output, inputs.format_name, inputs.rows, inputs.explain, inputs.report
     limits, est = inputs.limits, inputs.est
-    instead = path if told is None and _format_of(path) else None
+    instead = path if chosen is None and _format_of(path) else None
     for name in filter(None, (report, instead)):
         refuse_existing(name, force=inputs.force)
     refuse(instead and rows, "--rows are CSV or JSON, no picture; write them with -f, or leave them out")
     if len(est) > 1 and "svg" in (_format_of(report), _format_of(instead)):
         raise click.UsageError("an SVG shows one comparison; write .html for several")
-    if explain and (rows or instead or told not in (None, "text")):
+    if explain and (rows or instead or chosen not in (None, "text")):
         raise click.UsageError("--explain writes text; leave --rows, -f and pictures out")
     output = Output(inputs, "report", otherwise="text")
     try:

@@ -40,7 +40,7 @@ class ConvertCommand(Command):
         super().format_epilog(ctx, formatter)
 
 
-@command_named("convert", own=("given", "notations"), cls=ConvertCommand)
+@command_named("convert", own=("from_rep", "notations"), cls=ConvertCommand)
 @argument("values", nargs=-1, metavar="[VALUES.. | POSE]")
 @option("--axes NAME", "the pose at the same place in these axes (help axes)", AXES)
 @option("--world-axes A_from_B", "axes of the reference frame (help axes)", AXES, name="world")
@@ -181,7 +181,7 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
     return OtherAxes(left, right, operation.mirrors) if left or right else None
 
 
-def _say_of_engines(world: str | None, given: Notation | None, output: Output, *, is_anew: bool) -> None:
+def _say_of_engines(world: str | None, read_as: Notation | None, output: Output, *, is_anew: bool) -> None:
     """Report the units and angles that engines call by the same names, and write what is written anew in theirs."""
     from frametool.geometry.conventions import ENGINE_ANGLES, IN_CENTIMETRES
 
@@ -193,7 +193,7 @@ def _say_of_engines(world: str | None, given: Notation | None, output: Output, *
         say(f"note: Unreal counts in centimetres: xyz {here}")
     if out_of == IN_CENTIMETRES:
         say("note: Unreal counts in centimetres: xyz is read as metres, xyz_cm and x_cm say them")
-    for engine, wanted in ((into, output.notations), (out_of, (given,) if given else ())):
+    for engine, wanted in ((into, output.notations), (out_of, (read_as,) if read_as else ())):
         if engine in ENGINE_ANGLES and any(each.representation.name == "rpy" for each in wanted):
             say(f"warning: rpy is not what {engine.title()} calls its angles; {ENGINE_ANGLES[engine]} is")
 

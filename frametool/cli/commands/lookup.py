@@ -110,7 +110,7 @@ def _check_covariance(output: Output, *, by_row: bool) -> None:
 
 
 def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tuple[int, int] | None) -> int:
-    """Print the results at --times, or at those of all samples; with --on-error skip others are left out, and told."""
+    """Print the results at --times, or at those of all samples; with --on-error skip report the others."""
     inputs, tree = task.inputs, lookups.tree
     times, skipped = inputs.times, options.Skipped(in_json=task.output.chosen == "json")
     skip = times is not None and inputs.on_error == SKIP

@@ -46,9 +46,9 @@ def command(inputs: Inputs) -> int:
 
     gathered = Gathered(named=robust, labelled=inputs.by is not None)
     request = task.request(extra_column=inputs.by or weights, gathered=gathered)
-    status, given = 0, None
+    status, numbers = 0, None
     bare, is_inverse = without_inverse(poses[0]) if len(poses) == 1 else ("", False)
-    if bare == "-" or (bare and not stream.path and not is_pasted(bare, stream.given)):
+    if bare == "-" or (bare and not stream.path and not is_pasted(bare, stream.notation)):
         stream.path, poses = stream.path if bare == "-" else bare, ()
         request = request.of_inverses() if is_inverse else request
     if not poses:
@@ -57,9 +57,9 @@ def command(inputs: Inputs) -> int:
         task.only_arguments(poses)
         for number, each in enumerate(poses, 1):
             gathered.add(poses_from(each, request), f"argument {number}" if is_inline(each) else each)
-        given = None if weights is None else _numbers(weights)
-        if given is not None and len(given) != len(gathered.transforms):
-            raise click.UsageError(f"--weights are {len(given)}, the poses {len(gathered.transforms)}")
+        numbers = None if weights is None else _numbers(weights)
+        if numbers is not None and len(numbers) != len(gathered.transforms):
+            raise click.UsageError(f"--weights are {len(numbers)}, the poses {len(gathered.transforms)}")
     if gathered.uncertain:
         warn("covariances left out: mean's is that of the rows")
     if gathered.stamped:
@@ -67,7 +67,7 @@ def command(inputs: Inputs) -> int:
     from frametool.fit.closed_forms import mean_of_rows
 
     if inputs.by is None:
-        result, left_out = mean_of_rows(gathered, given, robust=robust)
+        result, left_out = mean_of_rows(gathered, numbers, robust=robust)
         task.output.values([result])
     else:
         refuse(bool(poses), "--by is of rows; POSEs have no column")

@@ -44,10 +44,10 @@ def command(inputs: Inputs) -> int:
         return task.derive("relative", *map(task.written, [one_argument(each) for each in (a, b)]))
     from frametool.stream.request import PREVIOUS, START, Operation
 
-    given = [each for each in (a, b) if each is not None]
+    poses = [each for each in (a, b) if each is not None]
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
-        refuse(len(given) > 1, "rows are compared with one of themselves; leave A and B out")
+        refuse(len(poses) > 1, "rows are compared with one of themselves; leave A and B out")
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if inputs.consecutive else START, velocity=velocity)
         beside = (inputs.time_column or "") if velocity or window else None
@@ -61,11 +61,11 @@ def command(inputs: Inputs) -> int:
     if b is None:
         refuse(a not in (None, "-"), "name A and B; one of them may be - for standard input")
         return task.answer("-", task.request(operation=Operation(of="pair"), poses=2, window=window))
-    bare = [without_inverse(each)[0] for each in given]
+    bare = [without_inverse(each)[0] for each in poses]
     refuse(bare == ["-", "-"], "standard input can be read once; leave A and B out to compare two poses of each row")
     refuse(task.stream.path and "-" not in bare, "-i FILE is read where - stands for A or B")
     request = task.request(window=window)
-    rows = rows_among(given, request, task.has_table)
+    rows = rows_among(poses, request, task.has_table)
     fixed = [*rows.before, *rows.behind][0]
 
     def rename(parent: str | None, name: str | None) -> tuple[str | None, str | None]:
