@@ -91,7 +91,7 @@ def say_error(error: FrametoolError, *, in_json: bool, fate: str = "") -> None:
     if in_json:
         tell(as_json(error, _lines[-1] if _lines else None, fate))
         return
-    say(f"{error}{f' ({fate})' if fate else ''}")
+    say(f"{error}{getattr(error, 'remedy', '')}{f' ({fate})' if fate else ''}")
     if snippet := getattr(error, "snippet", ""):
         tell(snippet)
 

@@ -16,7 +16,7 @@ from frametool.cli.stderr import say, say_error
 from frametool.documents.source import HEAD, Source, has_line, has_record
 from frametool.errors import FileProblem, FormatError
 from frametool.formats.table import FORMATS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
-from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRows
+from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     About = Callable[[], str] | None  # what else there is to say of a format
 
+TOP = 2  # lines of a table up to its first row: what is bad there may be bad in every row
 BAGS = (".bag", ".mcap", ".db3")
 _STREAMS = ", ".join(readers(*options.STREAMED))
 RECORDS = readers("records")
@@ -180,7 +181,7 @@ class Stream:
 
     def run(self, request: Request, output: Output, *, tables_only: bool = False) -> int:
         """Run the stream and return its exit status."""
-        from frametool.formats.detect import refuse_robots, with_hint
+        from frametool.formats.detect import refuse_robots
 
         self.inputs.ask("input_path", "on_error", "max_errors")
         with self.opened() as source:
@@ -190,7 +191,15 @@ class Stream:
             try:
                 return self._run_opened(source, request, output, tables_only=tables_only)
             except FormatError as error:
-                raise with_hint(error, head, self.name, chosen=bool(self.chosen_format())) from None
+                raise self._with_remedy(error, head) from None
+
+    def _with_remedy(self, error: FormatError, head: bytes) -> FormatError:
+        """Return the error that ends a stream with what to do."""
+        from frametool.formats.detect import with_hint
+
+        if isinstance(error, BadRow) and not (error.fault.final or head[:1] == b"[" or error.fault.line <= TOP):
+            error.remedy = "; --on-error skip goes on"
+        return with_hint(error, head, self.name, chosen=bool(self.chosen_format()))
 
     def _run_opened(self, stream: BufferedReader, request: Request, output: Output, *, tables_only: bool) -> int:
         """Run the stream, of whatever format it is."""

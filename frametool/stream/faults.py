@@ -75,6 +75,7 @@ class BadRow(FormatError):
 
     fate: what became of it: `row skipped`, `no result`, or "" if the run ended
     counted: what the number of its place counts: `line`, or `row` where there are no lines
+    remedy: what to do, in text for people
     """
 
     def __init__(self, fault: Fault, reason: str, *, source: str, fate: str = "", counted: str = "line") -> None:
@@ -82,6 +83,7 @@ class BadRow(FormatError):
         super().__init__(f"{reason} ({fate})" if fate else reason, source=source, line=fault.line)
         self.fault = fault
         self.counted = counted
+        self.remedy = ""
 
     def __str__(self) -> str:
         """Return `source:line:column: message`, or `source: row 17, column x: message`."""

@@ -172,3 +172,15 @@ def test_poses_are_not_cut_down_to_points(tmp_path: Path) -> None:
     status, out, told = in_tree(tmp_path, "cam", "--as", "point", text=b"x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n")
     assert (status, out) == (2, b"")
     assert "cannot be taken for a point" in told[0]
+
+
+def test_a_bad_row_after_good_ones_names_what_goes_on(tmp_path: Path) -> None:
+    def told(*arguments: str, text: bytes) -> str:
+        return in_tree(tmp_path, "cam", *arguments, text=text)[2][-1]
+
+    assert told(text=b"x,y,z\n0,0,0\n0,n/a,0\n") == "frametool: stdin:3:y: 'n/a' is not a number; --on-error skip goes on"
+    assert told(text=b"x,y,z\n0,n/a,0\n") == "frametool: stdin:2:y: 'n/a' is not a number"
+    assert "skip" not in told("-f", "json", text=b"x,y,z\n0,0,0\n0,n/a,0\n")
+    path = tmp_path / "points.csv"
+    path.write_text("x,y,z\n0,0,0\n")
+    assert "pass a file of records with -i " in told(str(path), text=b"")

@@ -277,6 +277,10 @@ def _points(texts: Sequence[str], kind: str | None) -> Iterator[Source]:
     except NotFinite:
         raise
     except ValueInvalid as error:
+        import os
+
+        file = next(filter(os.path.isfile, texts), "")
+        refuse(file, f"pass a file of records with -i {file}")
         raise click.UsageError(f"{error}; a point is three numbers or a mapping") from None
     refuse(len(numbers) % 3, f"points are three numbers each, found {len(numbers)}")
     for at in range(0, len(numbers), 3):
