@@ -110,7 +110,7 @@ def trajectory(
 
     known = answers()
     found = read_trajectory(
-        argument, form=fmt, topics=running().topics, answers=known._replace(time_offset=0), policy=policy,
+        argument, fmt=fmt, topics=running().topics, answers=known._replace(time_offset=0), policy=policy,
         normalize=normalize,
     )  # fmt: skip
     if found.stamps_ns is not None:

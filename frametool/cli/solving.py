@@ -132,7 +132,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     eye_to_hand = inputs.eye_to_hand
     if len(files) == 1:
         fmt, columns, normalize = formats_of(1)[0], inputs.columns or (), inputs.normalize
-        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, form=fmt, columns=columns)
+        samples = read_samples(files[0], eye_to_hand=eye_to_hand, normalize=normalize, fmt=fmt, columns=columns)
     else:
         samples = _paired(inputs, files)
     named = [each or name for each, name in zip(samples.names, NAMES, strict=True)]
@@ -143,7 +143,7 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     second, number = f"; {samples.files[1]}:" if len(files) > 1 else ",", len(samples.places)
     taken = f"{samples.files[0]}: {base}<-{gripper}{second} {camera}<-{target}; {number} sample{'s' * (number != 1)}"
     _report_taken(inputs, taken, samples.taken, f"solving for {holder}<-{camera} and {other}<-{target}")
-    for each in samples.told:
+    for each in samples.warnings:
         say(each)
     from frametool.fit.hand_eye import solve_hand_eye
 
@@ -184,14 +184,14 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
         return BadRows(name, STOP, tell=lambda error: say_error(error, in_json=False))
 
     named = zip(files, formats_of(2), strict=True)
-    a, b = (read_points(file, form=fmt, answers=answers(), policy=policy) for file, fmt in named)
+    a, b = (read_points(file, fmt=fmt, answers=answers(), policy=policy) for file, fmt in named)
     found_names = (a.frame, b.frame) if a.frame and b.frame and a.frame != b.frame else ("A", "B")
     names = target, source = tuple(inputs.names or found_names)
     pairs = matched(a, b)
     how, ids = "by row" if pairs.ids is None or a.ids is None or b.ids is None else "by id", pairs.ids
     matched_as = f"{len(pairs.places)} matched {how}"
     _report_taken(inputs, f"{a.file}: points in {target}; {b.file}: points in {source}; {matched_as}")
-    for each in pairs.told:
+    for each in pairs.warnings:
         say(each)
     weights, scale = pairs.weights, inputs.scale
     found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)

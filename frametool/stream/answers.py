@@ -101,13 +101,13 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     edge = None
     timed = request.timed
     if timed is not None and timed.name:
-        stamp = (_beside(key_path, document, record, timed.name),)
+        stamp = (_extra(key_path, document, record, timed.name),)
     elif timed is not None and record.stamps and timed.moves(record.parent.text):
         stamp = record.stamps[:2]
     elif timed is not None and request.operation.formula is not None and not request.operation.shown:
-        stamp = (_beside(stamp_keys, document, record),)
+        stamp = (_extra(stamp_keys, document, record),)
     elif request.extra_column is not None:
-        stamp = _path_beside(document, record, request.extra_column)
+        stamp = _extra_path(document, record, request.extra_column)
     elif request.pose_from_frame is not None:
         edge = request.pose_from_frame(record.parent.text)
     request = request.for_kind(record.shape.kind)
@@ -117,18 +117,18 @@ def _entry(document: Document, record: Record, request: Request) -> Entry:
     return Entry(record, target_of(record, request), edge, stamp, parent, name, lost_name(record, request))
 
 
-def _path_beside(document: Document, record: Record, name: str) -> tuple[Path, ...]:
+def _extra_path(document: Document, record: Record, name: str) -> tuple[Path, ...]:
     """Find what comes with a record under a key; "" is the stamp of its header, or else under a usual key."""
     if name:
-        return (_beside(key_path, document, record, name),)
+        return (_extra(key_path, document, record, name),)
     try:
-        return record.stamps[:2] or (_beside(stamp_keys, document, record),)
+        return record.stamps[:2] or (_extra(stamp_keys, document, record),)
     except Misfit:
         usual = ", ".join(STAMP_KEYS)
         raise Misfit(f"no stamp: neither a header nor {usual}; give --time-column", record.path) from None
 
 
-def _beside(find: Callable[..., Path], document: Document, record: Record, *name: str) -> Path:
+def _extra(find: Callable[..., Path], document: Document, record: Record, *name: str) -> Path:
     """Find a scalar around a record; raises Misfit."""
     return (document.index, *within((document.index,), find, document.value, record.path[1:], *name))
 
@@ -179,8 +179,8 @@ def wide_turn(made: Answer, operation: Operation) -> Finding | None:
         return None
     from frametool.geometry.uncertainty import WIDE_RULE, doubt
 
-    told = doubt(made.parts[-SIX_BY_SIX:])
-    return Finding(WIDE_RULE, told, path=record.path) if told else None
+    message = doubt(made.parts[-SIX_BY_SIX:])
+    return Finding(WIDE_RULE, message, path=record.path) if message else None
 
 
 def _stamp_ns(entry: Entry, texts: Sequence[str]) -> int:

@@ -1,7 +1,7 @@
 """Columns of numbers and texts on their way into a file of columns: each gets one type, as all its cells allow.
 
-Cells of text and the values of records wait until so many rows are there; then their types are settled.  What a form
-has no place for is left out, which is told once.
+Cells of text and the values of records wait until so many rows are there; then their types are settled.  What a format
+has no place for is left out, with one warning.
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ def fit(texts: Sequence[str], kind: Kind) -> bool:
 
 
 class ColumnsWriter:
-    """Write blocks of columns into a file of a form; the columns are those of the first rows."""
+    """Write blocks of columns into a file of a format; the columns are those of the first rows."""
 
     def __init__(self, style: Style, module: Any = None) -> None:
-        """Choose the form; module: what creates its writer, where that is not the form's own."""
+        """Choose the format; module: what creates its writer, where that is not the format's own."""
         self.style = style
         self.module: Any = module or import_module(FORMATS[style.format].writer)
         self.has_nulls: bool = getattr(self.module, "NULLS", False)
@@ -124,13 +124,13 @@ class ColumnsWriter:
         if not self.columns:
             raise ValueInvalid(f"{self.style.format} has no place for any column of these: {listing(self.left_out)}")
         texts = {name for made in blocks for name in made if isinstance(made[name].values, Spans)}
-        if (told := [column for column in self.columns if column.name in texts]) and self.has_nulls:
-            types = ", ".join(f"{each.name} {TYPE_NAMES.get(each.kind, each.kind)}" for each in told)
+        if (named := [column for column in self.columns if column.name in texts]) and self.has_nulls:
+            types = ", ".join(f"{each.name} {TYPE_NAMES.get(each.kind, each.kind)}" for each in named)
             warn(f"types of other columns, by their cells: {types}")
         self.writer = self.module.create(self.columns, None, self.style)
 
     def _misfit(self, column: OutColumn) -> str:
-        """Return the reason why a column has no place in the form; "" where it has one."""
+        """Return the reason why a column has no place in the format; "" where it has one."""
         if column.kind is None and not FORMATS[self.style.format].texts:
             return "it holds numbers"
         reason: str = self.module.misfit(column) if hasattr(self.module, "misfit") else ""
@@ -237,7 +237,7 @@ class ArrayWriter(ColumnsWriter):
     """
 
     def __init__(self, style: Style, kind: str, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose the form; kind: what a row is; extras: the numbers with each; placed: it has a position."""
+        """Choose the format; kind: what a row is; extras: the numbers with each; placed: it has a position."""
         super().__init__(style)
         self.kind = kind
         self.extras = tuple(extras)

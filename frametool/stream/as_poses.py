@@ -1,6 +1,6 @@
-"""Streams whose results come out in another form than theirs: rows of tables and listed poses, block by block.
+"""Streams whose results come out in another format than theirs: rows of tables and listed poses, block by block.
 
-rows or listed poses -> the operation -> blocks of poses -> the text of the other form
+rows or listed poses -> the operation -> blocks of poses -> the text of the other format
 """
 
 from __future__ import annotations
@@ -57,23 +57,23 @@ class Step(NamedTuple):
 class FormatConverter:
     """Convert a stream of poses or points to another format, block by block."""
 
-    def __init__(self, form: str, request: Request, style: Style, source: str, answers: Answers) -> None:
+    def __init__(self, fmt: str, request: Request, style: Style, source: str, answers: Answers) -> None:
         """Take what is asked for; raises Misused for what only a table can hold."""
         if request.keep or (request.prefix and request.operation.formula is None):
             raise Misused("--keep and --prefix are for tables that stay in their form")
-        self.form = form
+        self.fmt = fmt
         self.source = source
         self.answers = answers
         self.tally = Diagnostics()
-        self.is_table = FORMATS[form].is_table
-        self.module: Any = None if self.is_table else import_module(FORMATS[form].reader)
+        self.is_table = FORMATS[fmt].is_table
+        self.module: Any = None if self.is_table else import_module(FORMATS[fmt].reader)
         self.style = style.with_format(style.format)
         self.request = request._replace(all_numbers=True, notations=(QUATERNION,), keep_sign=True, place=None)
         self.looks_up_places = request.place is not None and not request.poses  # whose TARGET each row was checked for
         self.stamps = StampFile(answers.stamps) if answers.stamps else None
         self.to_arrays, self.has_points = ("arrays" in (writes := FORMATS[style.format].writes)), "points" in writes
         if request.on_error == NULL and not (self.is_table and (self.to_arrays or style.format in LEARNED)):
-            raise Misused(f"--on-error null: {style.format} of {form} cannot hold a row without a result; give skip")
+            raise Misused(f"--on-error null: {style.format} of {fmt} cannot hold a row without a result; give skip")
         self.without = 0  # rows of an array that stand for no point or pose, and have no place in a text
 
     def outcomes(self, stream: BufferedReader, *, header: bool = True) -> Generator[Outcome]:
@@ -95,14 +95,14 @@ class FormatConverter:
             raise FormatError("nothing in it", source=self.source)
         if writer is not None:
             yield from map(Outcome, writer.end())
-        for told in self.tally.findings():
-            warn(f"{self.source}:{told.line}: {told.message}")
+        for finding in self.tally.findings():
+            warn(f"{self.source}:{finding.line}: {finding.message}")
 
     def steps(self, stream: BufferedReader, *, header: bool = True) -> Iterator[Step]:
         """Yield the results of one block after the other."""
         if self.is_table:
             return self._rows(stream, header=header)
-        return self._columns(stream) if "arrays" in FORMATS[self.form].reads else self._listed(stream)
+        return self._columns(stream) if "arrays" in FORMATS[self.fmt].reads else self._listed(stream)
 
     def _writer(self) -> BlockWriter:
         """Choose what writes the results, by what they are."""
@@ -110,7 +110,7 @@ class FormatConverter:
         kind = operation.result_kind(self.shape.kind)
         extras = [self.request.prefix + name for name in self.request.extras(self.shape)]
         if operation.only_adds or not kind or (extras and kind != POSE and operation.formula is not None):
-            raise Misused(f"a stream of {self.form} with such results stays one; leave -f {self.style.format} out")
+            raise Misused(f"a stream of {self.fmt} with such results stays one; leave -f {self.style.format} out")
         return writer_for(self.style, kind, extras, placed=self.placed)
 
     def _zones(self, poses: RowPoses) -> list[RowNote]:
@@ -139,8 +139,8 @@ class FormatConverter:
 
     def _rows(self, stream: BufferedReader, *, header: bool) -> Iterator[Step]:
         """Yield the rows of a table."""
-        form, request = FORMATS[self.form].poses, self.request
-        begun = begin_table(stream, self.form, request, source=self.source, header=header)
+        fmt, request = FORMATS[self.fmt].poses, self.request
+        begun = begin_table(stream, self.fmt, request, source=self.source, header=header)
         rows = TablePoses(begun.table, request, self.source)
         self._settle(rows.shape, rows.plan, rows.columns, line=1)
         count = 0
@@ -150,19 +150,19 @@ class FormatConverter:
             poses = self._with_place(block, lambda size: [*rows.given[:size]])
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
-            stamps = stamps_for(poses, self.stamps, form, count)
-            poses = poses._replace(stamps_ns=self._held(stamps, form) if form.counted else stamps)
+            stamps = stamps_for(poses, self.stamps, fmt, count)
+            poses = poses._replace(stamps_ns=self._held(stamps, fmt) if fmt.counted else stamps)
             count += len(poses.numbers)
             yield Step(poses, outcome)
         if self.stamps:
             self.stamps.finish(count, self.source)
-        if is_trajectory(self.form):
-            describe(Options(self.tally, Topics(), answers=self.answers), form, count, named=False)
+        if is_trajectory(self.fmt):
+            describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
 
-    def _held(self, stamps_ns: Any, form: Poses) -> Any:
-        """Return stamps, unless they only count and the other form has no place for them: they are not lost then."""
+    def _held(self, stamps_ns: Any, fmt: Poses) -> Any:
+        """Return stamps, unless they only count and the other format has no place for them: they are not lost then."""
         rows = rows_of(self.style.format)
-        counts = bool(form.counted) and self.stamps is None
+        counts = bool(fmt.counted) and self.stamps is None
         has_room = not is_recording(self.style.format) and "stamps" in getattr(rows, "holds", ("stamps",))
         return stamps_ns if has_room or not counts else None
 
@@ -171,7 +171,7 @@ class FormatConverter:
     def _columns(self, stream: BufferedReader) -> Iterator[Step]:
         """Yield the rows of columns of numbers."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
-        file.format = self.form
+        file.format = self.fmt
         opened = self.module.open_columns(file, Options(self.tally, Topics(), answers=self.answers))
         rows = ColumnRows(opened, self.request, self.source)
         move_along(opened, self.request)
@@ -197,10 +197,10 @@ class FormatConverter:
         read = operation.place_as_read(self.shape, numbers) if operation.keeps_frames else ()
         return poses._replace(read=np.column_stack(read)) if read else poses
 
-    # --- forms that list poses ---
+    # --- formats that list poses ---
 
     def _listed(self, stream: BufferedReader) -> Iterator[Step]:
-        """Yield the poses of a form whose lines are no table."""
+        """Yield the poses of a format whose lines are no table."""
         file = InputFile(self.source if self.source != "stdin" else "-", stream)
         faults: list[Fault] = []
         report = stop
@@ -208,30 +208,30 @@ class FormatConverter:
             report = lambda error: faults.append(Fault(max(error.line, 1) - 1, "", error.message))  # noqa: E731
         options = Options(self.tally, Topics(), report, normalize=self.request.normalize, answers=self.answers)
         has_kinds = hasattr(self.module, "form_of")
-        form: Poses = self.module.form_of(file, options) if has_kinds else FORMATS[self.form].poses
+        fmt: Poses = self.module.form_of(file, options) if has_kinds else FORMATS[self.fmt].poses
         request = self.request
         if request.frames:
             raise ValueInvalid("poses do not say their frame; name SOURCE")
         if request.poses > 1:
-            raise FormatError(f"{self.form} lists one pose after the other; two a row are wanted", source=self.source)
+            raise FormatError(f"{self.fmt} lists one pose after the other; two a row are wanted", source=self.source)
         self.placed, self.shape = True, Shape(POSE, 1.0, QUATERNION)
         plan = _plan(request)
         state = State()
         rename = rename_of(request) or (lambda parent, name: (parent, name))
-        for each in blocks(self.module.poses(file, options), form, file, options, named=False):
+        for each in blocks(self.module.poses(file, options), fmt, file, options, named=False):
             block = _block(each._replace(stamps_ns=each.stamps_ns + request.offset_ns))
             done = Run(plan, block, state)
             good = done.rows.tolist()
             images = [each.images[row] for row in good]
             extras = {IMAGE: spans_of([image.encode() for image in images])} if any(images) else {}
-            if self.form == self.style.format:
+            if self.fmt == self.style.format:
                 extras[NUMBER] = spans_of([b"%d" % each.numbers[row] for row in good])
             lines = np.array(each.lines, np.int64)[done.rows]
             own = each.names[0] is not None
             pairs = [rename(*(each.names[row] or (None, None))) for row in (good if own else good[:1])]
             parents, names = zip(*pairs, strict=True) if pairs else ((None,), (None,))
             stamps = None if own or block.times is None else block.times[done.rows]
-            poses = RowPoses(done.results, self._held(stamps, form), lines, parents, names, extras)
+            poses = RowPoses(done.results, self._held(stamps, fmt), lines, parents, names, extras)
             found = sorted(faults + done.faults())
             yield Step(poses, Outcome(b"", found, len(each.lines) + len(faults), 0, notes=notes_of(done, block)))
             faults.clear()

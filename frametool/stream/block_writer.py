@@ -1,4 +1,4 @@
-"""What writes blocks of results, whatever their form: text, columns of numbers, or messages of a recording."""
+"""What writes blocks of results, whatever their format: text, columns of numbers, or messages of a recording."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class BlockWriter(Protocol):
 
 
 def writer_for(style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> BlockWriter:
-    """Return what writes blocks in the form of a style: text, columns of numbers, or messages of a recording.
+    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording.
 
     kind: pose, point, ..; extras: the numbers with each; placed: whether poses have a position
     """

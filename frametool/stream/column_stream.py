@@ -175,7 +175,7 @@ class ColumnRows(PlannedRows):
         return Outcome(text, self.faults, batch.size, batch.size, mended, self.notes, batch.bytes_read)
 
     def poses(self, batch: Batch) -> RowPoses:
-        """Return the results of a batch for another form, with what else its rows hold."""
+        """Return the results of a batch for another format, with what else its rows hold."""
         results = self.of_batch(batch)
         rows = np.arange(batch.size) if results.rows is None else results.rows
         stamp_at = self.layout.time
@@ -390,7 +390,7 @@ def _either(first: Flags | None, second: Flags | None) -> Flags | None:
 def run_columns(
     file: ColumnFile, request: Request, style: Style, *, source: str, into: Any = None
 ) -> Generator[Outcome]:
-    """Yield what becomes of a file's batches in a file of the same form, or in that of a module, `into`."""
+    """Yield what becomes of a file's batches in a file of the same format, or in that of a module, `into`."""
     rows = ColumnRows(file, request, source)
     columns = rows.columns() if into is None else rows.named_columns()
     move_along(file, request)
@@ -406,19 +406,19 @@ def run_columns(
         results = rows.of_batch(batch)
         text: Any = b""
         if other is not None:
-            text = other.of_columns(len(results.numbers), _in_other_form(columns, rows, batch, results))
+            text = other.of_columns(len(results.numbers), _in_other_format(columns, rows, batch, results))
         elif writer is not None:
             text = writer.of_rows(batch, results.rows, made_of(columns, rows, results))
         yield rows.outcome(batch, text)
     if other is not None and not other.begun:
         empty = file.nothing()
-        other.of_columns(0, _in_other_form(columns, rows, empty, rows.of_batch(empty)))
+        other.of_columns(0, _in_other_format(columns, rows, empty, rows.of_batch(empty)))
     if (last := other or writer) is not None:
         yield from map(Outcome, last.end())
 
 
 class MergedClouds:
-    """Several files of columns, each moved by its own pose, as one file of a form: the columns that all of them have.
+    """Several files of columns, each moved by its own pose, as one file of a format: the columns that all of them have.
 
     Numbers of one column get the type that holds those of all files.
     """
@@ -447,7 +447,7 @@ class MergedClouds:
         columns = rows.named_columns()
         for batch in file.batches():
             results = rows.of_batch(batch)
-            made = _in_other_form(columns, rows, batch, results)
+            made = _in_other_format(columns, rows, batch, results)
             typed = {
                 name: made[name] if kind is None else made[name]._replace(values=made[name].values.astype(kind))
                 for name, kind in self.kinds.items()
@@ -456,10 +456,10 @@ class MergedClouds:
             yield rows.outcome(batch, text)
 
 
-def _in_other_form(
+def _in_other_format(
     columns: Sequence[OutColumn], rows: ColumnRows, batch: Batch, results: RowResults
 ) -> dict[str, Made]:
-    """Return the columns of a batch by name, for a file of another form."""
+    """Return the columns of a batch by name, for a file of another format."""
     new = iter(made_of(columns, rows, results))
     chosen = np.arange(batch.size) if results.rows is None else results.rows
     found = {}
@@ -521,16 +521,16 @@ class MessageColumns(ColumnFile):
             yield StructuredBatch(rows[first : first + step])
 
     def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> ColumnWriter:
-        """Refuse: messages are written in other forms."""
+        """Refuse: messages are written in other formats."""
         raise NotImplementedError
 
 
 class _GridOfForm:
-    """A form in which the grid of a cloud is kept, and the pose of its sensor, where it has room for them."""
+    """A format in which the grid of a cloud is kept, and the pose of its sensor, where it has room for them."""
 
-    def __init__(self, form: str, cloud: PointCloud, pose: Rigid) -> None:
+    def __init__(self, fmt: str, cloud: PointCloud, pose: Rigid) -> None:
         """Take the cloud and the pose that moves it."""
-        self.module: Any = import_module(FORMATS[form].writer)
+        self.module: Any = import_module(FORMATS[fmt].writer)
         self.cloud = cloud
         self.pose = pose
         if hasattr(self.module, "misfit"):
@@ -546,7 +546,7 @@ class _GridOfForm:
 
 
 def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Iterator[Outcome]:
-    """Yield what a cloud becomes when a pose moves it, in the form of a style."""
+    """Yield what a cloud becomes when a pose moves it, in the format of a style."""
     request = Request(Operation(left=pose, moves=True))
     into = _GridOfForm(style.format, cloud, pose)
     yield from run_columns(MessageColumns(cloud), request, style, source=source, into=into)

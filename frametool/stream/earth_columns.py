@@ -217,8 +217,8 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     if not given and (others := find_positions(header)):
         said = [name for name, field in matches.items() if may_be_on_earth(name) or field == "lon"]
         if not request.operation.keeps_frames and said:
-            told = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
-            warn(f"{source}: {told}; --columns lat,lon,alt --from lla turns it round")
+            message = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
+            warn(f"{source}: {message}; --columns lat,lon,alt --from lla turns it round")
         return None
     try:
         found = find(names, earth, given)
@@ -388,7 +388,7 @@ def check_rows(
     if request.gathered is not None:
         request.gathered.frame = ECEF
     if request.operation.keeps_frames and request.place is None:
-        bare = shape.notation is None and all(form.representation.name == "quaternion" for form in request.notations)
+        bare = shape.notation is None and all(each.representation.name == "quaternion" for each in request.notations)
         request = request._replace(place=Place.written((ECEF,), Earth()), by_default=request.by_default or bare)
     if shape.notation is None and not (request.operation.inverse or request.operation.similar):
         has_idle_axes = request.earth and request.earth.axes and request.operation.keeps_frames

@@ -119,17 +119,17 @@ def _read(value: dict[str, Any], inner: Pose, used: Sequence[str], reading: Read
     is_point = pose.rotation is None and request.kind != POSE and _takes_points(request)
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, None if pose.rotation is None else notation("quaternion"))
-    beside = covariance or _beside(pose, reading, request, is_point=is_point)
-    if beside:
-        shape = shape._replace(covariance=(len(beside),), rewritten=True)
-    if pose.read and is_point and operation.keeps_frames and not beside:
+    extra = covariance or _extra(pose, reading, request, is_point=is_point)
+    if extra:
+        shape = shape._replace(covariance=(len(extra),), rewritten=True)
+    if pose.read and is_point and operation.keeps_frames and not extra:
         shape, numbers = Shape(POINT, pose.read.place), tuple(pose.read.numbers)
     keys = [*own, *used, *(key for key in (AXES_KEY, *COVARIANCE_KEYS) if key in value)]
     keys += ["header", *[FIX, FIX_TYPE] * bool(covariance)] if is_fix else []
-    return Placed(shape, (*numbers, *beside), tuple(keys))
+    return Placed(shape, (*numbers, *extra), tuple(keys))
 
 
-def _beside(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:
+def _extra(pose: Pose, reading: Reading, request: Request, *, is_point: bool) -> tuple[float, ...]:
     """Return the covariance of a pose or point in ECEF where it counts; where it does not, that is noted."""
     if pose.covariance is None:
         return ()

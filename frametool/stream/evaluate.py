@@ -212,8 +212,8 @@ class Run:
             entries = np.stack([column[rows] for column in columns], axis=-1)
             widest = np.linalg.eigvalsh(entries.reshape(-1, 6, 6)[:, 3:, 3:])[:, 2]
             for at in np.flatnonzero(widest > (0.999 * uncertainty.WIDE) ** 2).tolist():
-                if told := uncertainty.doubt(entries[at].tolist()):
-                    self.rounded.append(RowNote(self.block.line_of(int(rows[at])), uncertainty.WIDE_RULE, told))
+                if message := uncertainty.doubt(entries[at].tolist()):
+                    self.rounded.append(RowNote(self.block.line_of(int(rows[at])), uncertainty.WIDE_RULE, message))
                     break
 
     def _with_unit(self, text: str, column: int) -> float:
@@ -282,9 +282,9 @@ class Run:
         """Read the stamps of the rows."""
         if self.block.times is not None:
             return self.block.times
-        timed, beside = self.request.timed, self.request.extra_column or ""
-        stamps, column = self.block.stamps[at], timed.column if timed else beside
-        in_ns = timed.in_ns if timed else len(stamps) == 1 and in_nanoseconds(beside)
+        timed, extra = self.request.timed, self.request.extra_column or ""
+        stamps, column = self.block.stamps[at], timed.column if timed else extra
+        in_ns = timed.in_ns if timed else len(stamps) == 1 and in_nanoseconds(extra)
         times, reasons = read_stamps(stamps, in_ns=in_ns)
         for row, reason in reasons.items():
             self._blame(row, column, reason)

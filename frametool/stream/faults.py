@@ -211,10 +211,10 @@ def run(
 ) -> int:
     """Write what becomes of each block, report its faults, and return the exit status.
 
-    advance: is told rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
+    advance: receives rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
     """
     line, rows, mended = 1, 0, 0
-    told: set[str] = set()
+    reported: set[str] = set()
     zone = ""
     for outcome in outcomes:
         if outcome.text:
@@ -228,9 +228,9 @@ def run(
                     continue
                 sentence = f"the zone changes from {before} to {zone}: another grid; --zone {before} holds one"
                 note = note._replace(sentence=sentence)  # noqa: PLW2901
-            if note.about in told:
+            if note.about in reported:
                 continue
-            told.add(note.about)
+            reported.add(note.about)
             bad.take(fault for fault in faults if fault.line < line + note.line)
             faults = [fault for fault in faults if fault.line >= line + note.line]
             warn(f"{bad.place(line + note.line, note.column)}: {note.sentence}")

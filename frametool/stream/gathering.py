@@ -32,10 +32,10 @@ class Gathered:
         self.placed = self.turned = self.uncertain = self.stamped = False
         self.frame: str | None = None  # that of the Earth, where what was gathered is placed there
         self._poses: list[Floats] = []
-        self._beside: list[Floats] = []
+        self._extra: list[Floats] = []
 
     def take(
-        self, shape: Shape, pose: Components, kept: Flags, beside: Floats | None, line_of: Callable[[int], int]
+        self, shape: Shape, pose: Components, kept: Flags, extra: Floats | None, line_of: Callable[[int], int]
     ) -> None:
         """Add the rows of a block that are kept: components of a pose, and what comes with them."""
         if self._lines is not None:
@@ -44,8 +44,8 @@ class Gathered:
         self.turned |= shape.notation is not None
         rows = np.stack([np.broadcast_to(np.asarray(part, np.float64), len(kept)) for part in pose[:7]], axis=-1)
         self._poses.append(rows[kept])
-        if beside is not None:
-            self._beside.append(beside[kept])
+        if extra is not None:
+            self._extra.append(extra[kept])
 
     def placing(self, outcomes: Iterable[Outcome], place: Callable[[int], str]) -> Generator[Outcome]:
         """Pass the outcomes of blocks, and keep the places of what was taken from each; place: names a line."""
@@ -79,15 +79,15 @@ class Gathered:
 
     def groups(self) -> Iterator[tuple[str, Gathered]]:
         """Yield the poses by their labels, in the order in which these came."""
-        rows, labels = self.transforms, np.concatenate(self._beside).tolist()
+        rows, labels = self.transforms, np.concatenate(self._extra).tolist()
         for label in dict.fromkeys(labels):
             at = [row for row, each in enumerate(labels) if each == label]
             part = copy(self)
             part._poses = [np.stack(rows.components, -1)[at]]  # noqa: SLF001 - its own
-            part._beside, part.places = [], [self.places[row] for row in at] if self.places else []  # noqa: SLF001
+            part._extra, part.places = [], [self.places[row] for row in at] if self.places else []  # noqa: SLF001
             yield label, part
 
     @property
     def weights(self) -> Floats | None:
         """Return the numbers with the poses; None if there are none."""
-        return np.concatenate(self._beside) if self._beside else None
+        return np.concatenate(self._extra) if self._extra else None

@@ -246,8 +246,8 @@ def _standing_alone(row: Representation, header: Header, given: Notation | None)
     """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
     alone = [match for word in row.alone for match in header.match((word,), (0,))]
     if alone:
-        beside = [each for each in header.match(row.columns, partly=True) if any(each.spots[:-1])]
-        others = {(each.prefix, each.suffix) for each in beside}
+        partly = [each for each in header.match(row.columns, partly=True) if any(each.spots[:-1])]
+        others = {(each.prefix, each.suffix) for each in partly}
         for match in alone:
             if (match.prefix, match.suffix) not in others and header.is_plain(match):
                 spots = (*[None] * (len(row.columns) - 1), *match.spots)
@@ -422,7 +422,7 @@ def _kinship(rotation: Columns, position: Columns) -> tuple[bool, int]:
 
 
 def find_six(names: Sequence[str], kind: str) -> Columns | None:
-    """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where told so."""
+    """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where asked."""
     if len(names) < 6:
         return None
     folded = [re.sub(r"[./]", "_", re.sub(BRACKETS, "", name).strip().lower()) for name in names]
@@ -457,17 +457,17 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
             f"rows have a rotation, {rotation.shown}, and cannot be taken for a {request.kind}; "
             "name the three with --columns"
         )
-    form = rotation.notation
-    angles = form.representation.angles
-    said = [request.in_degrees(form) if each is None else each for each in rotation.degrees]
+    notation = rotation.notation
+    angles = notation.representation.angles
+    said = [request.in_degrees(notation) if each is None else each for each in rotation.degrees]
     degrees = any(said[at] for at in angles if at not in rotation.absent)
     radians_at = tuple(at for at in angles if degrees and not said[at])
     first = 0 if unit is None else len(XYZ)
     absent = (*(position.absent if position else ()), *(first + at for at in rotation.absent))
-    multiple = request.operation.multiples and form.representation.whole is not None
+    multiple = request.operation.multiples and notation.representation.whole is not None
     if rotation.whole:
-        return Shape(POSE, None, form, degrees, whole=True, multiple=multiple)
-    return Shape(POSE, unit, form, degrees, radians_at=radians_at, absent=absent, multiple=multiple)
+        return Shape(POSE, None, notation, degrees, whole=True, multiple=multiple)
+    return Shape(POSE, unit, notation, degrees, radians_at=radians_at, absent=absent, multiple=multiple)
 
 
 def named_pose(
@@ -517,17 +517,17 @@ def _unit_at_end(name: str) -> str:
 
 
 def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | None) -> tuple[int, Columns | None]:
-    """Return how many of the chosen columns, from the last, are a rotation, and which: by name, as told, by count."""
+    """Return how many of the chosen columns, from the last, are a rotation, and which: by name, as set, by count."""
     for count in (len(places), len(places) - 3, len(places) - 2):
         found = _by_names(header, places[-count:], given) if count > 0 else None
         if found is not None and (count != len(places) - 2 or found.absent):
             return count, found
     if given is None and len(places) == len(XYZ):
         return 0, None
-    for form in wholes_of(given):
-        if form.representation.whole and len(places) == len(form.representation.whole.columns):
-            found = _rotation(_chosen(header, places), form.representation, given)
-            return len(places), found._replace(whole=True, unit=1.0, notation=form)
+    for notation in wholes_of(given):
+        if notation.representation.whole and len(places) == len(notation.representation.whole.columns):
+            found = _rotation(_chosen(header, places), notation.representation, given)
+            return len(places), found._replace(whole=True, unit=1.0, notation=notation)
     if given is None:
         raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
     if len(places) not in given.counts:
@@ -540,10 +540,10 @@ def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> 
     """Return the rotation whose columns these are, in their order."""
     chosen = Header([header.names[place] for place in places])
     for row in dict.fromkeys([*([given.representation] if given is not None else ()), *ROTATIONS.values()]):
-        told = given if given is not None and given.representation is row else None
-        if not (row.searched or told):
+        own = given if given is not None and given.representation is row else None
+        if not (row.searched or own):
             continue
-        for each in (*_of_representation(row, chosen, told), *_standing_alone(row, chosen, told)):
+        for each in (*_of_representation(row, chosen, own), *_standing_alone(row, chosen, own)):
             if each.places == tuple(range(len(places))):
                 return each._replace(places=tuple(places), prefix="", suffix="")
     return None

@@ -60,9 +60,9 @@ class JointRows:
     adds = False
 
     def __init__(self, robot: Robot, posture: JointState, base: str, tip: str) -> None:
-        """Find the way; the joints that the posture was told of need no column.
+        """Find the way; the joints that the posture sets need no column.
 
-        Raises UnknownFrame, NotConnected; BadAnswer for joints that were told to move over time.
+        Raises UnknownFrame, NotConnected; BadAnswer for joints that are set to move over time.
         """
         self.chain = robot.chain(base, tip)
         self.joints = robot.joints
@@ -86,11 +86,11 @@ class JointRows:
         except ValueInvalid as error:
             raise FormatError(str(error), source=source, line=1) from None
         columns = [column for column in found if self.chain.uses(column.joint)]
-        told = {**self.constants, **{column.joint: None for column in columns}}
+        known = {**self.constants, **{column.joint: None for column in columns}}
         if twice := next((column for column in columns if column.joint in fixed), None):
             problem = f"joint {shown(twice.joint)} has a column, {shown(names[twice.place])}, and a value by --joint"
             raise Misused(f"{problem}; keep one", source=source)
-        if missing := self.chain.missing(told):
+        if missing := self.chain.missing(known):
             others = [name for place, name in enumerate(names) if place not in {column.place for column in found}]
             raise Misused(_about_missing(missing, names, others), source=source, line=1)
         self.columns = tuple(names[column.place] for column in columns)
@@ -138,19 +138,19 @@ def _about_missing(missing: Sequence[str], names: Sequence[str], others: Sequenc
     return f"no column for joint{plural} {listing(missing)}{near or ';'} {example}; columns: {columns}"
 
 
-def names_in(begin: bytes, form: str, source: str, *, header: bool = True) -> list[str]:
+def names_in(begin: bytes, fmt: str, source: str, *, header: bool = True) -> list[str]:
     """Return the names of a table's columns, or the keys of the first record; of a JointState the joints it names.
 
-    begin: the first bytes of the stream, of one of the forms that are streamed.
+    begin: the first bytes of the stream, of one of the formats that are streamed.
     Raises FormatError where nothing has a name.
     """
-    if "records" in FORMATS[form].reads:
-        return keys_in(begin, form, source, "a key for each joint, or JointState messages")
+    if "records" in FORMATS[fmt].reads:
+        return keys_in(begin, fmt, source, "a key for each joint, or JointState messages")
     if echoed(begin):
         return _echoed_names(begin, source)
     from frametool.stream.table import open_table
 
-    table, _ = open_table(begin, form, header=header, source=source)
+    table, _ = open_table(begin, fmt, header=header, source=source)
     if table.names is None:
         raise FormatError("the columns have no names, so that none is a joint", source=source, line=1)
     return list(table.names)
@@ -184,11 +184,11 @@ def _echoed_names(begin: bytes, source: str) -> list[str]:
         raise FormatError(str(misfit), source=source, line=1) from None
 
 
-def keys_in(begin: bytes, form: str, source: str, wanted: str) -> list[str]:
+def keys_in(begin: bytes, fmt: str, source: str, wanted: str) -> list[str]:
     """Return the keys of the first record, those further in with dots; wanted: what a record has."""
-    part = next(iter(Splitter(form).parts(begin).parts), None)
+    part = next(iter(Splitter(fmt).parts(begin).parts), None)
     text = "" if part is None else begin[part.start : part.end].decode("utf-8", "replace")
-    documents = parse_documents(without_noise(text) if form == "yaml" else text, source)
+    documents = parse_documents(without_noise(text) if fmt == "yaml" else text, source)
     value: Any = documents[0].value if documents else {}
     value = value[0] if type(value) is list and value else value
     if type(value) is not dict:

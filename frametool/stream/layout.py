@@ -44,10 +44,10 @@ class Item(Word):
 
     def text(self, number: float) -> bytes:
         """Return the text of a number."""
-        before, behind, other, form = self.words
+        before, behind, other, fmt = self.words
         if number != number:  # noqa: PLR0124 - nan
             return other.encode()
-        text = format(number, form)
+        text = format(number, fmt)
         return f"{before}{text if '.' in text else text.replace('e', self.quote.decode())}{behind}".encode()
 
 

@@ -360,7 +360,7 @@ def _record(document: Any, place: RecordPlace, request: Request, reading: Readin
         raise misfit.below(*here) from None
     try:
         if not record.placed and (around := holders(document, place, record.shape)):
-            from frametool.stream.beside import with_covariances
+            from frametool.stream.extra_numbers import with_covariances
 
             record = with_covariances(record, value_at(document, around[0]), around[0], place, above, request, reading)
         record = _with_asked(record, document, path, above, request)
@@ -428,7 +428,7 @@ def _with_asked(record: Record, document: Any, path: Path, above: Path, request:
         except ValueInvalid as error:
             raise Misfit(str(error), found) from None
         numbers = (*numbers, (*above, *found))
-    shape = record.shape._replace(beside=len(request.operation.columns))
+    shape = record.shape._replace(extra=len(request.operation.columns))
     return record._replace(shape=shape, numbers=numbers, values=values)
 
 
@@ -443,7 +443,7 @@ def _of_message(value: Any, place: RecordPlace, path: Path, reading: Reading, re
     if kind == VECTOR:
         return _with_position(Record(path, Shape(kind), key=field), value[field], 1.0, partial=False)
     if known := value.get(place.covariances[0]):
-        from frametool.stream.beside import is_unknown
+        from frametool.stream.extra_numbers import is_unknown
 
         if within(place.covariances, is_unknown, known, (9,)):
             return Record(path, Shape("", None), rotation=field)
@@ -476,7 +476,7 @@ def _mapping(value: dict[str, Any], path: Path, reading: Reading, request: Reque
         from frametool.stream.earth_records import placed_record
 
         def inner(rest: dict[str, Any]) -> tuple[Pose, list[str]]:
-            return _beside_place(rest, path, reading, request)
+            return _pose_at_place(rest, path, reading, request)
 
         if (found := placed_record(value, positions, inner, reading, request)) is not None:
             return _placed(found, path)
@@ -542,7 +542,7 @@ def _given_on_earth(record: Record, request: Request) -> Record:
     return record._replace(shape=shape, parent=Name(EARTH_FRAMES[0]))
 
 
-def _beside_place(rest: dict[str, Any], path: Path, reading: Reading, request: Request) -> tuple[Pose, list[str]]:
+def _pose_at_place(rest: dict[str, Any], path: Path, reading: Reading, request: Request) -> tuple[Pose, list[str]]:
     """Read the pose that comes with a place on the Earth, and return the keys that say it but its covariance."""
     covariance = None
     if not COVARIANCE_KEYS.isdisjoint(rest):
@@ -758,19 +758,19 @@ def _with_position(record: Record, value: Any, metre: float, *, partial: bool) -
 
 def _with_rotation(value: Any, key: str, record: Record, below: Path, reading: Reading, request: Request) -> Record:
     """Add the rotation's numbers."""
-    form, texts, places = shape_of(key, value)
-    joined = form.representation.whole
+    notation, texts, places = shape_of(key, value)
+    joined = notation.representation.whole
     whole = joined is not None and len(texts) == len(joined.columns)
     if whole and record.shape.unit is not None:
         raise Misfit("a 4x4 matrix is the whole pose; remove xyz, or write the 3x3 rotation", below)
     if request.poses != 1:
         raise Misfit("a record holds one pose; two in a row are for tables")
-    values, degrees = read_components(form, texts, places, Reading(reading.source, degrees=reading.degrees))
+    values, degrees = read_components(notation, texts, places, Reading(reading.source, degrees=reading.degrees))
     paths = tuple(_path_if_there(value, (*record.path, *below), place) for place in places[: len(texts)])
-    if degrees != (reading.degrees if form.degrees is None else form.degrees):
+    if degrees != (reading.degrees if notation.degrees is None else notation.degrees):
         paths = (None,) * len(paths)  # the numbers say another unit than their key: the member is written anew
     multiple = request.operation.multiples and joined is not None
-    shape = record.shape._replace(kind=POSE, notation=form, degrees=degrees, whole=whole, multiple=multiple)
+    shape = record.shape._replace(kind=POSE, notation=notation, degrees=degrees, whole=whole, multiple=multiple)
     return record._replace(shape=shape, numbers=record.numbers + paths, values=(*record.values, *values), rotation=key)
 
 
@@ -793,7 +793,7 @@ def _with_names(
         if type(value) is not dict:
             continue
         if record.shape.kind == POSE and SCALE in value and (around == path or type(value[SCALE]) is str):
-            from frametool.stream.beside import with_scale
+            from frametool.stream.extra_numbers import with_scale
 
             record = with_scale(record, value[SCALE], around, above, request)  # around it, of a Marker: its shape's
         parent_keys, name_keys = (EARTH_PARENTS, EARTH_NAMES) if on_earth else (PARENT_KEYS, NAME_KEYS)

@@ -84,10 +84,10 @@ class RecordCutter:
     closed: whether an array ended in the last block
     """
 
-    def __init__(self, splitter: Splitter, form: str, request: Request, source: str) -> None:
+    def __init__(self, splitter: Splitter, fmt: str, request: Request, source: str) -> None:
         """Start without templates."""
         self.splitter = splitter
-        self.form = form
+        self.fmt = fmt
         self.request = request
         self.source = source
         self.templates: list[Template] = []
@@ -186,7 +186,7 @@ class RecordCutter:
         record = text[part.start : part.end]
         if self._long is not None and self._long[0] == record:
             return self._long[1]
-        known = attempt(text, part, self.form, self.request, self.source, line)
+        known = attempt(text, part, self.fmt, self.request, self.source, line)
         if isinstance(known, RecordText) and known.is_long:
             self._long = record, known
         return known
@@ -266,11 +266,11 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     renamed = count(after + 2)
     pieces = [In(next(renamed)) if isinstance(each, Renamed) else each for each in template.pieces]
     on_error = SKIP if request.on_error == NULL else request.on_error  # rows without one are written elsewhere
-    beside = template.beside if request.extra_column is not None else None
+    extra = template.extra if request.extra_column is not None else None
     return Plan(
         template.shapes,
         tuple(entry.target for entry in template.entries),
-        request._replace(on_error=on_error, timed=template.timed(request), extra_column=beside, offset_ns=0),
+        request._replace(on_error=on_error, timed=template.timed(request), extra_column=extra, offset_ns=0),
         template.names,
         (In(after + 1), *pieces, In(after)),
         b"null",

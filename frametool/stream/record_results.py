@@ -1,4 +1,4 @@
-"""Streams of records in another form than theirs: what is alike becomes rows together, all else a result at a time."""
+"""Streams of records in another format: what is alike becomes rows together, all else a result at a time."""
 
 from __future__ import annotations
 
@@ -58,9 +58,9 @@ class BlockResults(NamedTuple):
         yield from map(itemgetter(1), found)
 
 
-def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, bad: BadRows) -> Iterator[BlockResults]:
+def stream_rows(stream: ByteStream, fmt: str, request: Request, style: Style, bad: BadRows) -> Iterator[BlockResults]:
     """Yield the results of a stream of records, block by block; bad ones are reported as rows are."""
-    splitter = Splitter(form)
+    splitter = Splitter(fmt)
     operation, request = request.operation, request._replace(canonical=True)
     depends = operation.formula is not None or operation.velocity or request.in_order or request.place
     alike: RecordRows | None = None
@@ -73,7 +73,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
         if not depends and not 0 < len(alone) <= sizes.FEW:
             from frametool.stream.record_rows import RecordRows
 
-            alike = alike or RecordRows(splitter, form, request, style, bad.source)
+            alike = alike or RecordRows(splitter, fmt, request, style, bad.source)
             batches, alone, mended = alike.of_block(block, teller.counts)
         values: list[tuple[int, Value]] = []
         rows += len({*chain.from_iterable(each.cut.starts[:, 0].tolist() for each in batches)})
@@ -81,7 +81,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
             rows += 1
             line, at = line + block.count(b"\n", at, part.start), part.start
             before = bad.count
-            known = attempt(block, part, form, request, bad.source, line - 1, teller.tell)
+            known = attempt(block, part, fmt, request, bad.source, line - 1, teller.tell)
             fault = known if isinstance(known, Fault) else None
             if not isinstance(known, Fault):
                 try:
@@ -95,7 +95,7 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
                 yield BlockResults([each.take((each.places < part.start).nonzero()[0]) for each in batches], values)
             bad.take([fault] if fault else [])
             if bad.count > before and bad.on_error == NULL:
-                values.append((part.start, _no_result(block[part.start : part.end], form, style)))
+                values.append((part.start, _no_result(block[part.start : part.end], fmt, style)))
         teller.counts[ROUNDED] += mended
         yield BlockResults(batches, values)
         line += block.count(b"\n", at)
@@ -105,11 +105,11 @@ def stream_rows(stream: ByteStream, form: str, request: Request, style: Style, b
     bad.finish(rows)
 
 
-def _no_result(record: bytes, form: str, style: Style) -> NoResult:
+def _no_result(record: bytes, fmt: str, style: Style) -> NoResult:
     """Return what a bad record says besides its numbers; in a table those are empty cells under names of their own."""
     try:
         text = record.decode()
-        said = plain(parse_nodes(nulled(text, json=form == "json") or text)[0])
+        said = plain(parse_nodes(nulled(text, json=fmt == "json") or text)[0])
     except (FormatError, UnicodeDecodeError, IndexError, TypeError):  # broken: no parser has taken it before
         said = None
     kept = said if type(said) is dict else {}

@@ -1,6 +1,6 @@
 """Records that are written alike, as rows: a record is a row whose columns are its scalars.
 
-What such a row becomes in another form is seen from one whose scalars are marks, by the way that single results take;
+What such a row becomes in another format is seen from one whose scalars are marks, by the way that single results take;
 what is invalid, or worth telling, takes that way itself.
 """
 
@@ -104,19 +104,19 @@ class RecordBatch(NamedTuple):
 class RecordRows:
     """Make rows of one block of records after the other, of those that are written alike."""
 
-    def __init__(self, splitter: Splitter, form: str, request: Request, style: Style, source: str) -> None:
+    def __init__(self, splitter: Splitter, fmt: str, request: Request, style: Style, source: str) -> None:
         """Begin without templates."""
         self.request = request._replace(canonical=True)
         self.style = style
-        self.cutter = RecordCutter(splitter, form, self.request, source)
-        self.is_yaml = form == "yaml"
+        self.cutter = RecordCutter(splitter, fmt, self.request, source)
+        self.is_yaml = fmt == "yaml"
         self.left = sizes.LEARNED  # where no records are alike, learning is lost time
         self._plans: dict[Template, tuple[Plan, list[Marked]] | None] = {}
 
-    def of_block(self, text: bytes, told: Mapping[str, int]) -> tuple[list[RecordBatch], list[Part], int]:
+    def of_block(self, text: bytes, reported: Mapping[str, int]) -> tuple[list[RecordBatch], list[Part], int]:
         """Return the rows of a block, the records that are none, and how many rotations of rows were normalised.
 
-        told: how often things were told, by their rules
+        reported: how often things were reported, by their rules
         """
         records, rest = self.cutter.cut(text)
         alone: list[Part] = []
@@ -134,7 +134,7 @@ class RecordRows:
         batches: list[RecordBatch] = []
         mended = 0
         for cut in records.by_template():
-            made, rows, count = self._of_cut(cut, data, text, told)
+            made, rows, count = self._of_cut(cut, data, text, reported)
             batches += made
             mended += count
             begins, ends = cut.starts[rows, 0].tolist(), cut.ends[rows, -3].tolist()
@@ -142,7 +142,7 @@ class RecordRows:
         return batches, sorted(alone, key=itemgetter(1)), mended
 
     def _of_cut(
-        self, cut: Cut, data: Bytes, text: bytes, told: Mapping[str, int]
+        self, cut: Cut, data: Bytes, text: bytes, reported: Mapping[str, int]
     ) -> tuple[list[RecordBatch], Sequence[int], int]:
         """Return the rows of one template; those that are odd, and the first that tells something, stay alone."""
         template = cut.template
@@ -154,8 +154,8 @@ class RecordRows:
         plan, marked = planned
         run = Run(plan, block_of(cut, data, text), State())
         tells = template.notes or template.own_notes or any(map(self.request.operation.carried, template.shapes))
-        left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not told[DEGREES])}
-        left |= {*run.mended[:1]} if not told[ROUNDED] else set()
+        left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not reported[DEGREES])}
+        left |= {*run.mended[:1]} if not reported[ROUNDED] else set()
         left |= {*run.reasons, *run.rows[run.locked != 0].tolist()}
         stamps = []
         for at, each in enumerate(marked):
@@ -209,11 +209,11 @@ class RecordRows:
         if not own.notations:
             return Target(1.0, ())
         placed = own.unit is not None or own.whole
-        forms = tuple((each, self.style.in_degrees(each)) for each in self.style.notations)
-        if self.style.format != "csv" or not forms:
+        target = tuple((each, self.style.in_degrees(each)) for each in self.style.notations)
+        if self.style.format != "csv" or not target:
             return Target(1.0, QUATERNIONS, keep_sign=True)
-        whole = placed and any(each.representation.whole for each, _ in forms)
-        return Target(1.0 if placed and not whole else None, forms, self.style.keep_sign, whole and len(forms) == 1)
+        whole = placed and any(each.representation.whole for each, _ in target)
+        return Target(1.0 if placed and not whole else None, target, self.style.keep_sign, whole and len(target) == 1)
 
 
 def marked(template: Template, at: int, request: Request, style: Style, target: Target) -> Marked | None:
@@ -226,8 +226,8 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
         text, begin = f"{text}{template.text[begin:start]}73105857{number:07d}", end
     text += template.text[begin:]
     own = 7 if record.shape.kind in (POSE, ROTATION) else len(NUMBERS[: record.shape.own_size])
-    beside = request.operation.extras(record.shape)
-    size = own + len(beside) + sum(record.shape.covariance)
+    extra = request.operation.extras(record.shape)
+    size = own + len(extra) + sum(record.shape.covariance)
     parts = (*NUMBERS[:own], *(0.7310585786300049 + at for at in range(size - own)))
     parent, name = entry.parent and PARENT, entry.name and NAME
     stamp = None if record.stamp_ns is None else STAMP_NS

@@ -146,8 +146,8 @@ class RecordRun:
         if into and not named:
             movable = sorted({each.topic for each in channels if each.type in MOVED_TYPES})
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
-            beside = f" beside {first_of(sorted(self.transform_topics), MOST_NAMED)}" if self.transform_topics else ""
-            raise Misused(f"--into moves the messages of topics that are named{beside}; {remedy}", source=path)
+            extra = f" beside {first_of(sorted(self.transform_topics), MOST_NAMED)}" if self.transform_topics else ""
+            raise Misused(f"--into moves the messages of topics that are named{extra}; {remedy}", source=path)
 
     def _refuse_others(self) -> None:
         """Raise FormatError for transforms that cannot be read here, as protobuf's, and for topics that are foreign."""
@@ -212,10 +212,10 @@ class RecordRun:
 
         return change
 
-    def pieces(self, form: str, folder: str, advance: Advance) -> Iterator[bytes]:
-        """Yield the bytes of the copy in a form; folder: where there is room for it while it is written."""
+    def pieces(self, fmt: str, folder: str, advance: Advance) -> Iterator[bytes]:
+        """Yield the bytes of the copy in a format; folder: where there is room for it while it is written."""
         first_ns = self.copy.first_ns or 0
-        yield from self.copy.pieces(form, folder, self.added, first_ns if first_ns < LAST_STAMP else 0, advance)
+        yield from self.copy.pieces(fmt, folder, self.added, first_ns if first_ns < LAST_STAMP else 0, advance)
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""

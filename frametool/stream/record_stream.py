@@ -36,10 +36,10 @@ _LEADING_COMMA = re.compile(rb"\A((?:\xef\xbb\xbf)?\s*\[?\s*),\s*")
 MOST_EXACT = 100  # bad records of one template in a block whose place is looked for
 
 
-def run_records(stream: ByteStream, form: str, request: Request, *, source: str) -> Generator[Outcome]:
+def run_records(stream: ByteStream, fmt: str, request: Request, *, source: str) -> Generator[Outcome]:
     """Yield the outcomes of a stream of records."""
-    outcomes = _outcomes(stream, RecordBlocks(form, request, source))
-    yield from _as_array(outcomes, request.on_error) if form == "json" else outcomes
+    outcomes = _outcomes(stream, RecordBlocks(fmt, request, source))
+    yield from _as_array(outcomes, request.on_error) if fmt == "json" else outcomes
 
 
 def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
@@ -67,11 +67,11 @@ def _raising(error: FormatError) -> Iterator[bytes]:
     yield b""
 
 
-def at_other_times(stream: ByteStream, form: str, offset_ns: int) -> BufferedReader:
+def at_other_times(stream: ByteStream, fmt: str, offset_ns: int) -> BufferedReader:
     """Return a stream of records with so much added to all stamps in them; a record that cannot be read stays."""
 
     def pieces() -> Iterator[bytes]:
-        splitter = Splitter(form)
+        splitter = Splitter(fmt)
         for block in read_blocks(stream, whole=splitter.whole):
             edits = []
             for part in splitter.parts(block).parts:
@@ -134,10 +134,10 @@ class Found:
 class RecordBlocks:
     """Process one block of records after the other."""
 
-    def __init__(self, form: str, request: Request, source: str) -> None:
+    def __init__(self, fmt: str, request: Request, source: str) -> None:
         """Start without templates."""
-        self.form, self.request, self.source = form, request, source
-        self.splitter = Splitter(form)
+        self.fmt, self.request, self.source = fmt, request, source
+        self.splitter = Splitter(fmt)
 
     def few(self, text: bytes, parts: Sequence[Part], *, closed: bool) -> Outcome:
         """Return the outcome of the few records of a whole stream."""
@@ -150,7 +150,7 @@ class RecordBlocks:
         from frametool.stream.evaluate import State
         from frametool.stream.record_cuts import RecordCutter
 
-        return RecordCutter(self.splitter, self.form, self.request, self.source), State()
+        return RecordCutter(self.splitter, self.fmt, self.request, self.source), State()
 
     def many(self, text: bytes) -> Outcome:
         """Return the outcome of a block."""
@@ -178,7 +178,7 @@ class RecordBlocks:
             if records is not None and (hit := known or self._learned(text, part, line, found)) is not None:
                 records.add(part, *hit)
             elif records is None:
-                self._alone(text, part, attempt(text, part, self.form, self.request, self.source, line), line, found)
+                self._alone(text, part, attempt(text, part, self.fmt, self.request, self.source, line), line, found)
             if found.faults and self.request.on_error == STOP:
                 return
         if at < end:
@@ -210,7 +210,7 @@ class RecordBlocks:
             if self.request.on_error != NULL or done.final:
                 return
             found.nulls += 1
-            row = null_of(row, json=self.form == "json")
+            row = null_of(row, json=self.fmt == "json")
         found.texts.append((part.begin, text[part.begin : part.start] + row + text[part.end : part.after]))
 
     def _outcome(self, text: bytes, cuts: Sequence[Cut], found: Found, *, closed: bool) -> Outcome:
@@ -243,13 +243,13 @@ class RecordBlocks:
         _, state = self._bulk
         data, runs = framed(text), []
         for cut in cuts:
-            run = Run(plan_of(cut.template, self.request, yaml=self.form == "yaml"), block_of(cut, data, text), state)
+            run = Run(plan_of(cut.template, self.request, yaml=self.fmt == "yaml"), block_of(cut, data, text), state)
             runs.append(run)
             for at, row in enumerate(run.reasons):
                 fault = Fault.of(run.block.line_of(row), *run.reasons[row])
                 part = cut.part(row)
                 line = text.count(b"\n", 0, part.start) if at < MOST_EXACT else 0
-                made = attempt(text, part, self.form, self.request, self.source, line) if at < MOST_EXACT else fault
+                made = attempt(text, part, self.fmt, self.request, self.source, line) if at < MOST_EXACT else fault
                 self._alone(text, part, made if isinstance(made, Fault) else fault, line, found)
             found.notes += [run.note_of_degrees(*each) for each in run.doubted[:1]] + run.rounded
             own = [*cut.template.notes, *cut.template.of_places]

@@ -219,7 +219,7 @@ def column_in(text: bytes, place: int) -> int:
 
 
 def attempt(
-    text: bytes, part: Part, form: str, request: Request, name: str, line: int,
+    text: bytes, part: Part, fmt: str, request: Request, name: str, line: int,
     note: Callable[[Source, list[Finding]], object] | None = None,
 ) -> RecordText | Fault:  # fmt: skip
     """Read one record of a stream, or say what is wrong with it.
@@ -231,10 +231,10 @@ def attempt(
     source = Source(name, "", line + 1, column_in(text, part.start))
     try:
         decoded = decode(text[part.start : part.end], name)
-        if form == "yaml" and _ODD_START.search(decoded):
+        if fmt == "yaml" and _ODD_START.search(decoded):
             decoded = without_noise(decoded)
         source = source._replace(text=decoded)
-        found = RecordText(source, request, json=form == "json", note=note and partial(note, source))
+        found = RecordText(source, request, json=fmt == "json", note=note and partial(note, source))
         if not request.canonical:
             found.edits = found.edits_for(found.entries, request)
     except Aliased as error:

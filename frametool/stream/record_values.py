@@ -1,4 +1,4 @@
-"""Records of a whole text and their results as values: for arguments, for files, and for output in another form.
+"""Records of a whole text and their results as values: for arguments, for files, and for output in another format.
 
 The records, the operation and what is said of them are those of streams; only the text is not kept.
 """
@@ -40,12 +40,12 @@ if TYPE_CHECKING:
     Value = Result | dict[str, Any]
     WrittenBack = Callable[[Path], Any]
 
-MESSAGES = ("yaml", "json", "ros1", "ros2")  # forms that can hold a message with all its fields
-SPELLED = ("yaml", "json", "csv")  # forms in which other keys keep their names
+MESSAGES = ("yaml", "json", "ros1", "ros2")  # formats that can hold a message with all its fields
+SPELLED = ("yaml", "json", "csv")  # formats in which other keys keep their names
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
-ROUNDED = "rounded"  # rule of what is told of rotations that were normalised
+ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
 LOST = "lost"  # rule of frames that results cannot name
-MOST_TOLD = 3  # of what is invalid by one rule in one text
+MOST_WARNED = 3  # of what is invalid by one rule in one text
 
 
 def read_poses(source: Source, asked: Request) -> list[Pose]:
@@ -63,16 +63,16 @@ def read_given(source: Source, asked: Request) -> tuple[list[Pose], set[str]]:
         asked.operation, kind=POSE, degrees=asked.degrees, normalize=asked.normalize, gathered=asked.gathered
     )
     poses: list[Pose] = []
-    beside: set[str] = set()
+    extra: set[str] = set()
     known = read_text(source, request)
     for record in known.records:
         poses.append(pose_of(record, request)._replace(stamp_ns=stamp_of(known.values, record, source)))
         unit = unit_of(record, value_at(known.values, record.path[:1]))
         if not _says_no_more(record, known.values, unit):
-            beside.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
+            extra.update(_header_stamp(record), _rest(known.root.at(unit), unit, record))
     if not poses:
         raise FormatError("nothing in it; a pose is {xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}", source=source.name)
-    return poses, beside
+    return poses, extra
 
 
 def stamp_of(documents: dict[int, Any], record: Record, source: Source) -> int | None:
@@ -90,7 +90,7 @@ def pose_of(record: Record, request: Request) -> Pose:
     shape = record.shape
     rotation = None
     if shape.multiple:
-        from frametool.stream.beside import of_multiple
+        from frametool.stream.extra_numbers import of_multiple
 
         own = record.values[: shape.own_size]
         check = partial(checked_rotation, shape, normalize=request.normalize)
@@ -103,19 +103,19 @@ def pose_of(record: Record, request: Request) -> Pose:
         rotation = x, y, z, w
     position = shape.position(record.values) if shape.whole or shape.unit is not None else None
     pose = Pose(position, rotation, record.name.text, record.parent.text)
-    beside = record.values[shape.own_size :]
+    extra = record.values[shape.own_size :]
     if 36 in shape.covariance:
-        pose = pose._replace(covariance=beside[:36])
+        pose = pose._replace(covariance=extra[:36])
     if 1 in shape.covariance:
-        pose = pose._replace(scale=beside[-1])
+        pose = pose._replace(scale=extra[-1])
     return inverted(pose) if shape.inverse else pose
 
 
 class Teller:
     """Report problems of documents, with their places: of one rule the first `most`, and at the end how many more."""
 
-    def __init__(self, most: int = MOST_TOLD) -> None:
-        """Begin with nothing told."""
+    def __init__(self, most: int = MOST_WARNED) -> None:
+        """Begin without warnings."""
         self.most = most
         self.counts: Counter[str] = Counter()
 
@@ -129,7 +129,7 @@ class Teller:
         tell(source, new)
 
     def end(self, name: str) -> None:
-        """Count what was not told."""
+        """Count what was not reported."""
         if more := sum(max(count - self.most, 0) for count in self.counts.values()):
             warn(f"{name}: {more} more like these")
 
@@ -143,7 +143,7 @@ def read_text(source: Source, request: Request) -> RecordText:
 
 
 def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
-    """Yield the results of every record of a text in a form: poses with what else their records say, or messages.
+    """Yield the results of every record of a text in a format: poses with what else their records say, or messages.
 
     Raises FormatError with the place of a record that cannot be read or has no result.
     """
@@ -217,7 +217,7 @@ class _WrittenBack:
         """Return the text, read again, our numbers, and the mark behind the place of each among them in the text."""
         known, request = self.known, self.known.request
         known.json = known.json or parse_json(known.source) is not None
-        if [form.spec for form in request.notations] == ["quaternion"]:  # the usual one
+        if [each.spec for each in request.notations] == ["quaternion"]:  # the usual one
             request = request._replace(notations=())
         entries = [each._replace(target=target_of(each.record, request)) for each in known.entries]
         made = {each.entry.record.numbers: each for each in self.answers}
@@ -237,7 +237,7 @@ def values_of_unit(
 ) -> Iterator[Value]:
     """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
     inside = any(type(step) is str for each in answers for step in each.entry.record.path[len(unit) :])
-    keeps = not request.notations or (inside and [form.spec for form in style.notations] == ["quaternion"])
+    keeps = not request.notations or (inside and [each.spec for each in style.notations] == ["quaternion"])
     is_list = type(node.value) is list
     is_one = len({each.entry.record.path for each in answers}) < len(answers)  # of several things, as an Imu
     moves = request.operation.moves
@@ -267,7 +267,7 @@ def _stays(node: Node, kind: str, style: Style) -> bool:
     return style.format != "text" and (style.format not in ("ros1", "ros2") or "header" in (node.value or ()))
 
 
-def _formula_result(node: Node, unit: Path, made: Answer, request: Request, form: str) -> Value:
+def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
     """Return what an expression made of a record, with what else the record says."""
     entry, operation = made.entry, request.operation
     shape = entry.record.shape
@@ -277,7 +277,7 @@ def _formula_result(node: Node, unit: Path, made: Answer, request: Request, form
     if operation.shown is not None:
         numbers = tuple(extras.values())
         members = operation.shown.values(request.prefix, numbers)
-        extras = operation.shown.cells(names, numbers) if form == "csv" else members
+        extras = operation.shown.cells(names, numbers) if fmt == "csv" else members
         for key in () if operation.shown.replaces else extras:
             refuse_member(key, node.value)
     if operation.only_adds:
@@ -312,13 +312,13 @@ def _pose_result(node: Node, unit: Path, made: Answer, request: Request, style: 
     return Result(pose, _header_stamp(record) | with_stamp_ns(extras, style.format))
 
 
-def with_stamp_ns(extras: dict[str, Any], form: str) -> dict[str, Any]:
-    """Read the stamp that a record says, in whole seconds and nanoseconds too, unless its form keeps it as it is.
+def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
+    """Read the stamp that a record says, in whole seconds and nanoseconds too, unless its format keeps it as it is.
 
     Raises ValueInvalid for what is no time.
     """
     key = stamp_key(extras)
-    is_spelled = form in SPELLED and (form != "csv" or type(extras[key]) is not dict) if key else False
+    is_spelled = fmt in SPELLED and (fmt != "csv" or type(extras[key]) is not dict) if key else False
     if not key or (key != "stamp_ns" and is_spelled):
         return extras
     return extras | {"stamp_ns": _read_stamp(key, extras.pop(key))}
@@ -387,14 +387,14 @@ def _rest(node: Node, unit: Path, record: Record) -> dict[str, Any]:
     return rest
 
 
-def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> dict[str, Any]:
+def _flat(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> dict[str, Any]:
     """Return a point, vector, twist or wrench as a mapping without levels, with what else its record says."""
     entry = made.entry
     kind = entry.record.shape.kind
     named: dict[str, Any] = {"frame": entry.parent} if entry.parent is not None else {}
     antenna = {"name": entry.name} if entry.record.placed and entry.name else {}
     numbers = written(made)[: entry.target.size]
-    beside = _extras(made, request, len(numbers))
+    extra = _extras(made, request, len(numbers))
     if kind in PARTS:
         named |= dict(zip(PARTS[kind], (numbers[:3], numbers[3:]), strict=True))
     elif entry.target.place is not None:
@@ -403,11 +403,11 @@ def _flat(node: Node, unit: Path, made: Answer, request: Request, form: str) -> 
         named = point_entry(entry.parent, made.parts[:3], entry.target.place, getattr(made.parts, "read", None))
     else:
         named[kind] = numbers
-    if is_recording(form) and request.operation.keeps_frames:
+    if is_recording(fmt) and request.operation.keeps_frames:
         holder = node.at(entry.record.path[len(unit) :])
         named |= {AS_READ: read} if (read := _place_as_read(holder, entry.record)) else {}
-    rest = with_stamp_ns(_rest(node, unit, entry.record), form)
-    return antenna | named | _header_stamp(entry.record) | beside | rest
+    rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)
+    return antenna | named | _header_stamp(entry.record) | extra | rest
 
 
 def _place_as_read(node: Node, record: Record) -> list[float]:

@@ -104,14 +104,14 @@ class RecordingWriter:
         """Yield the recording, and warn of what was left out or made up."""
         if self.path:
             self._write_path()
-        form = self.style.format
+        fmt = self.style.format
         if not self.is_named:
-            warn(f"{form}: nothing names the frame that the rows are seen from; {FRAMES[0]!r} is written")
+            warn(f"{fmt}: nothing names the frame that the rows are seen from; {FRAMES[0]!r} is written")
         if self.lost:
             kinds = f"; --messages {self.kinds[0]},tf keeps them" if self.kind == POSE else ""
-            warn(f"{form}: names of frames left out: {first_of([*self.lost], MOST_NAMED)}{kinds}")
+            warn(f"{fmt}: names of frames left out: {first_of([*self.lost], MOST_NAMED)}{kinds}")
         if self.dropped:
-            warn(f"{form}: {listing(self.dropped, MOST_NAMED)} left out")
+            warn(f"{fmt}: {listing(self.dropped, MOST_NAMED)} left out")
         yield from self.file.pieces()
 
     def _frames(self, block: RowPoses) -> list[tuple[str, str]]:

@@ -224,18 +224,18 @@ class Operation(NamedTuple):
         """Return what turns a vector along the axes of the body."""
         return rigid.inverse(*self.right[0]) if self.right else None
 
-    def move(self, shape: Shape, own: Components, beside: Components, edge: Components | None) -> Components:
+    def move(self, shape: Shape, own: Components, extra: Components, edge: Components | None) -> Components:
         """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes with it stays."""
         mover = self._of_body if shape.kind == RATE else edge or self.left
         if self.mirrors:
             own = (own[0], -own[1], *own[2:])
         if mover is not None and len(mover) == EXACT and not shape.covariance:
-            return (*MOVERS[shape.kind](*mover, *own), *beside)
+            return (*MOVERS[shape.kind](*mover, *own), *extra)
         if mover is None:
-            return (*own, *beside)
-        from frametool.stream.beside import move
+            return (*own, *extra)
+        from frametool.stream.extra_numbers import move
 
-        return move(shape, own, beside, mover, mirrors=self.mirrors)
+        return move(shape, own, extra, mover, mirrors=self.mirrors)
 
     def result(
         self,
@@ -255,13 +255,13 @@ class Operation(NamedTuple):
         compared: adds to a pose what it is compared with
         seconds: the time since the row before, of which velocities are made; times_ns: its own time
         """
-        own, beside = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
+        own, extra = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
         if shape.covariance and shape.place is not None:
-            from frametool.stream.beside import along_ecef
+            from frametool.stream.extra_numbers import along_ecef
 
-            shape, beside = along_ecef(shape, own, beside)
+            shape, extra = along_ecef(shape, own, extra)
         if shape.multiple:
-            from frametool.stream.beside import of_multiple
+            from frametool.stream.extra_numbers import of_multiple
 
             own = of_multiple(shape, own, rotation, xp)
         elif shape.kind in TURNED:
@@ -269,18 +269,18 @@ class Operation(NamedTuple):
         elif shape.unit is not None:
             own = shape.position(own)
         if self.formula is not None:
-            return self.formula.result(shape.kind, self._moved(own, edge), beside, times_ns, xp)
+            return self.formula.result(shape.kind, self._moved(own, edge), extra, times_ns, xp)
         if shape.kind != POSE:
-            return self._with_place(shape, numbers, self.move(shape, own, beside, edge))
+            return self._with_place(shape, numbers, self.move(shape, own, extra, edge))
         if shape.covariance:
-            from frametool.stream.beside import with_own
+            from frametool.stream.extra_numbers import with_own
 
-            own, beside = with_own(shape, own, beside, edge or self.left, mirrors=self.mirrors)
+            own, extra = with_own(shape, own, extra, edge or self.left, mirrors=self.mirrors)
         found = self.pose(compared(own), edge, xp)
         if self.velocity:
             last = EXACT + len(RELATIVE_EXTRAS)
             found = (*_with_velocity(found[:last], seconds(), xp), *found[last:])
-        return self._with_place(shape, numbers, (*found, *beside))
+        return self._with_place(shape, numbers, (*found, *extra))
 
     def _moved(self, own: Components, edge: Components | None) -> Components:
         """Return the point that a formula is given, or the pose that would move one."""
@@ -431,7 +431,7 @@ class Request(NamedTuple):
         return self.operation.keeps_position and self.place is None
 
     def target(self, shape: Shape) -> Target:
-        """Choose how results of things of a shape are written: as they were read unless told."""
+        """Choose how results of things of a shape are written: as they were read unless set."""
         kind = self.operation.result_kind(shape.kind)
         if kind != shape.kind:
             shape = Shape(kind, shape.unit or 1.0)
@@ -517,9 +517,9 @@ class Request(NamedTuple):
         """Return True if what is under `frame` is a counter rather than a frame's name."""
         return self.frame_is_counter and frame.isdecimal()
 
-    def in_degrees(self, form: Notation) -> bool:
+    def in_degrees(self, notation: Notation) -> bool:
         """Return True if a notation's angles are degrees: its own word wins."""
-        return self.degrees if form.degrees is None else form.degrees
+        return self.degrees if notation.degrees is None else notation.degrees
 
 
 class Memory:

@@ -65,7 +65,7 @@ class Shape(NamedTuple):
     sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit
     radians_at: which of the rotation's numbers are radians where the others are degrees
     absent: which numbers have no column and count as 0
-    beside: how many numbers that an expression reads come last
+    extra: how many numbers that an expression reads come last
     """
 
     kind: str
@@ -80,7 +80,7 @@ class Shape(NamedTuple):
     sigma: tuple[tuple[int, str], ...] = ()
     radians_at: tuple[int, ...] = ()
     absent: tuple[int, ...] = ()
-    beside: int = 0
+    extra: int = 0
 
     @property
     def joined(self) -> Whole | None:
@@ -90,7 +90,7 @@ class Shape(NamedTuple):
     @property
     def size(self) -> int:
         """Count the numbers of a row."""
-        return self.own_size + sum(self.covariance) + self.beside
+        return self.own_size + sum(self.covariance) + self.extra
 
     @property
     def own_size(self) -> int:
@@ -179,8 +179,8 @@ class Shape(NamedTuple):
     @property
     def bare_angles(self) -> tuple[int, ...]:
         """Return which of the rotation's numbers are angles in radians whose unit nobody said."""
-        form = self.notation
-        return () if form is None or self.degrees or form.degrees is not None else tuple(form.representation.angles)
+        fmt = self.notation
+        return () if fmt is None or self.degrees or fmt.degrees is not None else tuple(fmt.representation.angles)
 
     def _with_absent(self, numbers: Sequence[Any]) -> Sequence[Any]:
         """Put zeros where a row has no number."""

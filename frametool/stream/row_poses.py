@@ -1,4 +1,4 @@
-"""The rows of a table as blocks of poses: for trees, and for results in another form than the table's.
+"""The rows of a table as blocks of poses: for trees, and for results in another format than the table's.
 
 Also turns single results into such blocks and back, and columns of texts into spans and back.
 """

@@ -3,7 +3,7 @@
 - {gripper: {xyz: [..], rpy: [..]}, target: {..}}                      samples as one writes them
 - {effector_wrt_world: [16 numbers], object_wrt_sensor: [..]}          of moveit_calibration
 samples: [{robot: {translation: .., rotation: ..}, tracking: {..}}]    of easy_handeye2 (`optical` in the first)
-id,x,y,z,weight                                                        points, in any form that holds such
+id,x,y,z,weight                                                        points, in any format that holds such
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class HandEyeSamples(NamedTuple):
     """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
 
     places: where each is; names: of base, gripper, camera and target, None where nothing says one
-    files: what they are called; taken: how a form's own words were taken; told: sentences on what has no partner
+    files: what they are called; taken: how a format's own words were taken; warnings: sentences on what has no partner
     placed: whether they have positions; else these are 0
     """
 
@@ -63,12 +63,12 @@ class HandEyeSamples(NamedTuple):
     names: tuple[str | None, ...]
     files: tuple[str, ...]
     taken: str = ""
-    told: Sequence[str] = ()
+    warnings: Sequence[str] = ()
     placed: bool = True
 
 
 def read_samples(
-    argument: str, *, eye_to_hand: bool, normalize: bool = False, form: str = "", columns: Sequence[str] = ()
+    argument: str, *, eye_to_hand: bool, normalize: bool = False, fmt: str = "", columns: Sequence[str] = ()
 ) -> HandEyeSamples:
     """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2, or a table of both poses.
 
@@ -78,9 +78,9 @@ def read_samples(
     """
     file = InputFile(argument)
     try:
-        form = form or detect(file.head(), "rows", "records", name=file.path, otherwise="json")[0]
-        if columns or FORMATS[form].is_table:
-            return _of_table(file, form, columns, normalize=normalize)
+        fmt = fmt or detect(file.head(), "rows", "records", name=file.path, otherwise="json")[0]
+        if columns or FORMATS[fmt].is_table:
+            return _of_table(file, fmt, columns, normalize=normalize)
         source = file.source
     finally:
         file.close()
@@ -112,10 +112,10 @@ def read_samples(
     return HandEyeSamples(gripper, target, places, tuple(names), (source.name,), taken, placed=placed)
 
 
-def _of_table(file: InputFile, form: str, columns: Sequence[str], *, normalize: bool) -> HandEyeSamples:
+def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: bool) -> HandEyeSamples:
     """Read the poses of gripper and target that are side by side in the rows of a table."""
     text = file.stream.read()
-    names = open_table(text, form, header=True, source=file.name)[0].names or ()
+    names = open_table(text, fmt, header=True, source=file.name)[0].names or ()
     for first, others in () if columns else PARTNERS.items():
         found = [",".join(name for name in names if name.startswith(word)) for word in (first, *others)]
         columns = columns or [*filter(None, found)]
@@ -125,7 +125,7 @@ def _of_table(file: InputFile, form: str, columns: Sequence[str], *, normalize: 
     sides, placed, places = list[Transform](), False, list[str]()
     for each in columns:
         request = Request(Operation(moves=True), columns=(each,), normalize=normalize)
-        converter = FormatConverter(form, request, Style("json"), file.name, Answers())
+        converter = FormatConverter(fmt, request, Style("json"), file.name, Answers())
         blocks = gathered(converter, BufferedReader(BytesIO(text)), stop_at_first(file.name))
         numbers = np.concatenate([poses.numbers for poses, _ in blocks] or [np.empty((0, 7))])
         if numbers.shape[1] not in (4, 7):
@@ -211,8 +211,8 @@ class Points(NamedTuple):
     frame: str | None
 
 
-def read_points(argument: str, *, form: str, answers: Answers, policy: Callable[[str], BadRows]) -> Points:
-    """Read the points of a file in any form that holds such, with what is called `id` or `name`, and `weight`.
+def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[str], BadRows]) -> Points:
+    """Read the points of a file in any format that holds such, with what is called `id` or `name`, and `weight`.
 
     Raises FormatError with the place.
     """
@@ -220,20 +220,20 @@ def read_points(argument: str, *, form: str, answers: Answers, policy: Callable[
 
     file = InputFile(argument)
     try:
-        form = form or detect(file.head(), "rows", "arrays", "records", name=file.path)[0]
-        if "records" in FORMATS[form].reads and not re.search(TREE, file.head()):
+        fmt = fmt or detect(file.head(), "rows", "arrays", "records", name=file.path)[0]
+        if "records" in FORMATS[fmt].reads and not re.search(TREE, file.head()):
             return _of_documents(file)
-        return _of_rows(file, form, answers, policy(file.name))
+        return _of_rows(file, fmt, answers, policy(file.name))
     finally:
         file.close()
 
 
-def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Points:
+def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> Points:
     """Gather the points of a table, or of columns of numbers."""
-    if {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
-        raise FormatError(f"no points in it: {FORMATS[form].summary}", source=file.name)
-    converter = FormatConverter(form, Request(Operation(moves=True)), Style("json"), file.name, answers)
-    beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
+    if {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
+        raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
+    converter = FormatConverter(fmt, Request(Operation(moves=True)), Style("json"), file.name, answers)
+    extra: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
     blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
     if not blocks:
         raise FormatError("no points in it", source=file.name)
@@ -241,23 +241,23 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows) -> Poin
         raise FormatError("no positions in it: rotations alone are no points", source=file.name)
     for poses, _ in blocks:
         size = len(poses.numbers)
-        given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in beside}
+        given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in extra}
         if poses.names[0] is not None:
             given[IDS[1]] = [*poses.for_each(poses.names)]
-        for key, cells in beside.items():
+        for key, cells in extra.items():
             cells.extend(given.get(key, [None] * size))
-    on_lines = "arrays" not in FORMATS[form].reads
+    on_lines = "arrays" not in FORMATS[fmt].reads
     lines = np.concatenate([each for _, each in blocks]).tolist()
     places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in enumerate(lines, 1)]
     numbers = np.concatenate([poses.numbers[:, :3] for poses, _ in blocks])
-    return _points(file.name, numbers, beside, places, {name for poses, _ in blocks for name in poses.parents})
+    return _points(file.name, numbers, extra, places, {name for poses, _ in blocks for name in poses.parents})
 
 
 def _of_documents(file: InputFile) -> Points:
     """Gather the points of YAML or JSON."""
     source, request = file.source, Request()
     xyz: list[Any] = []
-    beside: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
+    extra: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
     paths: list[Path] = []
     frames: set[str | None] = set()
     known = read_text(source, request)
@@ -269,12 +269,12 @@ def _of_documents(file: InputFile) -> Points:
         paths.append(record.path)
         frames.add(record.parent.text)
         around = _around(known.values, record.path)
-        for key, cells in beside.items():
+        for key, cells in extra.items():
             cells.append(around.get(key))
     if not xyz:
         raise FormatError("no points in it; each is {id: .., xyz: [x, y, z]}", source=source.name)
     places = [f"{source.name}:{line}" for line, _ in locate_many(source.text, paths)]
-    return _points(source.name, np.array(xyz, float), beside, places, frames)
+    return _points(source.name, np.array(xyz, float), extra, places, frames)
 
 
 def _around(documents: dict[int, Any], path: Path) -> dict[str, Any]:
@@ -290,21 +290,21 @@ def _around(documents: dict[int, Any], path: Path) -> dict[str, Any]:
 
 
 def _points(
-    file: str, xyz: Array, beside: dict[str, list[Any]], places: list[str], frames: set[str | None]
+    file: str, xyz: Array, extra: dict[str, list[Any]], places: list[str], frames: set[str | None]
 ) -> Points:
     """Check ids and weights."""
-    key = next((key for key in IDS if any(each is not None for each in beside[key])), None)
-    ids = None if key is None else [str(each) for each in beside[key]]
+    key = next((key for key in IDS if any(each is not None for each in extra[key])), None)
+    ids = None if key is None else [str(each) for each in extra[key]]
     if key is not None and ids is not None:
         first: dict[str, str] = {}
-        for given, place in zip(beside[key], places, strict=True):
+        for given, place in zip(extra[key], places, strict=True):
             if given is None:
                 raise ValueInvalid(f"{place}: no {key}, the others have one")
             if (before := first.setdefault(given, place)) is not place:
                 raise ValueInvalid(f"{place}: {key} {shown(str(given))} appears twice, first at {before}")
     weights = None
-    if any(each is not None for each in beside[WEIGHT]):
-        weights = [_weight(each, place) for each, place in zip(beside[WEIGHT], places, strict=True)]
+    if any(each is not None for each in extra[WEIGHT]):
+        weights = [_weight(each, place) for each, place in zip(extra[WEIGHT], places, strict=True)]
     frame = frames.pop() if len(frames) == 1 else None
     return Points(file, xyz, ids, weights, places, frame)
 
@@ -322,7 +322,7 @@ def _weight(text: Any, place: str) -> float:
 class Matched(NamedTuple):
     """Points of two files that belong together, (n, 3) each.
 
-    places, ids: of each in the first file; told: sentences on what has no partner
+    places, ids: of each in the first file; warnings: sentences on what has no partner
     """
 
     target: Array
@@ -330,7 +330,7 @@ class Matched(NamedTuple):
     weights: list[float] | None
     places: list[str]
     ids: list[str] | None
-    told: list[str]
+    warnings: list[str]
 
 
 def matched(a: Points, b: Points) -> Matched:
@@ -338,7 +338,7 @@ def matched(a: Points, b: Points) -> Matched:
 
     Raises ValueInvalid where nothing matches.
     """
-    told = []
+    warnings = []
     if a.ids is not None and b.ids is not None:
         of_b = {name: at for at, name in enumerate(b.ids)}
         rows = [at for at, name in enumerate(a.ids) if name in of_b]
@@ -350,17 +350,17 @@ def matched(a: Points, b: Points) -> Matched:
             known = {*(other.ids or ())}
             if alone := [name for name in one.ids or () if name not in known]:
                 count = f"{len(alone)} of {len(one.xyz)} points have no partner in {other.file}"
-                told.append(f"{one.file}: {count}: {first_of(alone, MOST_NAMED, quote=bare)}")
+                warnings.append(f"{one.file}: {count}: {first_of(alone, MOST_NAMED, quote=bare)}")
     elif len(a.xyz) != len(b.xyz):
         raise ValueInvalid(f"{a.file} has {len(a.xyz)} points, {b.file} {len(b.xyz)}, and no ids to match them")
     else:
         rows = others = [*range(len(a.xyz))]
         if a.ids is not None or b.ids is not None:
-            told.append(f"{(a if a.ids is None else b).file} has no ids: points are matched row by row")
+            warnings.append(f"{(a if a.ids is None else b).file} has no ids: points are matched row by row")
     weights = _weights(a, b, rows, others)
     ids = a.ids or b.ids
     return Matched(
-        a.xyz[rows], b.xyz[others], weights, [a.places[at] for at in rows], ids and [ids[at] for at in rows], told
+        a.xyz[rows], b.xyz[others], weights, [a.places[at] for at in rows], ids and [ids[at] for at in rows], warnings
     )
 
 

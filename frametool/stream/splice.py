@@ -48,8 +48,8 @@ class Edit(NamedTuple):
 
 def target_of(record: Record, request: Request) -> Target:
     """Choose how the result of a record is written; conventions of Euler angles share a key and are together."""
-    names = [form.representation.name for form in request.notations]
-    together = sorted(request.notations, key=lambda form: names.index(form.representation.name))
+    names = [each.representation.name for each in request.notations]
+    together = sorted(request.notations, key=lambda each: names.index(each.representation.name))
     return request._replace(notations=tuple(together)).target(record.shape)
 
 
@@ -126,8 +126,8 @@ class Splicer:
     def _stays_a_list(self) -> bool:
         """Return True if a result has the numbers of the bare list it comes from and no others."""
         has_place = self.target.unit is None or self.record.shape.unit is not None
-        told = self.request.extras(self.record.shape)
-        return self._same_rotation() and has_place and not told
+        extra = self.request.extras(self.record.shape)
+        return self._same_rotation() and has_place and not extra
 
     def _same_rotation(self) -> bool:
         """Return True if the rotation is written as it was read, number by number."""
@@ -212,15 +212,15 @@ class Splicer:
     def _members(self, first: int) -> list[tuple[Piece, ...]]:
         """Return one member for each key of a notation, and the flag of a lock."""
         notations = self.target.notations
-        degrees = any(degrees for form, degrees in notations if form.degrees is None)  # what bare angles are
-        style = Style("json", tuple(form for form, _ in notations), degrees=degrees)
+        degrees = any(degrees for notation, degrees in notations if notation.degrees is None)  # what bare angles are
+        style = Style("json", tuple(notation for notation, _ in notations), degrees=degrees)
         position = SAMPLE[:3] if self.target.whole else None
         members = []
         for key, value in Result(Pose(position, SAMPLE)).mapping(style).items():
             if key not in ("gimbal_lock", "xyz"):
                 members.append(self._member({key: value}, first))
                 first += sum(isinstance(piece, Out) for piece in members[-1])
-        if any(form.euler_axes for form, _ in notations):
+        if any(notation.euler_axes for notation, _ in notations):
             flag = self._member({"gimbal_lock": True}, 0)
             members.append(tuple(IfLocked(piece.text) for piece in flag if isinstance(piece, Const)))
         return members
@@ -252,12 +252,12 @@ class Splicer:
         if isinstance(value, Word):
             return (*begin, value._replace(number=self.first + value.number))
         precision = self.request.precision
-        form, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
+        fmt, exponent = "" if precision is None else f"z.{precision}f", b"e" if self.json else b".0e"
         marks = [("[" * (not at), "]" if at == len(value) - 1 else ", ") for at in range(len(value))]
         marks = marks if value[1:] else [("", "")]
         items = zip(value, marks, strict=True)
         return (*begin, *(
-            Item(self.first + at, (*around, "null" * (at == value[0]), form), exponent) for at, around in items
+            Item(self.first + at, (*around, "null" * (at == value[0]), fmt), exponent) for at, around in items
         ))  # fmt: skip
 
     def _of_other_kind(self) -> list[Edit]:

@@ -60,9 +60,9 @@ class Parts(NamedTuple):
 class Splitter:
     """Cut a stream into records; `layout` is "" until the first line of JSON has been seen."""
 
-    def __init__(self, form: str) -> None:
+    def __init__(self, fmt: str) -> None:
         """Take `json` or `yaml`."""
-        self.layout = DOCUMENTS if form == "yaml" else ""
+        self.layout = DOCUMENTS if fmt == "yaml" else ""
         self._looked = 0
         self.is_open = True  # whether the end of an array has yet to come
 

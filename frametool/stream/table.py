@@ -3,7 +3,7 @@
 id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
 007,1.0,2.0,3.0,"a,b"                   (TUM: t x y z qx qy qz qw; s, m; the pose of the body in the world)
 
-Knows how a table is written, which frames its rows name, and which columns a trajectory has by its form.
+Knows how a table is written, which frames its rows name, and which columns a trajectory has by its format.
 """
 
 from __future__ import annotations
@@ -211,23 +211,23 @@ def _is_constant(column: Spans) -> bool:
     return all(bool((column.data[column.starts + offset] == byte).all()) for offset, byte in enumerate(first))
 
 
-def as_trajectory(table: Table, form: str, request: Request, source: str) -> Table:
+def as_trajectory(table: Table, fmt: str, request: Request, source: str) -> Table:
     """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
 
-    Raises FormatError for a count of columns that the form does not have.
+    Raises FormatError for a count of columns that the format does not have.
     """
-    row = FORMATS[form]
+    row = FORMATS[fmt]
     if request.given or request.columns:
         return table
-    if row.widths and table.width not in row.widths and (form == "kitti" or not table.names):
+    if row.widths and table.width not in row.widths and (fmt == "kitti" or not table.names):
         wanted = " or ".join(map(str, row.widths))
         line = table.head.count(b"\n") + 1
         raise FormatError(f"expected {wanted} numbers a line, found {table.width}", source=source, line=line)
-    if form == "kitti":
+    if fmt == "kitti":
         places = tuple(range(len(row.columns)))
         rows = Columns(places, row.columns, unit=1.0, notation=UPPER_ROWS, degrees=(None,) * 9, whole=True)
         return table._replace(names=row.columns, pose=PoseColumns(None, rows))
-    if form == "euroc":
+    if fmt == "euroc":
         names = table.names or row.columns[: table.width]
         if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
             names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
@@ -262,7 +262,7 @@ class Table(NamedTuple):
     names: of its columns, if it has any; width: how many cells a row has
     head: what comes before the header, or before the first row
     header: the raw text of the header's cells; title: its whole line; line_end: what ends it
-    pose: its columns, where the form says which they are, whatever their names
+    pose: its columns, where the format says which they are, whatever their names
     """
 
     delimiter: bytes
@@ -296,13 +296,13 @@ class Table(NamedTuple):
 
 
 def open_table(
-    block: bytes, form: str, *, header: bool, source: str, given: object = None
+    block: bytes, fmt: str, *, header: bool, source: str, given: object = None
 ) -> tuple[Table, bytes]:
     """Look at the first block; return the table and the block without what is before the first row.
 
     given: what --from says of numbers without names
     """
-    row = FORMATS[form]
+    row = FORMATS[fmt]
     delimiter = (row.delimiter or "").encode()
     mark = BYTE_ORDER_MARK if block.startswith(BYTE_ORDER_MARK) else b""
     comments, rest = _comments(block[len(mark) :])
@@ -433,7 +433,7 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Bl
 
 
 def at_other_times(table: Table, layout: Layout, text: bytes, offset_ns: int) -> bytes:
-    """Return rows with so much added to their stamps; what is no stamp stays as it is and is told where it is read."""
+    """Return rows with so much added to their stamps; what is no stamp stays unchanged and is reported when read."""
     if not offset_ns or layout.time is None:
         return text
     cells, name = table.split(text), table.name(layout.time)

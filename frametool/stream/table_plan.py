@@ -66,11 +66,11 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         from frametool.stream.earth_columns import refuse_elsewhere
 
         refuse_elsewhere(table, request, source)
-    beside: tuple[int, ...] = ()
+    extra: tuple[int, ...] = ()
     if any(map(may_be_uncertain, table.names or ())):
-        from frametool.stream.beside import covariance_columns
+        from frametool.stream.extra_numbers import covariance_columns
 
-        beside, shapes = covariance_columns(table, request, shapes, source)
+        extra, shapes = covariance_columns(table, request, shapes, source)
     request = request.for_kind(shapes[0].kind) if shapes else request
     if request.operation.formula is not None and (on_earth or request.place is not None):
         from frametool.stream.earth_columns import check_formula
@@ -78,7 +78,7 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
         check_formula(request, source, on_earth=on_earth)
     several = request.operation.moves and len(shapes) > 1
     targets = tuple(map(request.target, shapes)) if several else (request.target(shapes[0] if shapes else Shape(POSE)),)
-    places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *beside, *asked)
+    places = (*(place for pose in poses for columns in pose if columns for place in columns.places), *extra, *asked)
     frames = _frame_columns(table, request, source, on_earth=on_earth)
     stays = not request.poses or (request.operation.moves and request.rename is None)
     name = None if stays else _first_called(NAME_KEYS, table)
@@ -89,12 +89,12 @@ def plan_table(table: Table, request: Request, source: str) -> tuple[Plan, Layou
     named = ({frames[0]: PARENT} if frames and request.poses else {}) | ({} if name is None else {name: NAME})
     poses = [_written(pose) for pose in poses] if on_earth else poses
     columns = (_several if several else _columns)(table, poses, shapes, targets, request, named)
-    if beside and not request.keep:
-        from frametool.stream.beside import with_entries_at
+    if extra and not request.keep:
+        from frametool.stream.extra_numbers import with_entries_at
 
-        columns = with_entries_at(beside, columns, len(request.operation.carried(shapes[0])))
+        columns = with_entries_at(extra, columns, len(request.operation.carried(shapes[0])))
     if request.operation.turns and table.names and poses and poses[0].rotation:
-        from frametool.stream.beside import with_rates
+        from frametool.stream.extra_numbers import with_rates
 
         shapes, targets, places, columns = with_rates(table, request, shapes, targets, places, columns, source)
     if table.header:
@@ -211,13 +211,13 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     shapes = tuple(row_shape(pose, request._replace(kind=kind)) for pose, kind in zip(poses, kinds, strict=True))
     if request.operation.formula is None:
         return shapes
-    return ((shapes[0] if shapes else Shape("", None))._replace(beside=asked),)
+    return ((shapes[0] if shapes else Shape("", None))._replace(extra=asked),)
 
 
 def _by_width(width: int, given: Notation | None) -> str:
     """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
     if given is None:
-        wholes = [form.representation.whole for form in wholes_of(None)]
+        wholes = [notation.representation.whole for notation in wholes_of(None)]
         return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
     if width in given.counts:
         return f"1-{width}"
@@ -324,7 +324,7 @@ def _columns(
     if only_turned and request.by_default and not (request.all_numbers or target.notations or request.keep):
         return columns
     if request.keep or request.operation.only_adds or not ours:
-        return _beside(table, columns, [*position, *rotation, *extras], request.operation.shown or PLAIN)
+        return _extra(table, columns, [*position, *rotation, *extras], request.operation.shown or PLAIN)
     if rename_of(request) is not None:
         for place, role in named.items():
             columns[place] = Named(place, role)
@@ -345,7 +345,7 @@ def _columns(
     return [column for place, given in enumerate(columns) for column in at.get(place, [given])]
 
 
-def _beside(table: Table, columns: Sequence[Column], extras: Sequence[Column], shown: Shown) -> list[Column]:
+def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], shown: Shown) -> list[Column]:
     """Put new columns behind those that stay, or in the place of those of their names."""
     more = {getattr(each, "name", at) if shown.replaces else at: each for at, each in enumerate(extras)}
     mixed = [more.pop(name, kept) for name, kept in zip(_names_or_numbers(table), columns, strict=True)]
@@ -423,5 +423,5 @@ def _new_columns(
     axes: list[Column] = []
     if target.place is not None and turned and not (target.place == shape.place and AXES_KEY in target.place.fields):
         axes = [Fixed(target.place.axes, request.prefix + AXES_KEY)]
-    beside = [column for column, (_, name) in zip(new[last:], named[last:], strict=True) if name not in turned]
-    return [[*new[:first], *axes], new[first:last], beside]
+    extra = [column for column, (_, name) in zip(new[last:], named[last:], strict=True) if name not in turned]
+    return [[*new[:first], *axes], new[first:last], extra]

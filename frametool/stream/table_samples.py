@@ -36,13 +36,13 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
 
     Raises or reports FormatError with the line of a row that is no pose.
     """
-    form = FORMATS[file.format].poses
+    fmt = FORMATS[file.format].poses
     if what := not_text(file.head()):
         raise FormatError(what, source=file.name)
     request = Request(normalize=options.normalize, notations=(notation("quaternion"),), keep_sign=True)
     begun = begin_table(cast("ByteStream", file.stream), file.format, request, source=file.name)
     rows = TablePoses(begun.table, request, file.name)
-    _check(rows, form, file, options)
+    _check(rows, fmt, file, options)
     stamps = StampFile(options.answers.stamps) if options.answers.stamps else None
     count = 0
     for block, line, outcome in rows.blocks(begun):
@@ -52,20 +52,20 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | Samples]:
             column = rows.table.name(rows.naming.places[role] or 0)
             fault = Fault(line + int(block.lines[row]), column, "no name of a frame")
             options.report(BadRow(fault, fault.reason, source=file.name))
-        times = stamps_for(block, stamps, form, count)
-        yield from _pieces(block, None if times is None else times.tolist(), line, form, options)
+        times = stamps_for(block, stamps, fmt, count)
+        yield from _pieces(block, None if times is None else times.tolist(), line, fmt, options)
         count += len(block.numbers)
     if stamps:
         stamps.finish(count, file.name)
-    _tell(rows, form, options, count)
+    _tell(rows, fmt, options, count)
 
 
-def _check(rows: TablePoses, form: Poses, file: InputFile, options: Options) -> None:
+def _check(rows: TablePoses, fmt: Poses, file: InputFile, options: Options) -> None:
     """Refuse a table that is no poses, or poses without time and names."""
     if rows.shape.notation is None:
         message = f"no rotation among the columns {rows.columns}: points are no frames"
         raise FormatError(message, source=file.name, line=1)
-    if rows.stamp_at is None and not form.counted and not options.answers.stamps and len(rows.roles) < 2:
+    if rows.stamp_at is None and not fmt.counted and not options.answers.stamps and len(rows.roles) < 2:
         lacking = ", ".join(name for role, name in enumerate(("parent", "name")) if role not in rows.roles)
         wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns, or --stamps FILE"
         raise FormatError(f"no column {lacking} nor stamp among {rows.columns}; {wanted}", source=file.name, line=1)
@@ -78,7 +78,7 @@ def _nameless(block: RowPoses, roles: Sequence[int]) -> dict[int, int]:
 
 
 def _pieces(
-    block: RowPoses, times: Sequence[int] | None, line: int, form: Poses, options: Options
+    block: RowPoses, times: Sequence[int] | None, line: int, fmt: Poses, options: Options
 ) -> Iterator[Edge | Samples]:
     """Yield the poses of a block: as samples of one frame after the other, or as edges that are static."""
     columns: Components = tuple(block.numbers.T)
@@ -86,7 +86,7 @@ def _pieces(
         columns = (*[columns[0] * 0.0] * 3, *columns)
     poses = list(zip(*(column.tolist() for column in columns), strict=True))
     lines = (block.lines + line).tolist()
-    world, body = options.answers.names(*form.frames)
+    world, body = options.answers.names(*fmt.frames)
     parents = [name or world for name in block.for_each(block.parents)]
     names = [name or body for name in block.for_each(block.names)]
     bare = options.tally.names.bare
@@ -97,14 +97,14 @@ def _pieces(
             yield Samples(parent, name, times[part], poses[part], lines[part])
         else:
             yield from (Edge(parent, name, poses[at], None, lines[at]) for at in some)
-    options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or form.axes)
+    options.tally.axes |= dict.fromkeys(names, options.answers.camera_axes or fmt.axes)
 
 
-def _tell(rows: TablePoses, form: Poses, options: Options, count: int) -> None:
+def _tell(rows: TablePoses, fmt: Poses, options: Options, count: int) -> None:
     """Keep what is worth telling: what was taken for granted, rotations that were not quite."""
     if len(rows.roles) < 2:
-        describe(options, form, count)
-    if form.rotation == "matrix":
+        describe(options, fmt, count)
+    if fmt.rotation == "matrix":
         options.tally.projected = rows.off
     else:
         options.tally.rough += [1] * rows.mended

@@ -51,10 +51,10 @@ if TYPE_CHECKING:
 
 
 def run_table(
-    stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True
+    stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True
 ) -> Generator[Outcome]:
     """Yield the outcomes of a table's blocks, the first one its head."""
-    begun = begin_table(stream, form, request, source=source, header=header)
+    begun = begin_table(stream, fmt, request, source=source, header=header)
     names = begun.table.names
     request = request if NORMAL_NAMES.isdisjoint(names or ()) else with_vectors(names, request)
     rows = TableRows(begun.table, request, source)
@@ -78,15 +78,15 @@ class Begun(NamedTuple):
         return chain((self.rest,) if self.rest else (), self.blocks)
 
 
-def begin_table(stream: ByteStream, form: str, request: Request, *, source: str, header: bool = True) -> Begun:
-    """Read the head of a table in a form; raises FormatError."""
-    delimiter = (FORMATS[form].delimiter or "").encode()
+def begin_table(stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True) -> Begun:
+    """Read the head of a table in a format; raises FormatError."""
+    delimiter = (FORMATS[fmt].delimiter or "").encode()
     blocks = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines)
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
-    table, rest = open_table(first, form, header=header, source=source, given=request.given or request.given_place)
-    table = as_trajectory(table, form, request, source)
+    table, rest = open_table(first, fmt, header=header, source=source, given=request.given or request.given_place)
+    table = as_trajectory(table, fmt, request, source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
 
@@ -105,10 +105,10 @@ def _first_rows(blocks: Iterator[bytes]) -> bytes | None:
 def settle_stamps(table: Table, request: Request, source: str) -> tuple[Request, Timed | None]:
     """Find the column of stamps that a request needs; or, where no option names one, the one nobody asked for."""
     timed = request.timed
-    beside = request.extra_column
-    if (request.window or request.offset_ns) and beside is None and not (timed and timed.name):
-        beside = ""
-    if beside == "":
+    extra = request.extra_column
+    if (request.window or request.offset_ns) and extra is None and not (timed and timed.name):
+        extra = ""
+    if extra == "":
         who = "a velocity" if request.operation.velocity else "--start, --stop, --time-offset"
         request = request._replace(extra_column=_stamp_column(table, source, who))
     if timed is None:
@@ -247,8 +247,8 @@ class TablePoses(TableRows):
         parts = block.parts if len(rows) == run.count else [chosen(part, rows) for part in block.parts]
         texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
         own = own_count(self.plan, results.shape[1])
-        beside = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
-        texts |= {each.name: results[:, each.number] for each in beside}
+        extra = [each for each in self.layout.columns if isinstance(each, New) and each.number >= own]
+        texts |= {each.name: results[:, each.number] for each in extra}
         names: list[Sequence[str | None]] = [[name] for name in self.unnamed]
         for role, part in zip(self.roles, parts[len(self.kept) :], strict=True):
             names[role] = _texts(part)
@@ -267,12 +267,12 @@ def _texts(part: Spans) -> Sequence[str | None]:
     return [texts[0] or None] if len(texts) == 1 else [texts[code] or None for code in codes.tolist()]
 
 
-def stamps_for(block: RowPoses, file: StampFile | None, form: Poses, before: int) -> Ints | None:
+def stamps_for(block: RowPoses, file: StampFile | None, fmt: Poses, before: int) -> Ints | None:
     """Return the stamps of poses behind some: those of a file, their own, or their numbers as seconds."""
     size = len(block.numbers)
     if file:
         return np.array([file.at(before + at) for at in range(size)], np.int64)
-    counts = block.stamps_ns is None and form.counted
+    counts = block.stamps_ns is None and fmt.counted
     return np.arange(before, before + size, dtype=np.int64) * BILLION if counts else block.stamps_ns
 
 

@@ -65,7 +65,7 @@ _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
 )  # fmt: skip
 COVARIANCE = "covariance"  # an entry of one that passes as it is decides nothing
-TOLD = DESCRIPTIVE - {"frame"}  # whatever a number under these is, it tells of a result; null may be another record
+RESULT_KEYS = DESCRIPTIVE - {"frame"}  # a number under these belongs to a result; null may be another record
 MOST_NAMES = 1 << 16  # of frames, kept in mind
 
 
@@ -180,7 +180,7 @@ class Template:
         )
 
     @property
-    def beside(self) -> str:
+    def extra(self) -> str:
         """Return the last key that leads to what is read with the numbers."""
         return next((str(entry.stamp[0][-1]) for entry in self.entries if entry.stamp), "")
 
@@ -320,7 +320,7 @@ class Template:
                 yield leaf, f"{leaf.quote}{number.pattern}{leaf.quote}"
             elif key in LISTED_WORDS and depth == len(path):
                 yield leaf, SINGLE_QUOTED if leaf.quote == "'" else FREE[self.json, leaf.quote == '"']
-            elif key in TOLD and depth == len(path) and path not in fixed and number.fullmatch(leaf.value):
+            elif key in RESULT_KEYS and depth == len(path) and path not in fixed and number.fullmatch(leaf.value):
                 yield leaf, f"{leaf.quote}{number.pattern}{leaf.quote}"
             elif path in fixed or key in DECISIVE or (path[: depth - 1] in around and _stem(key) in words):
                 continue

@@ -1,4 +1,4 @@
-"""Trajectories of any form as arrays: rows of poses or positions, files that list poses, what moves in a recording.
+"""Trajectories of any format as arrays: rows of poses or positions, files that list poses, what moves in a recording.
 
 walk.tum        rows.csv        run.mcap:/odom        run.mcap:map:base_link
 """
@@ -59,14 +59,14 @@ def load_trajectory(
     frames: Sequence[str] = (),
     **answers: Any,
 ) -> Trajectory:
-    """Read a trajectory: a file of poses or positions over time, in any form that holds such.
+    """Read a trajectory: a file of poses or positions over time, in any format that holds such.
 
     path: a file, `-` for standard input, `FILE:TOPIC`, or `FILE:TARGET:SOURCE` for what moves in a tree or recording.
     format, topic, frames, answers: as `frametool.load` has them.
     Raises FormatError with the line of what cannot be read, ValueInvalid where there is not one trajectory.
     """
     known = Answers(tuple(frames), **answers)
-    return read_trajectory(str(path), form=format or "", topics=[topic] if topic else [], answers=known)
+    return read_trajectory(str(path), fmt=format or "", topics=[topic] if topic else [], answers=known)
 
 
 def stop_at_first(name: str) -> BadRows:
@@ -77,7 +77,7 @@ def stop_at_first(name: str) -> BadRows:
 def read_trajectory(
     text: str,
     *,
-    form: str = "",
+    fmt: str = "",
     topics: Sequence[str] = (),
     answers: Answers = Answers(),  # noqa: B008 - it is frozen
     policy: Callable[[str], BadRows] = stop_at_first,
@@ -91,7 +91,7 @@ def read_trajectory(
     name, inside = split_name(text)
     if len(inside) == 1:
         topics, inside = inside, []
-    if not inside and (form or by_suffix(name, RECORDINGS) or of_folder(name)) in RECORDINGS:
+    if not inside and (fmt or by_suffix(name, RECORDINGS) or of_folder(name)) in RECORDINGS:
         from frametool.recordings.messages import open_trajectory
 
         if (found := open_trajectory(name, topics, Diagnostics())) is not None:
@@ -100,16 +100,16 @@ def read_trajectory(
             with closing(InputFile(name, found[0])) as file:
                 return _of_records(file, "json", bad, asked, body_of(found[1], answers))
     if os.path.isdir(name) or inside or topics:
-        return _of_tree(name, form, topics, answers, inside, normalize=normalize)
+        return _of_tree(name, fmt, topics, answers, inside, normalize=normalize)
     file = InputFile(name)
     try:
-        form = form or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
-        is_record = "records" in FORMATS[form].reads and not re.search(TREE, file.head())
-        if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[form].reads):
-            return _of_tree(name, form, topics, answers, inside, file, normalize=normalize)
+        fmt = fmt or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)[0]
+        is_record = "records" in FORMATS[fmt].reads and not re.search(TREE, file.head())
+        if not is_record and {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
+            return _of_tree(name, fmt, topics, answers, inside, file, normalize=normalize)
         bad = policy(file.name)
         asked = Request(normalize=normalize, on_error=bad.on_error)
-        return _of_records(file, form, bad, asked) if is_record else _of_rows(file, form, answers, bad, asked)
+        return _of_records(file, fmt, bad, asked) if is_record else _of_rows(file, fmt, answers, bad, asked)
     finally:
         file.close()
 
@@ -142,10 +142,10 @@ def read_stamps(path: str, report: Report) -> list[int]:
         head = file.head()
         words = next((line.split() for line in head.splitlines() if line.strip() and line.lstrip()[:1] != b"#"), [])
         is_list = len(words) < 2 and not re.search(rb"[,;:{\[<\0]", b"".join(words)) and by_sign(head, "tree") is None
-        form = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)[0]
-        known = FORMATS[form]
-        if not known.is_table or form == "kitti":
-            return _stamps_of_poses(path, form, is_tree=not known.is_table and bool(re.search(TREE, head)))
+        fmt = "tum" if is_list else detect(head, "rows", "arrays", "tree", "records", name=file.path)[0]
+        known = FORMATS[fmt]
+        if not known.is_table or fmt == "kitti":
+            return _stamps_of_poses(path, fmt, is_tree=not known.is_table and bool(re.search(TREE, head)))
         text = file.stream.read()
     finally:
         file.close()
@@ -153,15 +153,15 @@ def read_stamps(path: str, report: Report) -> list[int]:
         raise FormatError(NO_TIMES, source=file.name)
     text = _with_title(text, (known.delimiter or "").encode() or None)
     titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
-    table, rest = open_table(text, form, header=titled, source=file.name)
+    table, rest = open_table(text, fmt, header=titled, source=file.name)
     named = table.names or (("t",) if is_list else (known.columns or ("t",))[: table.width])
-    at, below = (0, None) if form == "euroc" else stamp_places(named)
+    at, below = (0, None) if fmt == "euroc" else stamp_places(named)
     if at is None:
         columns = f"; columns: {listed(named)}" if table.names else ""
         raise FormatError(f"no column of stamps (t, stamp, time, stamp_ns ..){columns}", source=file.name, line=1)
     cells = table.split(rest)
     lines = cells.rows + text.count(b"\n", 0, len(text) - len(rest)) + 1
-    in_ns = 1 if form == "euroc" else in_nanoseconds(named[at])
+    in_ns = 1 if fmt == "euroc" else in_nanoseconds(named[at])
     parts = tuple(without_quotes(cells.column(place)) for place in (at, below) if place is not None)
     stamps, reasons = stamp_columns.read_stamps(parts, in_ns=in_ns)
     found = []
@@ -192,19 +192,19 @@ def _with_title(text: bytes, delimiter: bytes | None) -> bytes:
 NO_TIMES = "no times in it; write one a line"
 
 
-def _stamps_of_poses(path: str, form: str, *, is_tree: bool) -> list[int]:
-    """Return the stamps of a form that lists poses or records, or of all that moves in a recording."""
-    if is_tree or ("tree" in FORMATS[form].reads and "records" not in FORMATS[form].reads):
-        return _stamps_of_tree(path, form=form)
-    trajectory = read_trajectory(path, form=form)
+def _stamps_of_poses(path: str, fmt: str, *, is_tree: bool) -> list[int]:
+    """Return the stamps of a format that lists poses or records, or of all that moves in a recording."""
+    if is_tree or ("tree" in FORMATS[fmt].reads and "records" not in FORMATS[fmt].reads):
+        return _stamps_of_tree(path, fmt=fmt)
+    trajectory = read_trajectory(path, fmt=fmt)
     if trajectory.stamps_ns is None:
-        raise FormatError(f"no stamps in it ({FORMATS[form].summary})", source=path)
+        raise FormatError(f"no stamps in it ({FORMATS[fmt].summary})", source=path)
     return [int(stamp) for stamp in trajectory.stamps_ns]
 
 
-def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, form: str | None = None) -> list[int]:
+def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, fmt: str | None = None) -> list[int]:
     """Return the stamps of all that moves in a tree or recording, or of what came by a topic."""
-    recording = FrameFile(path, fmt=form, topics=topics)
+    recording = FrameFile(path, fmt=fmt, topics=topics)
     found = {edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None}
     if not found:
         raise FormatError(f"no stamps in it ({FORMATS[recording.format].summary})", source=path)
@@ -227,13 +227,13 @@ def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows) -
     return found
 
 
-def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
+def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
     """Gather the rows of a table, of columns of numbers, or of a file that lists poses."""
-    row = FORMATS[form].poses
+    row = FORMATS[fmt].poses
     counts = row is not None and bool(row.counted)
-    own = answers if counts or form == "csv" else answers._replace(stamps="")
+    own = answers if counts or fmt == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
-    converter = FormatConverter(form, request, Style("tum"), file.name, own)
+    converter = FormatConverter(fmt, request, Style("tum"), file.name, own)
     blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
     if not blocks:
         raise FormatError("no poses in it", source=file.name)
@@ -251,14 +251,14 @@ def _of_rows(file: InputFile, form: str, answers: Answers, bad: BadRows, asked: 
     stamps: Any = [poses.stamps_ns for poses, _ in blocks]
     times = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
     turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
-    at = None if "arrays" in FORMATS[form].reads else np.concatenate([lines for _, lines in blocks])
+    at = None if "arrays" in FORMATS[fmt].reads else np.concatenate([lines for _, lines in blocks])
     return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
 
 
-def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
+def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
     """Gather records: poses, or points, with their stamps."""
     blocks, named, turned = list[RowPoses](), set[tuple[str | None, str | None]](), True
-    for rows in stream_rows(cast("ByteStream", file.stream), form, asked, Style("tum"), bad):
+    for rows in stream_rows(cast("ByteStream", file.stream), fmt, asked, Style("tum"), bad):
         found = rows.posed()
         if found is None:
             results = [each for each in rows.in_order() if isinstance(each, Result) and each.pose.position is not None]
@@ -283,11 +283,11 @@ def _of_records(file: InputFile, form: str, bad: BadRows, asked: Request, body: 
 
 
 def _of_tree(
-    name: str, form: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None,
+    name: str, fmt: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None,
     *, normalize: bool = False,
 ) -> Trajectory:
     """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
-    recording = FrameFile(name, None if file is None else file.stream, form or None, topics, answers)
+    recording = FrameFile(name, None if file is None else file.stream, fmt or None, topics, answers)
     tree = cast("TransformBuffer", load_sources(opened_together([recording]), Rules(normalize=normalize)))
     if topics and not recording.topics.counts:
         raise ValueInvalid(f"{recording.name}: {FORMATS[recording.format].summary}: nothing in it came by a topic")

@@ -1,7 +1,7 @@
-"""Poses, points and vectors in blocks to any form of text that writes them.
+"""Poses, points and vectors in blocks to any format of text that writes them.
 
-What a row of text looks like is said by the form (`ROWS`), or learned from what it writes for one; where neither can
-be, the form writes row after row as it writes single results.  Other columns go along where they have a place.
+What a row of text looks like is said by the format (`ROWS`), or learned from what it writes for one; where neither can
+be, the format writes row after row as it writes single results.  Other columns go along where they have a place.
 """
 
 from __future__ import annotations
@@ -74,19 +74,19 @@ def target_in(style: Style, kind: str, *, placed: bool) -> Target:
     place: Any = style.place
     if kind != POSE:
         return Target(None, (), plain=True) if kind in SIX else Target(place or 1.0, (), three=True)
-    forms = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
-    whole = placed and len(forms) == 1 and forms[0][0].representation.whole is not None
-    return Target(None if whole or not placed else place or 1.0, forms, style.keep_sign, whole)
+    notations = tuple((each, style.in_degrees(each)) for each in style.notations or (notation("quaternion"),))
+    whole = placed and len(notations) == 1 and notations[0][0].representation.whole is not None
+    return Target(None if whole or not placed else place or 1.0, notations, style.keep_sign, whole)
 
 
 class TextWriter:
     """Write blocks of poses, points or vectors as text; `end` says what comes behind the last."""
 
     def __init__(self, style: Style, kind: str = POSE, extras: Sequence[str] = (), *, placed: bool = True) -> None:
-        """Choose how the form of a style is written.
+        """Choose how the format of a style is written.
 
         kind: pose, point or vector; extras: the numbers with each; placed: whether poses have a position
-        Raises ValueInvalid for what the form does not hold, and for notations that it does not have.
+        Raises ValueInvalid for what the format does not hold, and for notations that it does not have.
         """
         if kind in SIX and style.format not in LEARNED:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
@@ -107,7 +107,7 @@ class TextWriter:
         self.count = 0
         self.dropped: dict[str, None] = {}
         self.rows: RowForm | None = None
-        self.looked = False  # whether the form was seen to write a row
+        self.looked = False  # whether the format was seen to write a row
         self.order: list[int] = []
         self.first: Any = None
         self.empty: RowPoses | None = None  # a block without rows says what columns there are
@@ -154,9 +154,9 @@ class TextWriter:
         self.dropped_fields.tell()
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
-    # --- forms that say what a row is ---
+    # --- formats that say what a row is ---
 
-    def _fixed(self, form: RowForm, block: RowPoses) -> bytes:
+    def _fixed(self, fmt: RowForm, block: RowPoses) -> bytes:
         dropped = self.dropped_fields
         if dropped is not None:
             there = [name for names in (block.parents, block.names) for name in names if name]
@@ -166,19 +166,19 @@ class TextWriter:
                 stamps=block.stamps_ns is not None and NUMBER not in block.extras,
                 extras=[*self.extras, *(name for name in block.extras if name not in (IMAGE, NUMBER))],
             )
-            dropped.counted |= "stamps" in form.holds and block.stamps_ns is None
-            dropped.by_stamp |= IMAGE in form.row and images is None
+            dropped.counted |= "stamps" in fmt.holds and block.stamps_ns is None
+            dropped.by_stamp |= IMAGE in fmt.row and images is None
             dropped.turned = is_turned(self.style)
         tx, ty, tz, x, y, z, w = self._own(tuple(block.numbers.T))[:7]  # as the format has them: axes, direction, sign
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].poses.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
-        return self._joined(form, np.array(form.numbers(tx, ty, tz, *turn)).T + 0.0, block)  # none is -0.0
+        return self._joined(fmt, np.array(fmt.numbers(tx, ty, tz, *turn)).T + 0.0, block)  # none is -0.0
 
-    def _joined(self, form: RowForm, values: Floats, block: RowPoses) -> bytes:
+    def _joined(self, fmt: RowForm, values: Floats, block: RowPoses) -> bytes:
         """Put the rows of a block together."""
         after = bytearray()
-        for piece in form.row:
+        for piece in fmt.row:
             if isinstance(piece, Numbers):
                 after += (piece.between[:1] or b",") * piece.size
         if not np.isfinite(values).all():
@@ -187,17 +187,17 @@ class TextWriter:
             np.ascontiguousarray(values), self.style.precision, bytes(after), yaml=self.style.format == "yaml"
         )
         size, first = len(values), 0
-        parts = [constant(form.between, size)] if form.between else []
-        for piece in form.row:
+        parts = [constant(fmt.between, size)] if fmt.between else []
+        for piece in fmt.row:
             if isinstance(piece, bytes):
                 parts.append(constant(piece, size))
             elif isinstance(piece, Numbers):
                 parts += _numbers(numbers, first, piece)
                 first += piece.size
             else:
-                parts.append(self._field(piece, block, form.first))
+                parts.append(self._field(piece, block, fmt.first))
         text = join(parts)
-        return text if self.count else form.head + text[len(form.between) :]
+        return text if self.count else fmt.head + text[len(fmt.between) :]
 
     def _field(self, name: str, block: RowPoses, first: int) -> Spans:
         """Return what is written in one field of each row."""
@@ -222,7 +222,7 @@ class TextWriter:
         return stamps
 
     def _cells(self, mark: str, block: RowPoses) -> Spans:
-        """Return a column of names or of what is not ours, as the form writes texts."""
+        """Return a column of names or of what is not ours, as the format writes texts."""
         what = mark[2:-2]
         if what in ("name", "parent"):
             texts: Sequence[str | None] = block.names if what == "name" else block.parents
@@ -235,10 +235,10 @@ class TextWriter:
         known = {text: (quoted(text or "") if in_csv else dump(plain_cell(text or ""))).encode() for text in {*texts}}
         return spans_of([known[text] for text in texts])
 
-    # --- forms whose rows depend on what is written ---
+    # --- formats whose rows depend on what is written ---
 
     def _free(self, block: RowPoses, *, is_null: bool) -> bytes:
-        """Write a block as the form was seen to write poses; one by one where it was not, or angles are not unique."""
+        """Write a block as the format was seen to write poses; one by one where unseen, or angles are not unique."""
         if is_null:
             return self._one_by_one(block)
         if not self.looked:
@@ -267,7 +267,7 @@ class TextWriter:
         return self._joined(rows, values, block)
 
     def _learn(self, block: RowPoses) -> None:
-        """See how the form writes a pose whose numbers are all different, and take them for places to fill in."""
+        """See how the format writes a pose whose numbers are all different, and take them for places to fill in."""
         style = self.style.with_format(self.style.format)
         style.precision = None
         varies = block.extras or {len(block.names), len(block.parents)} != {1}
@@ -280,8 +280,8 @@ class TextWriter:
         head, between = (alone[: -len(row)], "") if alone.endswith(row) else ("", row[: -len(alone)])
         row = row[len(between) :]
         own = self.probe[: self._size] if self.placed or self.kind != POSE else self.probe
-        beside = (0.7310585786300049 + at for at in range(len(self.extras)))
-        written = [*self.target.written(own, floats), *beside]
+        extra = (0.7310585786300049 + at for at in range(len(self.extras)))
+        written = [*self.target.written(own, floats), *extra]
         marks = {repr(value): at for at, value in enumerate(written) if type(value) is float}
         marks |= {MARK.format(what): -1 for what in ("name", "parent", *range(len(block.extras)))}
         marks[str(PROBE_NS)] = -1
@@ -326,7 +326,7 @@ class TextWriter:
         return extras | {name: Verbatim(MARK.format(at)) for at, name in enumerate(block.extras)}
 
     def _one_by_one(self, block: RowPoses) -> bytes:
-        """Write the rows as the form does for single results."""
+        """Write the rows as the format does for single results."""
         results: list[Any]
         if self.kind == POSE:
             results = list(results_of(block, self.extras, placed=self.placed))
@@ -338,19 +338,19 @@ class TextWriter:
         return text[len(known) :].encode()
 
 
-def refuse_scale_in(form: str, beside: Iterable[str]) -> None:
-    """Stop where a form has no place for the scale of a similarity, which would then be a pose."""
-    if SCALE in beside and form not in ("text", *LEARNED):
-        raise ValueInvalid(f"{form} has no place for a scale; write json, yaml or csv")
+def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:
+    """Stop where a format has no place for the scale of a similarity, which would then be a pose."""
+    if SCALE in extra and fmt not in ("text", *LEARNED):
+        raise ValueInvalid(f"{fmt} has no place for a scale; write json, yaml or csv")
 
 
 def _no_text(_results: Sequence[Any], _style: Style) -> str:
-    """Write nothing: a form that says what its rows are writes them by that alone."""
+    """Write nothing: a format that says what its rows are writes them by that alone."""
     return ""
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return the text of single poses in a form that says what its rows are."""
+    """Return the text of single poses in a format that says what its rows are."""
     writer = TextWriter(style)
     return b"".join((writer.of_block(block_of(list(results))), *writer.end())).decode()
 

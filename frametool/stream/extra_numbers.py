@@ -169,7 +169,7 @@ def covariance_columns(
     passes = request.operation.keeps_frames and request.gathered is None
     own = shapes[0].place if shapes else None
     if passes and own is not None and request.place is not None and own.axes != request.place.axes:
-        _refuse_beside(table, own.axes, request.place.axes, source)
+        _refuse_extra(table, own.axes, request.place.axes, source)
     if passes or not kinds or not {*PLACED}.issuperset(kinds):
         return (), shapes
     try:
@@ -195,7 +195,7 @@ def covariance_columns(
     return places, (shape._replace(covariance=(len(places),), rewritten=True, sigma=sigma),)
 
 
-def _refuse_beside(table: Table, axes: str, others: str, source: str) -> None:
+def _refuse_extra(table: Table, axes: str, others: str, source: str) -> None:
     """Raise FormatError for the columns of a covariance that would stay along axes which a result does not have."""
     if any(find_columns(table.names or (), size)[0] for size in (9, 36)):
         given, remedy = (f"along {axes}", "") if axes else ("along the axes there", f", or say --local-axes {others}")
@@ -203,13 +203,13 @@ def _refuse_beside(table: Table, axes: str, others: str, source: str) -> None:
         raise FormatError(message, source=source, line=1)
 
 
-def with_entries_at(beside: Sequence[int], columns: Sequence[Column], count: int) -> list[Column]:
+def with_entries_at(extra: Sequence[int], columns: Sequence[Column], count: int) -> list[Column]:
     """Put the entries of a result's covariance, the last numbers there are, where that of the row stood."""
     entries = sorted([each for each in columns if isinstance(each, New)], key=lambda each: each.number)[-count:]
     found: list[Column] = []
     for column in columns:
-        if isinstance(column, Kept) and column.place in beside:
-            found += entries if column.place == min(beside) else []
+        if isinstance(column, Kept) and column.place in extra:
+            found += entries if column.place == min(extra) else []
         elif column not in entries:
             found.append(column)
     return found
@@ -249,11 +249,11 @@ SCALED_ALONE = (POINT, VECTOR, POSE)  # what a similarity moves
 
 
 def with_own(
-    shape: Shape, pose: Components, beside: Components, mover: Components | None, *, mirrors: bool
+    shape: Shape, pose: Components, extra: Components, mover: Components | None, *, mirrors: bool
 ) -> tuple[Components, Components]:
     """Return a row's pose with its own covariance or scale, and what else comes with it."""
     size = shape.covariance[0]
-    given, rest = beside[:size], beside[size:]
+    given, rest = extra[:size], extra[size:]
     if mirrors and size > 1:
         raise ValueInvalid(MIRRORED)
     if shape.sigma:
@@ -262,9 +262,9 @@ def with_own(
         if mover is not None and len(mover) > EXACT:
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
         count = sum(shape.covariance)
-        parts = [beside[at : at + size] for at in range(0, count, size)]
+        parts = [extra[at : at + size] for at in range(0, count, size)]
         turned = [part if mover is None else uncertainty.rotate_covariance(part, *mover[3:]) for part in parts]
-        return pose, (*chain.from_iterable(turned), *beside[count:])
+        return pose, (*chain.from_iterable(turned), *extra[count:])
     if shape.inverse:
         back = inverse((*rigid.inverse(*pose), *given))
         return (back if size == 1 else (*pose, *back[EXACT:])), rest
@@ -285,16 +285,16 @@ def of_multiple(
     return inverse((*pose, s)) if shape.inverse else (*pose, s)
 
 
-def along_ecef(shape: Shape, own: Components, beside: Components) -> tuple[Shape, Components]:
+def along_ecef(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:
     """Return what comes with a place with its covariance along the axes of ECEF, from the axes there."""
     size, place = shape.covariance[0], shape.place
-    given = beside[:size]
+    given = extra[:size]
     if shape.sigma:
         given = expanded(shape, given)
         given = given if shape.kind == POSE else tuple(given[6 * i + j] for i in range(3) for j in range(3))
     turn = place._replace(level=False).turned(own[: place.size], IDENTITY) if place is not None else IDENTITY
     made = shape._replace(covariance=(len(given), *shape.covariance[1:]), sigma=())
-    return made, (*uncertainty.rotate_covariance(given, *turn), *beside[size:])
+    return made, (*uncertainty.rotate_covariance(given, *turn), *extra[size:])
 
 
 def expanded(shape: Shape, numbers: Components) -> Components:
@@ -303,14 +303,14 @@ def expanded(shape: Shape, numbers: Components) -> Components:
     return of_sigmas([zero if at < 0 else in_unit(numbers[at], unit) for at, unit in shape.sigma])
 
 
-def move(shape: Shape, own: Components, beside: Components, mover: Components, *, mirrors: bool) -> Components:
+def move(shape: Shape, own: Components, extra: Components, mover: Components, *, mirrors: bool) -> Components:
     """Move what is no pose by one, with its covariances; one that has a covariance gives what moves its own."""
     pose, kind = pose_of(mover), shape.kind
     if mirrors and shape.covariance:
         raise ValueInvalid(MIRRORED)
     if shape.sigma:
-        given = expanded(shape, beside)
-        beside = (*(given[6 * i + j] for i in range(3) for j in range(3)), *beside[shape.covariance[0] :])
+        given = expanded(shape, extra)
+        extra = (*(given[6 * i + j] for i in range(3) for j in range(3)), *extra[shape.covariance[0] :])
         shape = shape._replace(covariance=(uncertainty.POINT,), sigma=())
     if len(mover) == SCALED:
         if kind not in SCALED_ALONE or shape.covariance:
@@ -318,19 +318,19 @@ def move(shape: Shape, own: Components, beside: Components, mover: Components, *
             raise ValueInvalid(f"{what} cannot be carried through a scale; points, vectors and poses can")
         s = scale_of(mover)
         x, y, z = own
-        return (*MOVERS[kind](*pose, s * x, s * y, s * z), *beside)
+        return (*MOVERS[kind](*pose, s * x, s * y, s * z), *extra)
     moved = MOVERS[kind](*pose, *own)
     if len(mover) > EXACT:
         if kind not in (POINT, VECTOR):
             raise ValueInvalid(f"the covariance cannot be carried through to a {kind}; leave --covariance out")
         carry = uncertainty.of_point if kind == POINT else uncertainty.of_vector
         size = sum(shape.covariance[:1])
-        found = carry(pose, mover[EXACT:], own, beside[:size] or None)
-        return (*moved, *(found or ()), *beside[size:])
+        found = carry(pose, mover[EXACT:], own, extra[:size] or None)
+        return (*moved, *(found or ()), *extra[size:])
     for size in shape.covariance:
         if kind in (TWIST, WRENCH):
-            turned = uncertainty.of_moved(MOVERS[kind], pose, beside[:size])
+            turned = uncertainty.of_moved(MOVERS[kind], pose, extra[:size])
         else:
-            turned = uncertainty.rotate_covariance(beside[:size], *pose[3:])
-        moved, beside = (*moved, *turned), beside[size:]
-    return (*moved, *beside)
+            turned = uncertainty.rotate_covariance(extra[:size], *pose[3:])
+        moved, extra = (*moved, *turned), extra[size:]
+    return (*moved, *extra)
