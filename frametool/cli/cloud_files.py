@@ -34,7 +34,7 @@ PLACES: dict[str, Callable[[PointCloud], str]] = {
     "number": lambda cloud: f"{cloud.number:06d}",
     "topic": lambda cloud: cloud.topic.strip("/"),
     "frame": lambda cloud: cloud.frame,
-}  # {NAME} in -o -> what stands there
+}  # {NAME} in -o -> what replaces it
 _HEAD = 64
 _WRITTEN = ", ".join(writers("arrays"))
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)

@@ -30,7 +30,7 @@ EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup,
 EVERYTHING = "frametool.everything"  # a key in a context's `meta`
 INPUTS = "frametool.inputs"  # the key in a context's `meta`
 PASSED = "frametool.passed"  # the same: the options on the command line
-# what stands for an option of several values in a command without it
+# the value of an option of several values in a command without it
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
 # options that any way may ignore: they are about what is said, not about what is done
 OF_MESSAGES = ("quiet", "verbose")
@@ -156,7 +156,7 @@ def _help(ctx: click.Context, option: click.Parameter, chosen: bool) -> None:  #
 
 
 def option_row(option: click.Option) -> tuple[str, str]:
-    """Return the names of an option with what it takes, and its meaning; long lists of choices stand in the latter."""
+    """Return the names of an option with what it takes, and its meaning; long lists of choices are in the latter."""
     names, text = ", ".join((*option.opts, *option.secondary_opts)), option.help or ""
     taken = option.metavar or option.type.name.upper()
     if isinstance(option.type, click.Choice) and not option.metavar:
@@ -416,7 +416,7 @@ def _without_others(message: str, command: click.Command) -> str:
     return message if found is None or found[1] in has else message[: found.start()]
 
 
-# options that may stand bare, and their values: the first is what they mean then
+# options that may be without a value, and their values: the first is what they mean then
 OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
 

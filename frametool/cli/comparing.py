@@ -60,7 +60,7 @@ def _read_up(text: str) -> tuple[float, float, float]:
 
 
 def read_delta(text: str, *units: str) -> Delta:
-    """Read a step in one of some units, all without any; in frames a number may stand alone."""
+    """Read a step in one of some units, all without any; a number of frames needs no unit."""
     from frametool.fit.comparison import parse_delta
 
     return parse_delta(f"{text}frames" if text.isdigit() and "frames" in units else text, *[units] * bool(units))
@@ -129,7 +129,7 @@ def formats_of(files: int) -> list[str]:
 
 
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
-    """Compare estimates with a reference as the options say; tell what is worth it. Also: whether rows were skipped."""
+    """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
     from frametool.fit.comparison import compare
 
     refuse([ref, *ests].count("-") > 1, "standard input can be read once; only one trajectory may be -")

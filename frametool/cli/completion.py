@@ -36,7 +36,7 @@ def answer(command: click.Command, variable: str, wanted: str, line: str) -> Non
 
 
 def _offers(command: click.Command, variable: str, line: str) -> list[tuple[str, str, str]]:
-    """Return type, word and meaning of what may end a line; all of the word, also what stands before a `=`."""
+    """Return type, word and meaning of what may end a line; all of the word, also what comes before a `=`."""
     *words, begun = split_arg_string(f"{line}.")  # the point: behind a blank a word begins
     option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""
     known = list(map(os.path.expanduser, words[1:]))

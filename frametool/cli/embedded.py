@@ -36,7 +36,7 @@ def run(
 ) -> Ran:
     """Run a command in this process as a shell would: what is wrong with it is a message and a status, never an exit.
 
-    line: as it is typed, `|` between commands, or the list of its words; `frametool` may stand first
+    line: as it is typed, `|` between commands, or the list of its words; `frametool` may come first
     stdin: what the command finds on standard input
     files: name -> content; the command runs in a folder that holds these, without them in the current one
     columns: width of the terminal that the output is laid out for; 0 for a pipe

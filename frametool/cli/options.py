@@ -48,7 +48,7 @@ FULL = -1  # digits: as many as the number has
 
 
 class Digits(Text):
-    """How many digits stand after the point: a number, or `full`."""
+    """How many digits follow the point: a number, or `full`."""
 
     def read(self, text: str) -> Any:
         """Take the word for all, or count."""

@@ -52,7 +52,7 @@ class Output:
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the format: as chosen, else by the file's suffix, else text for a terminal and YAML for a pipe.
 
-        otherwise: the format that stands in the place of these two
+        otherwise: the format instead of these two
         """
         self._inputs = inputs
         self.path: str | None = inputs.output
@@ -134,13 +134,13 @@ class Output:
         if len(poses) < len(found) and self.style.format != "csv":
             self.points([each.mapping(self.style) if isinstance(each, Result) else each for each in found])
             return
-        beside = {key for each in poses for key in each.said(self.style)}
-        if len(poses) > 1 or "covariance" in beside:
+        keys = {key for each in poses for key in each.said(self.style)}
+        if len(poses) > 1 or "covariance" in keys:
             self._shorten()
-        if "scale" in beside:
+        if "scale" in keys:
             from frametool.stream.writers import refuse_scale_in
 
-            refuse_scale_in(self.style.format, beside)
+            refuse_scale_in(self.style.format, keys)
         self.text(self._module("frametool.view.pose_text").write_poses(found, self.style))
         self._warn_dropped(key for each in poses for key in each.extras)
 

@@ -262,38 +262,38 @@ class ArgumentPoses(NamedTuple):
 
     source: Source
     poses: list[Pose]
-    beside: set[str]
-    odd: list[tuple[Any, ...]]
+    others: set[str]
+    warnings: list[tuple[Any, ...]]
 
     def only_poses(self, *, timed: bool) -> list[Pose]:
-        """Return the poses alone; tell what was odd, and what else stood there, but stamps that count as `timed`."""
+        """Return the poses alone; warn of what was noted and of what is left out, except stamps if `timed`."""
         from frametool.grammar.names import stamp_column
 
-        for message, rule in self.odd:
+        for message, rule in self.warnings:
             warn(message, rule=rule)
-        left_out = [key for key in sorted(self.beside) if not (timed and stamp_column([key]) is not None)]
+        left_out = [key for key in sorted(self.others) if not (timed and stamp_column([key]) is not None)]
         if left_out:
             warn(f"{self.source.name}: {', '.join(map(shown, left_out))} left out: only its pose is used")
         return self.poses
 
 
 def _read_argument(argument: str | Source, request: Request) -> ArgumentPoses:
-    """Read all poses of one of several arguments; warnings are kept, not told."""
+    """Read all poses of one of several arguments, and keep the warnings for later."""
     from frametool.stream.record_values import read_given
     from frametool.stream.request import COMBINED
 
     asked = request.operation
     request = request._replace(operation=COMBINED._replace(similar=asked.similar, multiples=asked.multiples))
-    odd: list[tuple[Any, ...]] = []
-    with heard_by(lambda *said: odd.append(said)):
+    warnings: list[tuple[Any, ...]] = []
+    with heard_by(lambda *said: warnings.append(said)):
         found: list[ArgumentPoses] = [
-            *_read(argument, request, lambda source: [ArgumentPoses(source, *read_given(source, request), odd)])
+            *_read(argument, request, lambda source: [ArgumentPoses(source, *read_given(source, request), warnings)])
         ]
     return found[0]
 
 
 def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:
-    """Return where the argument that holds several poses stands; raise ValueInvalid if another one does too."""
+    """Return the index of the argument that holds several poses; raise ValueInvalid if another one does too."""
     found = [at for at, each in enumerate(read) if each and len(each.poses) > 1]
     if len(found) > 1:
         named = " and ".join(f"{each.source.name} ({len(each.poses)})" for each in read if each and each.poses[1:])
@@ -324,7 +324,7 @@ def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[
         raise click.UsageError(f"only one argument may hold rows, {files} do; frametool compare takes two trajectories")
     stream = streams[0] if streams else None
     read = [None if at == stream else _read_argument(each, request) for at, each in enumerate(arguments)]
-    says_more = [at for at, each in enumerate(read) if each and each.beside]
+    says_more = [at for at, each in enumerate(read) if each and each.others]
     at = [0, *says_more, *_several(read)][-1] if stream is None else stream
     _warn_of_twins(bare, read)
     rows, timed = read[at], None
@@ -360,7 +360,7 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
-    """Read the one pose of an argument; warn of what else stands there."""
+    """Read the one pose of an argument; warn of what else it holds."""
     return _only(_read_argument(argument, request).only_poses(timed=False), argument)
 
 

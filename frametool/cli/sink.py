@@ -123,7 +123,7 @@ def is_special(path: str) -> bool:
 
 
 def _own_stream(path: str) -> int | None:
-    """Return the descriptor that a path such as /dev/stdout stands for."""
+    """Return the descriptor that a path such as /dev/stdout denotes."""
     found = re.fullmatch(r"(?:/dev|/proc/self)/fd/(\d+)", path)
     return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(path)
 
@@ -182,7 +182,7 @@ def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
     mode = 0o600 if os.path.exists(place) else 0o666
     part = ""
     with problems_of(path):
-        stream = unnamed_beside(place, mode)
+        stream = unnamed_in_folder(place, mode)
         if stream is None:
             part, stream = created(place, partial(_new_file, mode))
     try:
@@ -199,7 +199,7 @@ def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
         raise
 
 
-def unnamed_beside(place: str, mode: int) -> BinaryIO | None:
+def unnamed_in_folder(place: str, mode: int) -> BinaryIO | None:
     """Open a file without a name in the folder of a place, which is gone with its process; None where none can be."""
     if not (hasattr(os, "O_TMPFILE") and os.path.isdir(OPEN_FILES)):
         return None
@@ -254,7 +254,7 @@ def filling(path: str, *, force: bool) -> Iterator[Write]:
         nonlocal part
         with problems_of(path):
             if name := getattr(piece, "name", ""):
-                stream = unnamed_beside(place, 0o666)
+                stream = unnamed_in_folder(place, 0o666)
                 if stream is None:
                     part = part or created(place, os.mkdir)[0]
                     stream = open(os.path.join(part, name), "xb", buffering=0)  # noqa: SIM115 - closed below

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class BatchLine(NamedTuple):
-    """A line of a batch, and the file it stands in."""
+    """A line of a batch, and the file it is in."""
 
     source: str
     line: int
@@ -55,7 +55,7 @@ def say(text: str) -> None:
 
 
 def folded(line: str) -> str:
-    """Break a line between words where the terminal ends; what follows stands further in."""
+    """Break a line between words where the terminal ends; the rest is indented."""
     from shutil import get_terminal_size
 
     width = get_terminal_size().columns
@@ -124,7 +124,7 @@ def wants_json(arguments: Sequence[str]) -> bool:
 def as_json(error: FrametoolError, line: BatchLine | None = None, fate: str = "") -> str:
     """Return the error's kind, its message and its fields.
 
-    line: of the batch in which it is; the object's place is then that one, and its own place stands under `input`
+    line: of the batch in which it is; the object's place is then that one, and its own place is under `input`
     fate: what became of that line
     """
     from frametool.documents.json import dump

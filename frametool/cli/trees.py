@@ -206,7 +206,7 @@ def opened(
 
 
 def refuse_two_readers(arguments: Sequence[str]) -> None:
-    """Raise a usage error where two arguments stand for standard input."""
+    """Raise a usage error where two arguments are standard input."""
     refuse(list(arguments).count("-") > 1, "standard input can be read once; only one argument may be -")
 
 
@@ -250,7 +250,7 @@ def _frame_names(text: str) -> tuple[str, ...]:
 
 
 def tree_file(argument: str) -> str:
-    """Return the file that an argument stands for."""
+    """Return the file that an argument denotes."""
     if argument != ".":
         return argument
     if named := os.environ.get("FRAMETOOL_TREE"):

@@ -217,8 +217,8 @@ def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]
 def _head(scene: FrameScene) -> dict[str, Any]:
     """Return names, parents and the offset of each track in the blob."""
     index = {name: number for number, name in enumerate(scene.names)}
-    standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
-    parents = [-1 if track is None else index[track.parent] for track in standing]
+    static = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
+    parents = [-1 if track is None else index[track.parent] for track in static]
     tracks: list[dict[str, Any]] = []
     at = EACH * len(NO_POSE) * len(parents)
     for name, moving in scene.tracks.items():
@@ -232,8 +232,8 @@ def _head(scene: FrameScene) -> dict[str, Any]:
 
 def _blob(scene: FrameScene) -> Iterator[bytes]:
     """Yield the static poses, then the stamps and samples of each track."""
-    standing = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
-    yield _little(array("d", chain.from_iterable(track.components if track else NO_POSE for track in standing)))
+    static = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
+    yield _little(array("d", chain.from_iterable(track.components if track else NO_POSE for track in static)))
     for moving in scene.tracks.values():
         yield _little(array("q", (stamp for stamp, _, _ in moving.walk())))
         samples = moving.walk()

@@ -219,8 +219,8 @@ def _left_out(found: Solution) -> Iterator[str]:
         lines = [*_aligned(name, width, numbers)]
         if each.fits:
             words = f"fits when {each.fits}"
-            fits_beside = len(lines[-1]) + 2 + len(words) <= WIDTH
-            lines = [*lines[:-1], f"{lines[-1]}  {words}"] if fits_beside else [*lines, f"    {words}"]
+            fits_behind = len(lines[-1]) + 2 + len(words) <= WIDTH
+            lines = [*lines[:-1], f"{lines[-1]}  {words}"] if fits_behind else [*lines, f"    {words}"]
         yield from lines
 
 

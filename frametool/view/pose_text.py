@@ -224,12 +224,12 @@ def _two_digits(value: float, unit: str) -> str:
 
 
 def _said(value: Any) -> str:
-    """Write what stands beside numbers."""
+    """Write what accompanies numbers."""
     return printable(dump(value) if isinstance(value, (dict, list)) else "" if value is None else str(value))
 
 
 def _layout(lines: Sequence[NumberLine], style: Style) -> str:
-    """Align names and numbers in columns; where that is too wide each part stands for itself, or each number."""
+    """Align names and numbers in columns; where that is too wide each part, or each number, has a line."""
     label = max(len(line.label) for line in lines)
     width = get_terminal_size((WIDTH, 0)).columns
     parts: list[list[NumberLine]] = []
@@ -281,7 +281,7 @@ def _number(value: float, style: Style) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Pad the numbers of each column so that their decimal points stand below one another."""
+    """Pad the numbers of each column so that their decimal points are aligned."""
     points = [[len(cell.partition(".")[0]) for cell in row] for row in rows]
     wholes = [max(column) for column in zip_longest(*points, fillvalue=0)]
     moved = [
@@ -305,7 +305,7 @@ def write_blocks(results: Iterable[Result], target: str, source: str, style: Sty
 
 
 def _block(result: Result, style: Style) -> str:
-    """Return one block; a path that stands still has no time."""
+    """Return one block; a static path has no time."""
     decimals = ECHO_DECIMALS if style.precision is None else style.precision
     stamp_ns, components = result.extras.get("stamp_ns"), result.pose.components
 
@@ -384,8 +384,8 @@ def _label(track: Track, style: Style, covariance: Components | None) -> tuple[s
 def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
     """Yield the lines with the blanks that bring their poses below one another.
 
-    Where that makes them too long levels stand closer, sigmas are left out; where that is not enough either poses stand
-    behind their names.
+    Where that makes them too long levels are closer, sigmas are left out; where that is not enough either poses follow
+    their names.
     """
     lines = list(_lines(tree, style))
     turns = max((len(line.label[1]) for line in lines if _is_uncertain(line)), default=0)

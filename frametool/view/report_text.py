@@ -57,8 +57,8 @@ def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> list[str]:
 
 def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
     """Return the patterns that highlight problems in a report; each group is named by its colour."""
-    odd = [entry for entry in entries if entry["jumps"] or entry["backward"]]
-    names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in odd)
+    bad = [entry for entry in entries if entry["jumps"] or entry["backward"]]
+    names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in bad)
     rows = (rf"(?m)^(?P<red>{parent} +{child} .*)$" for parent, child in names)
     said = r"(?P<red>\b(?:jumps|back) [1-9]\d*)", r"(?m)(?P<magenta>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
     return *rows, *said

@@ -94,7 +94,7 @@ AXES = ("red", "green", "blue")
 ARROWS = "→↗↑↖←↙↓↘"
 LEAST_LINES, LEAST_COLUMNS = 4, 20
 SAME = 3.0  # dots within which frames share a name
-MOST_SHARED = 8  # names that stand side by side
+MOST_SHARED = 8  # names that are side by side
 MOST_OUTSIDE = 12  # frames that are pointed to
 
 

@@ -122,7 +122,7 @@ class Way(NamedTuple):
     target: the frame they are then expressed in, if it has a name
     from_frame: the transform from a frame (None: the one SOURCE), at a time or the latest
     at_times: columns of such transforms, nan where there is no data; None where the time does not matter
-    moves: tells whether the transform from a frame depends on the time
+    moves: returns True if the transform from a frame depends on the time
     explained: the same for derivations
     has_source: whether all come from one frame
     counters: whether no frame has a number for its name

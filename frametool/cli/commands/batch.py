@@ -1,6 +1,6 @@
 """`frametool batch`: commands one after the other in one process, each as it would run alone in a pipe.
 
-NAME = COMMAND keeps the result, as JSON text, instead of printing it; $NAME then stands for it.
+NAME = COMMAND keeps the result, as JSON text, instead of printing it; $NAME is then replaced by it.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class KeptResults:
         self._failed: dict[str, int] = {}  # name -> the line that sets it
 
     def value_of(self, name: str) -> str:
-        """Return what stands for a name; raise Misused for one that has no value."""
+        """Return the value of a name; raise Misused for one that has no value."""
         if name in self._texts:
             return self._texts[name]
         if name in self._failed:
@@ -198,7 +198,7 @@ class CommandBatch:
         return ROWS_SKIPPED
 
     def _run_line(self, line: CommandLine) -> int:
-        """Run one command and tell what goes wrong; return its status."""
+        """Run one command and report what goes wrong; return its status."""
         words: list[str] = []
         status = 0
         problem: FrametoolError

@@ -112,7 +112,7 @@ def _read(files: Sequence[FrameFile], *, normalize: bool) -> list[Measurement]:
 def _with_loops(
     files: Sequence[FrameFile], rows: Sequence[Measurement], tolerance: Tolerance | None, *, normalize: bool
 ) -> list[Finding]:
-    """Return what is wrong with files, then the measurements that do not agree; tell what was not compared."""
+    """Return what is wrong with files, then the measurements that do not agree; report what was not compared."""
     if not rows:
         return check(files, normalize=normalize)
     from frametool.fit.measured_tree import loops

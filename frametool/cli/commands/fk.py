@@ -44,8 +44,8 @@ def command(inputs: Inputs) -> int:
     mimic joint follows its leader. For a single posture use `frametool lookup arm.urdf arm_base tool -j elbow=30deg`.
     """
     stream, output = Stream(inputs), Output(inputs, "poses")
-    if (given := inputs.peek("joints")) and not stream.path and not stream.has_input():
-        words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in given)))
+    if (joints := inputs.peek("joints")) and not stream.path and not stream.has_input():
+        words = " ".join((inputs.tree, inputs.base, inputs.tip, *(f"-j {each}" for each in joints)))
         raise UsageError(f"no rows of joint values: give -i FILE; for one posture, frametool lookup {words}")
     (file,) = opened((inputs.tree,), streams=True)
     robot, posture = robot_of(file)

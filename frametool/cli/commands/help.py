@@ -52,7 +52,7 @@ def questions() -> dict[str, str]:
 
 
 def finder(words: Iterable[str]) -> Callable[[str], bool]:
-    """Return what tells whether a text holds all these words, in any case and number; `y-up` is one word."""
+    """Return the test whether a text holds all these words, in any case and number; `y-up` is one word."""
     found = re.findall(r"\w+(?:-\w+)*", " ".join(words).lower())
     stems = [r"\b" + r"\W?".join(map(_stem, each.split("-"))) for each in found]
     return lambda text: bool(stems) and all(re.search(each, text.lower()) for each in stems)
@@ -140,7 +140,7 @@ def _texts(command: click.Command, ctx: click.Context) -> list[str]:
 
 
 def common(ctx: click.Context) -> str:
-    """Return the options that stand in groups, each as the first command has it that does."""
+    """Return the options that are in groups, each as the first command has it that does."""
     found: dict[str, Any] = {}
     for command in _commands(ctx).values():
         several = [each for each in command.params if getattr(each, "under", shared.HEADINGS[0]) != shared.HEADINGS[0]]

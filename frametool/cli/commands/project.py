@@ -1,4 +1,4 @@
-"""`frametool project`: points into the picture of a camera. What it shares with `unproject` stands here too."""
+"""`frametool project`: points into the picture of a camera. What it shares with `unproject` is here too."""
 
 from __future__ import annotations
 
@@ -215,8 +215,8 @@ class CameraTask:
             request = request._replace(prefix=self.inputs.prefix, precision=output.style.precision)
             output.values(values_of(records, request, output))
         if not self.inputs.quiet and (self.is_stream or seen.lost) and (summary := seen.summary()):
-            is_odd = seen.is_mostly_behind and not self.inputs.camera_axes
-            say(f"{summary}{'; most are behind: --camera-axes flu or opengl?' * is_odd}")
+            is_wrong = seen.is_mostly_behind and not self.inputs.camera_axes
+            say(f"{summary}{'; most are behind: --camera-axes flu or opengl?' * is_wrong}")
         return status
 
 

@@ -50,9 +50,9 @@ def command(inputs: Inputs) -> int:
         refuse(len(poses) > 1, "rows are compared with one of themselves; leave A and B out")
         # a row is seen from another one of the same stream, which is the same thing at another moment
         operation = Operation(of=PREVIOUS if inputs.consecutive else START, velocity=velocity)
-        beside = (inputs.time_column or "") if velocity or window else None
+        column = (inputs.time_column or "") if velocity or window else None
         request = task.request(
-            operation=operation, extra_column=beside, window=window, rename=lambda _parent, name: (name, name)
+            operation=operation, extra_column=column, window=window, rename=lambda _parent, name: (name, name)
         )
         status = task.answer(a or "-", request)
         if velocity and not inputs.quiet:

@@ -47,7 +47,7 @@ of transforms, as `lookup` does. A summary goes to stderr.
 
 
 class SimGroup(Group):
-    """The subcommands of the turtles, which stand below."""
+    """The subcommands of the turtles, which are below."""
 
     table = {name: (__name__, about) for name, about in SUBCOMMANDS.items()}  # noqa: RUF012 - as the group's own
 
