@@ -273,9 +273,9 @@ class ArrayWriter(ColumnsWriter):
         """Return the columns of a block by name."""
         size = len(block.numbers)
         made: dict[str, Made] = {}
-        for name, given in (("name", block.names), ("parent" if self.kind == POSE else "frame", block.parents)):
-            if any(given):
-                made[name] = Made(objects(list(given) * (1 if len(given) == size else size)))
+        for name, frames in (("name", block.names), ("parent" if self.kind == POSE else "frame", block.parents)):
+            if any(frames):
+                made[name] = Made(objects(list(frames) * (1 if len(frames) == size else size)))
         for name, column in zip(self._names(), self._numbers(block), strict=True):
             made[name] = Made(column, not_finite(column))
         if (place := self.target.place) is not None:

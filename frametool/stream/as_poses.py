@@ -147,7 +147,7 @@ class FormatConverter:
         none = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), [None], [None], {})
         yield Step(none, Outcome(b"", lines=begun.lines, size=begun.taken))
         for block, _, outcome in rows.blocks(begun):
-            poses = self._with_place(block, lambda size: [*rows.given[:size]])
+            poses = self._with_place(block, lambda size: [*rows.inputs[:size]])
             if self.looks_up_places:
                 poses = poses._replace(parents=EARTH_FRAMES[:1])
             stamps = stamps_for(poses, self.stamps, fmt, count)

@@ -59,14 +59,14 @@ class RowResults(NamedTuple):
     numbers: (n, k) the results, nan if absent
     absent: (n,) for each shape, rows that have no numbers on purpose; None where all have
     names: by role, the names of the results, one a row, where a column holds them
-    given: the frames that the rows are expressed in
+    own_frames: the frames that the rows are expressed in
     """
 
     rows: Ints | None
     numbers: Floats
     absent: Sequence[Flags | None]
     names: Mapping[int, Sequence[str]]
-    given: Sequence[str | None]
+    own_frames: Sequence[str | None]
 
 
 class ColumnRows(PlannedRows):
@@ -115,12 +115,12 @@ class ColumnRows(PlannedRows):
         names = [name for each in targets for name in (*each.position_columns, *each.names)]
         kept = dict(zip(self.layout.places, names, strict=False))
         found = []
-        for at, (column, given) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1):
-            ours = dict(enumerate(names)).get(given.number) if isinstance(given, New) else None
-            if isinstance(given, (Kept, Named)):
-                ours = kept.get(given.place)
-            elif isinstance(given, (Worded, Fixed)):
-                ours = given.name
+        for at, (column, target) in enumerate(zip(self.columns(), self.layout.columns, strict=True), 1):
+            ours = dict(enumerate(names)).get(target.number) if isinstance(target, New) else None
+            if isinstance(target, (Kept, Named)):
+                ours = kept.get(target.place)
+            elif isinstance(target, (Worded, Fixed)):
+                ours = target.name
             found.append(column._replace(name=ours or f"column_{at}"))
         return found
 
@@ -199,7 +199,7 @@ class ColumnRows(PlannedRows):
         for column in self.layout.columns:
             if isinstance(column, New) and column.number >= own:
                 extras[column.name] = results.numbers[:, column.number]
-        return RowPoses(results.numbers[:, :own], stamps, rows, names[PARENT], names[NAME], extras, results.given)
+        return RowPoses(results.numbers[:, :own], stamps, rows, names[PARENT], names[NAME], extras, results.own_frames)
 
     # --- what is read ---
 
@@ -217,12 +217,12 @@ class ColumnRows(PlannedRows):
                     columns[at] = self._words(batch, at, bad)
                     continue
                 columns[at], missing = batch.numbers(places[at])
-                odd = not_finite(columns[at])
-                if odd is not None and not self.file.gaps:
-                    wrong = odd if missing is None else odd & ~missing
+                invalid = not_finite(columns[at])
+                if invalid is not None and not self.file.gaps:
+                    wrong = invalid if missing is None else invalid & ~missing
                     bad |= dict.fromkeys(np.flatnonzero(wrong).tolist(), (self.plan.names[at], "not finite"))
                 else:
-                    missing = _either(missing, odd)
+                    missing = _either(missing, invalid)
                 flags = _either(flags, missing)
             if flags is not None:
                 columns[first : first + shape.size, flags] = 0.0
@@ -285,11 +285,11 @@ class ColumnRows(PlannedRows):
         if self.request.gathered is not None and self.request.gathered.labelled:
             return np.array(batch.texts(self.layout.time), object)
         weights, nulls = batch.numbers(self.layout.time)
-        odd = _either(nulls, not_finite(weights))
-        if odd is not None:
+        invalid = _either(nulls, not_finite(weights))
+        if invalid is not None:
             name = self.table.name(self.layout.time)
-            bad |= dict.fromkeys(np.flatnonzero(odd).tolist(), (name, "not finite"))
-            weights[odd] = 0.0
+            bad |= dict.fromkeys(np.flatnonzero(invalid).tolist(), (name, "not finite"))
+            weights[invalid] = 0.0
         return weights
 
     # --- what becomes of it ---
@@ -486,17 +486,17 @@ def move_along(file: ColumnFile, request: Request) -> None:
 def made_of(columns: Sequence[OutColumn], rows: ColumnRows, results: RowResults) -> list[Made]:
     """Return what is in the columns that are made, in their order."""
     made = []
-    for column, given in zip(columns, rows.layout.columns, strict=True):
-        if isinstance(given, New):
+    for column, target in zip(columns, rows.layout.columns, strict=True):
+        if isinstance(target, New):
             with np.errstate(invalid="ignore"):
-                values = results.numbers[:, given.number].astype(column.kind or DOUBLE)
-            made.append(Made(values, rows.absent_in(given.number, results)))
-        elif isinstance(given, Named):
-            made.append(Made(results.names.get(given.role, ())))
-        elif isinstance(given, Worded):
-            made.append(Made([given.words[int(number)] for number in results.numbers[:, given.number].tolist()]))
-        elif isinstance(given, Fixed):
-            made.append(Made([given.word] * len(results.numbers)))
+                values = results.numbers[:, target.number].astype(column.kind or DOUBLE)
+            made.append(Made(values, rows.absent_in(target.number, results)))
+        elif isinstance(target, Named):
+            made.append(Made(results.names.get(target.role, ())))
+        elif isinstance(target, Worded):
+            made.append(Made([target.words[int(number)] for number in results.numbers[:, target.number].tolist()]))
+        elif isinstance(target, Fixed):
+            made.append(Made([target.word] * len(results.numbers)))
     return made
 
 

@@ -66,8 +66,8 @@ def _cells(batch: RecordBatch, value: Any, style: Style) -> Spans:
     if leaf is None:
         return _words([value], size)
     node, found = batch.leaf(int(leaf[1]))
-    is_odd = _is_split(found) if node.quote else found.data[found.starts] == ord("n")  # it may be null
-    if not is_odd.any():
+    is_unclear = _is_split(found) if node.quote else found.data[found.starts] == ord("n")  # it may be null
+    if not is_unclear.any():
         return found
     return _words(plain_texts(batch, int(leaf[1])), size)
 

@@ -67,10 +67,10 @@ class NamedColumn(NamedTuple):
     unit: str
 
 
-def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | None:
+def find(names: Sequence[str], earth: Earth, expected: str = "") -> PoseColumns | None:
     """Find the one position on the Earth among names, and a heading with it; None if absent.
 
-    given: the representation that --from names.
+    expected: the representation that --from names.
     Raises ValueInvalid for several, for heights that are not above the ellipsoid, and for units that are not known.
     """
     groups: dict[str, dict[str, NamedColumn]] = {}
@@ -84,7 +84,7 @@ def find(names: Sequence[str], earth: Earth, given: str = "") -> PoseColumns | N
     found = [
         (prefix, columns)
         for prefix, spots in groups.items()
-        for kind in ((given,) if given else POSITIONS)
+        for kind in ((expected,) if expected else POSITIONS)
         if (columns := _position(kind, spots, groups, earth)) is not None
     ]
     if not found:
@@ -213,16 +213,16 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
     matches = {name: FIELDS[match[2].lower()] for name in names if name and (match := PATTERN.fullmatch(name))}
     known = () if request.given_place else ECEF_COLUMNS
     header = Header(["" if matches.get(name) in known else name for name in names])
-    earth, given = request.earth or Earth(), request.given_place
-    if not given and (others := find_positions(header)):
+    earth, expected = request.earth or Earth(), request.given_place
+    if not expected and (others := find_positions(header)):
         said = [name for name, field in matches.items() if may_be_on_earth(name) or field == "lon"]
         if not request.operation.keeps_frames and said:
             message = f"{', '.join(said[:2])} stay data: {others[0].shown} are the position"
             warn(f"{source}: {message}; --columns lat,lon,alt --from lla turns it round")
         return None
     try:
-        found = find(names, earth, given)
-        if found is None and (place := Place.of_xyz(given, earth)) and (positions := find_positions(header)):
+        found = find(names, earth, expected)
+        if found is None and (place := Place.of_xyz(expected, earth)) and (positions := find_positions(header)):
             found = PoseColumns(positions[0]._replace(unit=place), None)
         if problem := _problem(found, names, request):
             raise ValueInvalid(problem)  # noqa: TRY301 - so that it gets its place as others do
@@ -243,15 +243,15 @@ def find_pose(names: Sequence[str], request: Request, source: str) -> PoseColumn
 
 def _problem(found: PoseColumns | None, names: Sequence[str], request: Request) -> str:
     """Return why the place of --from, or an incomplete one, cannot be read; "" where all is well."""
-    given = request.given_place
+    expected = request.given_place
     if found is None:
-        row = POSITIONS.get(given)
-        missing = row and f"no columns of {given} ({' '.join(row.columns)}) among: {listed(names)}"
+        row = POSITIONS.get(expected)
+        missing = row and f"no columns of {expected} ({' '.join(row.columns)}) among: {listed(names)}"
         return f"{missing}; name them with --columns" if missing else _half(names)
     place = place_of(found.position.unit) if found.position else None
     is_held = request.earth is not None and request.earth.zone is not None
     asked = [each.name for each in (request.place, *request.place.more)] if request.place else []
-    if is_held and given == UTM and place and ZONE in place.fields and UTM not in asked:
+    if is_held and expected == UTM and place and ZONE in place.fields and UTM not in asked:
         return "--zone has no effect: each row says its zone"
     return ""
 
@@ -360,11 +360,11 @@ def zone_notes(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
 
 def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
     """Wonder about the first row whose zone has the S of a band."""
-    given = dict(zip(place.fields, columns, strict=False))
+    fields = dict(zip(place.fields, columns, strict=False))
     if place.name != UTM:
         return []
-    northing = given["northing"]
-    zone = given[ZONE] if place.zone is None else northing * 0.0 + place.zone
+    northing = fields["northing"]
+    zone = fields[ZONE] if place.zone is None else northing * 0.0 + place.zone
     rows = ((zone < 0.0) & (northing >= 3.5e6) & (northing <= 4.5e6)).nonzero()[0][:1].tolist()
     return [RowNote(line_of(row), "band-s", band_s(float(zone[row]), float(northing[row])), ZONE) for row in rows]
 

@@ -54,8 +54,8 @@ def apply_arrow(
         if not is_floating(field.type):
             message = f"column {shown(field.name)} is {field.type}, not floating point; cast it to float64 first"
             raise ValueInvalid(message)
-    given = [in_one(data.column(place)) for place in places]
-    masks = [mask for mask in map(nulls_of, given) if mask is not None]
+    inputs = [in_one(data.column(place)) for place in places]
+    masks = [mask for mask in map(nulls_of, inputs) if mask is not None]
     nulls = np.logical_or.reduce(masks) if masks else None
     if tree is None:
         mover = _one_or_each(transform, data.num_rows, tree=bool(target or source or time_column))
@@ -63,7 +63,7 @@ def apply_arrow(
         mover = _looked_up(tree, target, source, data, time_column, nulls)
     else:
         raise ValueInvalid("give a transform, or tree, target and source")
-    numbers = [column.to_numpy(zero_copy_only=False) for column in given]
+    numbers = [column.to_numpy(zero_copy_only=False) for column in inputs]
     moved = _moved(mover.components, numbers, as_, nulls)
     with np.errstate(over="ignore"):  # what is too large becomes infinite
         made = [np.asarray(each, kind_of(field.type)) for each, field in zip(moved, fields, strict=True)]
@@ -140,7 +140,7 @@ def _moved(mover: Components, numbers: Sequence[Any], as_: str, nulls: Flags | N
     return (*poses.components[:3], *poses.xyzw.T)
 
 
-def _check(given: Sequence[Any], made: Sequence[Any], fields: Sequence[Any], nulls: Flags | None) -> None:
+def _check(inputs: Sequence[Any], made: Sequence[Any], fields: Sequence[Any], nulls: Flags | None) -> None:
     """Raise ValueInvalid for the first row that is not finite, or null where a column may hold no null."""
     for values, field in zip(made, fields, strict=True):
         if nulls is not None and not field.nullable:
@@ -149,7 +149,7 @@ def _check(given: Sequence[Any], made: Sequence[Any], fields: Sequence[Any], nul
         finite = np.isfinite(values) if nulls is None else np.isfinite(values) | nulls
         if not finite.all():
             row = int(np.argmin(finite))
-            for numbers, each in zip(given, fields, strict=True):
+            for numbers, each in zip(inputs, fields, strict=True):
                 if not np.isfinite(numbers[row]):
                     found = f"{each.name}[{row}]: {numbers[row]} is not finite"
                     raise ValueInvalid(f"{found}; make it null, or leave the row out")

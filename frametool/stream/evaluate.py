@@ -157,10 +157,10 @@ class Run:
         numbers, bad = parse_floats(self.block.numbers)
         if not (len(bad) or words):
             return numbers
-        odd = [each for place in bad.tolist() if (each := divmod(place, numbers.shape[1]))[1] not in words]
-        odd += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
+        invalid = [each for place in bad.tolist() if (each := divmod(place, numbers.shape[1]))[1] not in words]
+        invalid += [(row, column) for column in words for row in range(self.count)]  # also those that look like numbers
         known: dict[tuple[int, str], float] = {}
-        for row, column in odd:
+        for row, column in invalid:
             text = self.block.numbers.text(row, column).decode("utf-8", "replace").strip(" \t")
             try:
                 if column not in words:
@@ -196,8 +196,8 @@ class Run:
         from frametool.stream.earth_columns import doubt_band, zone_notes
 
         line_of = self.block.line_of
-        if (given := self.plan.shapes[0].place) is not None:
-            self.rounded += doubt_band(given, self.columns, line_of)
+        if (own := self.plan.shapes[0].place) is not None:
+            self.rounded += doubt_band(own, self.columns, line_of)
         if (place := self.plan.targets[0].place) is not None and len(self.rows):
             self.rounded += zone_notes(place, [*self.results.T], lambda row: line_of(int(self.rows[row])))
 
@@ -344,15 +344,15 @@ class Run:
         """Return the checked quaternions of a shape whose numbers begin at the column `first`."""
         if shape.notation is None:
             return IDENTITY
-        given = list(shape.rotation(numbers))
+        values = list(shape.rotation(numbers))
         names = self.plan.names[first : first + shape.size]
         if shape.joined:
             self._check_tail(numbers, names, shape.joined.tail)
-        found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.request.normalize)
+        found = read_rotations(shape.notation, values, degrees=shape.degrees, normalize=self.request.normalize)
         rule = shape.notation.representation.batch
         if rule and rule.explained and self.block.values is None and (found.mended.size or found.reasons):
-            self._take_as_meant(rule, given, [first + at for at in shape.rotation_at], {*found.mended, *found.reasons})
-            found = read_rotations(shape.notation, given, degrees=shape.degrees, normalize=self.request.normalize)
+            self._take_as_meant(rule, values, [first + at for at in shape.rotation_at], {*found.mended, *found.reasons})
+            found = read_rotations(shape.notation, values, degrees=shape.degrees, normalize=self.request.normalize)
         for row, reason in found.reasons.items():
             self._blame(row, names[shape.rotation_at[0]], reason)
         if found.mended.size and not self.rounded:
@@ -363,13 +363,13 @@ class Run:
             self.rounded += [RowNote(place[0], rule, sentence, place[1]) for rule, sentence in warned]
         self.mended += found.mended.tolist()
         self.off = max(self.off, found.off)
-        self._doubt(shape, given, first)
+        self._doubt(shape, values, first)
         return found.quaternions
 
-    def _take_as_meant(self, rule: BatchRule, given: list[Floats], places: Sequence[int], rough: set[int]) -> None:
+    def _take_as_meant(self, rule: BatchRule, values: list[Floats], places: Sequence[int], rough: set[int]) -> None:
         """Replace the rotations of rows that are off by no more than the digits they are written with."""
         rows, cells = np.array(sorted(rough), np.int64), self.block.numbers
-        own = [column[rows] for column in given]
+        own = [column[rows] for column in values]
         halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
         meant = rule.explained is not None and rule.explained(own, halves, arrays)
         off = rule.deviation(*own, arrays)
@@ -379,20 +379,20 @@ class Run:
             line, column = self._place(int(rows[at]), places[0])
             self.rounded.append(RowNote(line, "rounded", FEW_DIGITS.format(off[at]), column))
         for at, numbers in enumerate(rule.repair(*own, arrays)):
-            given[at] = given[at].copy()
-            given[at][rows] = np.where(meant, numbers, own[at])
+            values[at] = values[at].copy()
+            values[at][rows] = np.where(meant, numbers, own[at])
 
-    def _doubt(self, shape: Shape, given: Sequence[Floats], first: int) -> None:
+    def _doubt(self, shape: Shape, values: Sequence[Floats], first: int) -> None:
         """Wonder about the first row with a bare angle beyond a full turn."""
         angles = shape.bare_angles
         if not angles:
             return
-        beyond = np.flatnonzero(np.max([abs(given[at]) for at in angles], axis=0) > TURN)
+        beyond = np.flatnonzero(np.max([abs(values[at]) for at in angles], axis=0) > TURN)
         if beyond.size:
             row = int(beyond[0])
-            at = max(angles, key=lambda at: abs(given[at][row]))
+            at = max(angles, key=lambda at: abs(values[at][row]))
             remedy = self.plan.remedies[self.plan.shapes.index(shape)] if self.plan.remedies else COLUMNS_REMEDY
-            self.doubted.append((row, first + shape.number_at(at), doubt(shape, given[at][row], remedy)))
+            self.doubted.append((row, first + shape.number_at(at), doubt(shape, values[at][row], remedy)))
 
     def note_of_degrees(self, row: int, number: int, sentence: str) -> RowNote:
         """Return what is worth telling about an angle, with its place."""
@@ -470,12 +470,12 @@ class Run:
 
     def groups(self, end: int | None) -> list[tuple[Ints, list[Spans]]]:
         """Return what is written before place `end`: results, rows without one, and what passes."""
-        odd = list(self.block.odd)
+        unchanged = list(self.block.unchanged)
         if end is not None:
             self._keep(self.block.places[self.rows] < end)
-            odd = [(place, text) for place, text in odd if place < end]
+            unchanged = [(place, text) for place, text in unchanged if place < end]
         groups = [*self._written(), *self._null_rows()]
-        return [*groups, texts_as_rows(odd)] if odd else groups
+        return [*groups, texts_as_rows(unchanged)] if unchanged else groups
 
     def _written(self) -> list[tuple[Ints, list[Spans]]]:
         plan, rows = self.plan, self.rows

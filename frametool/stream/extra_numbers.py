@@ -198,8 +198,8 @@ def covariance_columns(
 def _refuse_extra(table: Table, axes: str, others: str, source: str) -> None:
     """Raise FormatError for the columns of a covariance that would stay along axes which a result does not have."""
     if any(find_columns(table.names or (), size)[0] for size in (9, 36)):
-        given, remedy = (f"along {axes}", "") if axes else ("along the axes there", f", or say --local-axes {others}")
-        message = f"the covariance is {given}, the result along {others}; leave its columns out{remedy}"
+        wording, remedy = (f"along {axes}", "") if axes else ("along the axes there", f", or say --local-axes {others}")
+        message = f"the covariance is {wording}, the result along {others}; leave its columns out{remedy}"
         raise FormatError(message, source=source, line=1)
 
 
@@ -253,11 +253,11 @@ def with_own(
 ) -> tuple[Components, Components]:
     """Return a row's pose with its own covariance or scale, and what else comes with it."""
     size = shape.covariance[0]
-    given, rest = extra[:size], extra[size:]
+    entries, rest = extra[:size], extra[size:]
     if mirrors and size > 1:
         raise ValueInvalid(MIRRORED)
     if shape.sigma:
-        given = expanded(shape, given)
+        entries = expanded(shape, entries)
     elif size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
         if mover is not None and len(mover) > EXACT:
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
@@ -266,9 +266,9 @@ def with_own(
         turned = [part if mover is None else uncertainty.rotate_covariance(part, *mover[3:]) for part in parts]
         return pose, (*chain.from_iterable(turned), *extra[count:])
     if shape.inverse:
-        back = inverse((*rigid.inverse(*pose), *given))
+        back = inverse((*rigid.inverse(*pose), *entries))
         return (back if size == 1 else (*pose, *back[EXACT:])), rest
-    return (*pose, *given), rest
+    return (*pose, *entries), rest
 
 
 def of_multiple(
@@ -288,13 +288,13 @@ def of_multiple(
 def along_ecef(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:
     """Return what comes with a place with its covariance along the axes of ECEF, from the axes there."""
     size, place = shape.covariance[0], shape.place
-    given = extra[:size]
+    entries = extra[:size]
     if shape.sigma:
-        given = expanded(shape, given)
-        given = given if shape.kind == POSE else tuple(given[6 * i + j] for i in range(3) for j in range(3))
+        entries = expanded(shape, entries)
+        entries = entries if shape.kind == POSE else tuple(entries[6 * i + j] for i in range(3) for j in range(3))
     turn = place._replace(level=False).turned(own[: place.size], IDENTITY) if place is not None else IDENTITY
-    made = shape._replace(covariance=(len(given), *shape.covariance[1:]), sigma=())
-    return made, (*uncertainty.rotate_covariance(given, *turn), *extra[size:])
+    made = shape._replace(covariance=(len(entries), *shape.covariance[1:]), sigma=())
+    return made, (*uncertainty.rotate_covariance(entries, *turn), *extra[size:])
 
 
 def expanded(shape: Shape, numbers: Components) -> Components:
@@ -309,8 +309,8 @@ def move(shape: Shape, own: Components, extra: Components, mover: Components, *,
     if mirrors and shape.covariance:
         raise ValueInvalid(MIRRORED)
     if shape.sigma:
-        given = expanded(shape, extra)
-        extra = (*(given[6 * i + j] for i in range(3) for j in range(3)), *extra[shape.covariance[0] :])
+        entries = expanded(shape, extra)
+        extra = (*(entries[6 * i + j] for i in range(3) for j in range(3)), *extra[shape.covariance[0] :])
         shape = shape._replace(covariance=(uncertainty.POINT,), sigma=())
     if len(mover) == SCALED:
         if kind not in SCALED_ALONE or shape.covariance:

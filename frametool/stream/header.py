@@ -200,27 +200,27 @@ def _position(columns: Columns) -> Columns:
     return columns._replace(unit=x if x == y == z else (x, y, z))
 
 
-def find_rotations(names: Sequence[str] | Header, given: Notation | None) -> list[Columns]:
-    """Return every set of columns that can be a rotation, of the given notation if there is one."""
+def find_rotations(names: Sequence[str] | Header, expected: Notation | None) -> list[Columns]:
+    """Return every set of columns that can be a rotation, of the expected notation if there is one."""
     header = names if isinstance(names, Header) else Header(names)
-    rows = SEARCHED if given is None else _searched(given)
+    rows = SEARCHED if expected is None else _searched(expected)
     found: dict[frozenset[int], Columns] = {}  # qvec_w .. are found by either of two names
     for row in rows:
-        maps = _named_maps(header, bare=given is not None) if row.shape == NAMED else ()
-        for each in (*_of_representation(row, header, given), *(_rotation(match, row, given) for match in maps)):
+        maps = _named_maps(header, bare=expected is not None) if row.shape == NAMED else ()
+        for each in (*_of_representation(row, header, expected), *(_rotation(match, row, expected) for match in maps)):
             found[frozenset(each.places)] = each
     best: dict[int, int] = {}  # where several share a column, an axis with an angle and an angle_deg, the nearest
     for each in found.values():
         for place in each.places:
             best[place] = min(best.get(place, each.spread), each.spread)
     nearest = [each for each in found.values() if each.spread <= min(map(best.__getitem__, each.places))]
-    return nearest or [each for row in rows for each in _standing_alone(row, header, given)]
+    return nearest or [each for row in rows for each in _standing_alone(row, header, expected)]
 
 
-def _searched(given: Notation) -> list[Representation]:
+def _searched(expected: Notation) -> list[Representation]:
     """Return the representations whose columns are looked for, of those that share their columns the first."""
-    same = [row for row in ROTATIONS.values() if row.searched and {*row.columns} == {*given.representation.columns}]
-    return same[:1] if given.representation.searched else [given.representation]
+    same = [row for row in ROTATIONS.values() if row.searched and {*row.columns} == {*expected.representation.columns}]
+    return same[:1] if expected.representation.searched else [expected.representation]
 
 
 SEARCHED = [*{frozenset(row.columns): row for row in reversed(ROTATIONS.values()) if row.searched}.values()][::-1]
@@ -234,15 +234,15 @@ def _named_maps(header: Header, *, bare: bool = False) -> Iterator[Columns]:
                 yield match
 
 
-def _of_representation(row: Representation, header: Header, given: Notation | None) -> Iterator[Columns]:
+def _of_representation(row: Representation, header: Header, expected: Notation | None) -> Iterator[Columns]:
     """Find a representation's columns: those of a rotation, or of a whole pose."""
     for match in header.match(row.columns, row.angles):
-        yield _rotation(match, row, given)
+        yield _rotation(match, row, expected)
     for match in header.match(row.whole.columns) if row.whole else ():
-        yield _rotation(match, row, given)._replace(whole=True, unit=1.0)
+        yield _rotation(match, row, expected)._replace(whole=True, unit=1.0)
 
 
-def _standing_alone(row: Representation, header: Header, given: Notation | None) -> Iterator[Columns]:
+def _standing_alone(row: Representation, header: Header, expected: Notation | None) -> Iterator[Columns]:
     """Find the column that says a rotation by itself, where none of the others is there: `yaw`, `theta`."""
     alone = [match for word in row.alone for match in header.match((word,), (0,))]
     if alone:
@@ -251,10 +251,10 @@ def _standing_alone(row: Representation, header: Header, given: Notation | None)
         for match in alone:
             if (match.prefix, match.suffix) not in others and header.is_plain(match):
                 spots = (*[None] * (len(row.columns) - 1), *match.spots)
-                yield _rotation(match._replace(spots=spots), row, given)
+                yield _rotation(match._replace(spots=spots), row, expected)
 
 
-def _rotation(columns: Columns, row: Representation, given: Notation | None) -> Columns:
+def _rotation(columns: Columns, row: Representation, expected: Notation | None) -> Columns:
     """Read the units of a rotation's columns: those of angles, each as its name says."""
     said: list[bool | None] = []
     for at, spot in enumerate(columns.spots):
@@ -267,20 +267,20 @@ def _rotation(columns: Columns, row: Representation, given: Notation | None) -> 
         said.append(ANGLES.get(unit) if angle else None)
     units = {said[at] for at in row.angles if columns.spots[at]}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
-    axes = f":{given.axes}" if given is not None and given.axes else ""
-    notation = given if given is not None and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
+    axes = f":{expected.axes}" if expected is not None and expected.axes else ""
+    notation = expected if expected and row.angles and not suffix else parse_notation(f"{row.name}{suffix}{axes}")
     absent = tuple(at for at, spot in enumerate(columns.spots) if spot is None)
     return columns._replace(notation=notation, degrees=tuple(said), absent=absent)
 
 
-def find_poses(names: Sequence[str], given: Notation | None, count: int, source: str) -> list[PoseColumns]:
+def find_poses(names: Sequence[str], expected: Notation | None, count: int, source: str) -> list[PoseColumns]:
     """Find so many points or poses; raises FormatError that lists the candidates, or the columns there are."""
     header = Header(names)
-    positions, rotations = find_positions(header), find_rotations(header, given)
+    positions, rotations = find_positions(header), find_rotations(header, expected)
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
     if len(positions) <= 1 and len(rotations) <= 1 and count == 1:
-        return [_only_pose(header, positions, rotations, given, source)]
+        return [_only_pose(header, positions, rotations, expected, source)]
     poses = _paired(positions, rotations) if max(len(positions), len(rotations)) <= count else []
     if len(poses) == count:
         return poses
@@ -325,14 +325,14 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _only_pose(
-    header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], given: Notation | None, source: str
+    header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], expected: Notation | None, source: str
 ) -> PoseColumns:
     """Put the one position and the one rotation together; raise FormatError where a rotation is there by half."""
     rotation = rotations[0] if rotations else None
     taken = set(rotation.places) if rotation else set()
     whole = rotation is not None and rotation.whole
     position = positions[0] if positions and not whole and taken.isdisjoint(positions[0].places) else None
-    if rotation is None and (half := _half_rotation(header, given)):
+    if rotation is None and (half := _half_rotation(header, expected)):
         raise _refusal(half, source)
     if position is None and rotation and not whole:
         position = _half_position(header, rotation)
@@ -343,26 +343,26 @@ def _only_pose(
     return PoseColumns(position, rotation)
 
 
-def _half_rotation(header: Header, given: Notation | None) -> str:
+def _half_rotation(header: Header, expected: Notation | None) -> str:
     """Return what is missing of a rotation that is there by half, or goes by other names; "" if absent."""
-    for row in ROTATIONS.values() if given is None else ():
+    for row in ROTATIONS.values() if expected is None else ():
         if not row.searched and (match := next(header.match(row.columns), None)):
             return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
-    if given is None and (match := next(_named_maps(header, bare=True), None)):
+    if expected is None and (match := next(_named_maps(header, bare=True), None)):
         may_be = f"{match.shown} may be a quaternion or a point and a number"
         return f"{may_be}; add --from xyzw, or --columns with the three"
-    for match in header.match(XYZ) if given is None else ():
+    for match in header.match(XYZ) if expected is None else ():
         if match.prefix.lower().endswith("rot_"):
             axes = "name them roll, pitch, yaw or rotvec_x, rotvec_y, rotvec_z"
             return f"columns {match.shown} do not say what they are; {axes}"
-    for row in SEARCHED if given is None else _searched(given):
+    for row in SEARCHED if expected is None else _searched(expected):
         for match in header.match(row.columns, partly=True):
             if len(match.places) > 1 or (row.alone and header.is_plain(match)):
                 absent = [word for word, spot in zip(row.columns, match.spots, strict=True) if spot is None]
                 missing = ", ".join(f"{match.prefix}{word}{match.suffix}" for word in absent)
                 half = f"half a rotation: {match.shown} without {missing}"
                 return f"{half}; add what is missing, or choose with --columns"
-    return _other_names(header) if given is None else ""
+    return _other_names(header) if expected is None else ""
 
 
 def _other_names(header: Header) -> str:
@@ -471,7 +471,7 @@ def row_shape(pose: PoseColumns, request: Request) -> Shape:
 
 
 def named_pose(
-    spec: str, names: Sequence[str] | None, width: int, given: Notation | None, kind: str = ""
+    spec: str, names: Sequence[str] | None, width: int, expected: Notation | None, kind: str = ""
 ) -> PoseColumns:
     """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
 
@@ -488,7 +488,7 @@ def named_pose(
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
     if kind in SIX:
         return PoseColumns(_six(places, header.names, kind), None)
-    count, rotation = _chosen_rotation(header, places, given)
+    count, rotation = _chosen_rotation(header, places, expected)
     if count == len(places):
         return PoseColumns(None, rotation)
     match = _chosen(header, places[: len(places) - count])
@@ -497,10 +497,10 @@ def named_pose(
     return PoseColumns(_position(match._replace(spots=(*match.spots, None), absent=(2,))), rotation)
 
 
-def wholes_of(given: Notation | None) -> list[Notation]:
+def wholes_of(expected: Notation | None) -> list[Notation]:
     """Return the notations whose numbers may be those of a whole pose: without names twelve need a word for it."""
-    if given is not None:
-        return [given, *([UPPER_ROWS] if given.representation.whole else [])]
+    if expected is not None:
+        return [expected, *([UPPER_ROWS] if expected.representation.whole else [])]
     return [parse_notation(row.name) for row in ROTATIONS.values() if row.whole]
 
 
@@ -516,31 +516,31 @@ def _unit_at_end(name: str) -> str:
     return (said[1] or said[2]) if said else ""
 
 
-def _chosen_rotation(header: Header, places: Sequence[int], given: Notation | None) -> tuple[int, Columns | None]:
+def _chosen_rotation(header: Header, places: Sequence[int], expected: Notation | None) -> tuple[int, Columns | None]:
     """Return how many of the chosen columns, from the last, are a rotation, and which: by name, as set, by count."""
     for count in (len(places), len(places) - 3, len(places) - 2):
-        found = _by_names(header, places[-count:], given) if count > 0 else None
+        found = _by_names(header, places[-count:], expected) if count > 0 else None
         if found is not None and (count != len(places) - 2 or found.absent):
             return count, found
-    if given is None and len(places) == len(XYZ):
+    if expected is None and len(places) == len(XYZ):
         return 0, None
-    for notation in wholes_of(given):
+    for notation in wholes_of(expected):
         if notation.representation.whole and len(places) == len(notation.representation.whole.columns):
-            found = _rotation(_chosen(header, places), notation.representation, given)
+            found = _rotation(_chosen(header, places), notation.representation, expected)
             return len(places), found._replace(whole=True, unit=1.0, notation=notation)
-    if given is None:
+    if expected is None:
         raise Misused(f"--columns: {len(places)} columns do not say what they are; add --from REP")
-    if len(places) not in given.counts:
-        raise Misused(f"--columns: {given.counted}; found {len(places)}")
-    size = len(given.representation.columns)
-    return size, _rotation(_chosen(header, places[-size:]), given.representation, given)
+    if len(places) not in expected.counts:
+        raise Misused(f"--columns: {expected.counted}; found {len(places)}")
+    size = len(expected.representation.columns)
+    return size, _rotation(_chosen(header, places[-size:]), expected.representation, expected)
 
 
-def _by_names(header: Header, places: Sequence[int], given: Notation | None) -> Columns | None:
+def _by_names(header: Header, places: Sequence[int], expected: Notation | None) -> Columns | None:
     """Return the rotation whose columns these are, in their order."""
     chosen = Header([header.names[place] for place in places])
-    for row in dict.fromkeys([*([given.representation] if given is not None else ()), *ROTATIONS.values()]):
-        own = given if given is not None and given.representation is row else None
+    for row in dict.fromkeys([*([expected.representation] if expected is not None else ()), *ROTATIONS.values()]):
+        own = expected if expected is not None and expected.representation is row else None
         if not (row.searched or own):
             continue
         for each in (*_of_representation(row, chosen, own), *_standing_alone(row, chosen, own)):

@@ -212,7 +212,7 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
         for below, column, reason, *_ in outcome.faults:
             raise FormatError(f"{column}{': ' * bool(column)}{reason}", source=file.name, line=line + below)
         results = results_of(block, columns() if rows.shape.covariance else (), placed=has_place)
-        for at, result, given in zip(block.lines.tolist(), results, rows.given.T.tolist(), strict=True):
+        for at, result, inputs in zip(block.lines.tolist(), results, rows.inputs.T.tolist(), strict=True):
             pose, cells = result.pose, result.extras
             try:
                 child = _one_child(pose.name, cells.get("name"))
@@ -221,7 +221,7 @@ def _of_table(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
                 raise FormatError(str(error), source=file.name, line=line + at) from None
             pose = pose._replace(covariance=cells.get("covariance"))
             made = _made(inverted(pose) if inverse else pose, bare(pose.parent or ""), bare(child), cells.get("id"))
-            written = None if inverse else _written(rows.shape, given)
+            written = None if inverse else _written(rows.shape, inputs)
             yield MeasuredRow(made._replace(written=written), line + at, cells.get("stamp_ns"))
     file.tally.rough += [1] * rows.mended
     file.tell()

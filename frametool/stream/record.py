@@ -261,8 +261,8 @@ def _refuse_half(value: dict[str, Any], found: Sequence[RecordPlace], path: Path
         used |= USED
     rest = [key for key, each in value.items() if key not in used and _is_geometry(key, each, doubtful=is_message)]
     if found and rest:
-        given = f"{first_of(rest, 2, quote=shown)} may be given in a frame that changes, and would stay"
-        raise Misfit(f"{given}; leave out what does not move, see help records", (*path, rest[0]), key=True)
+        message = f"{first_of(rest, 2, quote=shown)} may be given in a frame that changes, and would stay"
+        raise Misfit(f"{message}; leave out what does not move, see help records", (*path, rest[0]), key=True)
 
 
 def _is_geometry(key: str, value: Any, *, doubtful: bool) -> bool:
@@ -709,16 +709,16 @@ def _number(
 def _check(shape: Shape, values: Sequence[float], names: Sequence[str], reading: Reading) -> None:
     """Refuse numbers that are no rotation; note what is invalid about them."""
     try:
-        _, odd = checked_rotation(shape, values, normalize=reading.normalize)
+        _, doubts = checked_rotation(shape, values, normalize=reading.normalize)
     except ValueInvalid as error:
         raise NotARotation(str(error), (names[0],)) from None
-    for rule, message in odd:
+    for rule, message in doubts:
         reading.note(message, names[0], rule=rule)
-    given = shape.rotation(values)
-    largest = max(shape.bare_angles, key=lambda at: abs(given[at]), default=None)
-    if largest is not None and abs(given[largest]) > TURN:
+    angles = shape.rotation(values)
+    largest = max(shape.bare_angles, key=lambda at: abs(angles[at]), default=None)
+    if largest is not None and abs(angles[largest]) > TURN:
         name = names[shape.number_at(largest) - shape.position_size]
-        reading.note(doubt(shape, given[largest], KEYS_REMEDY), name, rule="degrees")
+        reading.note(doubt(shape, angles[largest], KEYS_REMEDY), name, rule="degrees")
 
 
 def _turns_in_doubt(value: dict[str, Any]) -> bool:

@@ -144,7 +144,7 @@ class RecordRows:
     def _of_cut(
         self, cut: Cut, data: Bytes, text: bytes, reported: Mapping[str, int]
     ) -> tuple[list[RecordBatch], Sequence[int], int]:
-        """Return the rows of one template; those that are odd, and the first that tells something, stay alone."""
+        """Return the rows of one template; those that are unclear, and the first that tells something, stay alone."""
         template = cut.template
         is_new = template not in self._plans
         if is_new:

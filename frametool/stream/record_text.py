@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from frametool.stream.splice import Edit
     from frametool.stream.splitter import Part
 
-_ODD_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
+_OTHER_START = re.compile(r"^(?=[A-Z\t\[\d$^])", re.MULTILINE)  # no key that ROS prints begins so
 
 MOST_LEAVES = 2000  # scalars of a record: an expression that cuts those written alike takes longer for more
 
@@ -231,7 +231,7 @@ def attempt(
     source = Source(name, "", line + 1, column_in(text, part.start))
     try:
         decoded = decode(text[part.start : part.end], name)
-        if fmt == "yaml" and _ODD_START.search(decoded):
+        if fmt == "yaml" and _OTHER_START.search(decoded):
             decoded = without_noise(decoded)
         source = source._replace(text=decoded)
         found = RecordText(source, request, json=fmt == "json", note=note and partial(note, source))

@@ -171,10 +171,10 @@ class Shape(NamedTuple):
         if self.joined:
             rotation: Components = self.joined.split(numbers)[1]
             return rotation
-        given = list(self._with_absent(numbers)[count_of(self.unit) : self._full])
+        values = list(self._with_absent(numbers)[count_of(self.unit) : self._full])
         for index in self.radians_at:
-            given[index] = given[index] * TO_DEGREES
-        return tuple(given)
+            values[index] = values[index] * TO_DEGREES
+        return tuple(values)
 
     @property
     def bare_angles(self) -> tuple[int, ...]:
@@ -342,8 +342,8 @@ def checked_rotation(
 
 def wrong_tail(wanted: Sequence[float], found: Sequence[float]) -> str:
     """Return the message that the last row of a 4x4 matrix is not what it always is."""
-    expected, given = (" ".join(f"{value:g}" for value in row) for row in (wanted, found))
-    return f"the last row of a 4x4 pose is {expected}, found {given}"
+    expected, actual = (" ".join(f"{value:g}" for value in row) for row in (wanted, found))
+    return f"the last row of a 4x4 pose is {expected}, found {actual}"
 
 
 def doubt(shape: Shape, angle: float, remedy: str) -> str:

@@ -39,7 +39,7 @@ class Block(NamedTuple):
     parts: spans (n,) that pieces refer to
     places: (n,) where each row is among all that the block holds
     line_of: the line of a row, from 0
-    odd: place and text of what passes as it is
+    unchanged: place and text of what passes as it is
     broken: rows that have no numbers
     frames: the name of the frame each row is expressed in, if rows say so
     stamps: for each shape the spans (n,) of its stamp: one, or seconds and nanoseconds; none where it has none
@@ -55,7 +55,7 @@ class Block(NamedTuple):
     parts: Sequence[Spans]
     places: Ints
     line_of: Callable[[int], int]
-    odd: Sequence[tuple[int, bytes]] = ()
+    unchanged: Sequence[tuple[int, bytes]] = ()
     broken: Sequence[Broken] = ()
     frames: Sequence[str | None] = ()
     stamps: Sequence[tuple[Spans, ...]] = ()
@@ -91,17 +91,17 @@ def numbers_or_null(
 def _with_points(spans: Spans, values: Floats, separators: bytes) -> Spans:
     """Write 1e-05 as 1.0e-05."""
     size = abs(values)
-    odd = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))
-    if not odd.size:
+    far = np.flatnonzero(((size < 1e-4) & (size > 0.0)) | (size >= 1e16))
+    if not far.size:
         return spans
     texts = [
-        repr(value) if "." in repr(value) else repr(value).replace("e", ".0e") for value in values.ravel()[odd].tolist()
+        repr(value) if "." in repr(value) else repr(value).replace("e", ".0e") for value in values.ravel()[far].tolist()
     ]
-    after = [chr(separators[place % len(separators)]) for place in odd.tolist()]
+    after = [chr(separators[place % len(separators)]) for place in far.tolist()]
     _, (added,) = texts_as_rows([(0, f"{text}{end}".encode()) for text, end in zip(texts, after, strict=True)])
     starts, ends = spans.starts.copy(), spans.ends.copy()
-    starts.reshape(-1)[odd] = added.starts + len(spans.data)
-    ends.reshape(-1)[odd] = added.ends + len(spans.data)
+    starts.reshape(-1)[far] = added.starts + len(spans.data)
+    ends.reshape(-1)[far] = added.ends + len(spans.data)
     return Spans(np.concatenate([spans.data, added.data]), starts, ends)
 
 
@@ -156,10 +156,10 @@ def chosen(spans: Spans, rows: Ints) -> Spans:
     return Spans(spans.data, spans.starts[rows], spans.ends[rows])
 
 
-def texts_as_rows(odd: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
+def texts_as_rows(unchanged: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
     """Return texts as rows in the order of their places."""
-    odd = sorted(odd, key=itemgetter(0))
-    return np.array([place for place, _ in odd], np.int64), [spans_of([text for _, text in odd])]
+    unchanged = sorted(unchanged, key=itemgetter(0))
+    return np.array([place for place, _ in unchanged], np.int64), [spans_of([text for _, text in unchanged])]
 
 
 def spans_of(texts: list[bytes]) -> Spans:

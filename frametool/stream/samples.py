@@ -241,11 +241,11 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> Point
         raise FormatError("no positions in it: rotations alone are no points", source=file.name)
     for poses, _ in blocks:
         size = len(poses.numbers)
-        given = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in extra}
+        named = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in extra}
         if poses.names[0] is not None:
-            given[IDS[1]] = [*poses.for_each(poses.names)]
+            named[IDS[1]] = [*poses.for_each(poses.names)]
         for key, cells in extra.items():
-            cells.extend(given.get(key, [None] * size))
+            cells.extend(named.get(key, [None] * size))
     on_lines = "arrays" not in FORMATS[fmt].reads
     lines = np.concatenate([each for _, each in blocks]).tolist()
     places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in enumerate(lines, 1)]
@@ -297,11 +297,11 @@ def _points(
     ids = None if key is None else [str(each) for each in extra[key]]
     if key is not None and ids is not None:
         first: dict[str, str] = {}
-        for given, place in zip(extra[key], places, strict=True):
-            if given is None:
+        for label, place in zip(extra[key], places, strict=True):
+            if label is None:
                 raise ValueInvalid(f"{place}: no {key}, the others have one")
-            if (before := first.setdefault(given, place)) is not place:
-                raise ValueInvalid(f"{place}: {key} {shown(str(given))} appears twice, first at {before}")
+            if (before := first.setdefault(label, place)) is not place:
+                raise ValueInvalid(f"{place}: {key} {shown(str(label))} appears twice, first at {before}")
     weights = None
     if any(each is not None for each in extra[WEIGHT]):
         weights = [_weight(each, place) for each, place in zip(extra[WEIGHT], places, strict=True)]

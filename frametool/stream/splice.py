@@ -322,11 +322,11 @@ class Splicer:
 
     def _has_swapped(self, name: str | None, parent: str | None) -> bool:
         """Call the one frame there is by the other key, where that is all that changes."""
-        before, given = self.record.name, self.record.parent
-        if (name, parent) != (given.text, before.text) or (name is None) == (parent is None):
+        before, own = self.record.name, self.record.parent
+        if (name, parent) != (own.text, before.text) or (name is None) == (parent is None):
             return False
-        old, key = (before, "parent") if given.text is None else (given, "name")
-        only = not (before.paths and given.paths)
+        old, key = (before, "parent") if own.text is None else (own, "name")
+        only = not (before.paths and own.paths)
         if not only or len(old.paths) != 1 or old.paths[0][-1] not in ("name", "parent"):
             return False
         node = self.node.value[old.paths[0][-1]][0]

@@ -296,11 +296,11 @@ class Table(NamedTuple):
 
 
 def open_table(
-    block: bytes, fmt: str, *, header: bool, source: str, given: object = None
+    block: bytes, fmt: str, *, header: bool, source: str, expected: object = None
 ) -> tuple[Table, bytes]:
     """Look at the first block; return the table and the block without what is before the first row.
 
-    given: what --from says of numbers without names
+    expected: what --from says of numbers without names
     """
     row = FORMATS[fmt]
     delimiter = (row.delimiter or "").encode()
@@ -319,7 +319,7 @@ def open_table(
         head, titles, title, end = named
         return Table(delimiter, _names(titles, source), len(titles), mark + head, titles, title, end), rest
     if not own:
-        if header and not given and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
+        if header and not expected and delimiter and not row.columns and len(cells) != len(FORMATS["tum"].columns):
             raise FormatError("the first line holds numbers and no names; give --no-header", source=source, line=1)
         return Table(delimiter, None, len(cells), mark + comments), rest
     title = line.rstrip(b"\r\n")
@@ -415,19 +415,19 @@ def table_block(table: Table, layout: Layout, text: bytes, naming: Naming) -> Bl
     ]
     times = [place for place in (layout.time, layout.below) if place is not None]
     stamps = [tuple(without_quotes(cells.column(place)) for place in times)] if times else []
-    odd, broken = [], []
+    unchanged, broken = [], []
     lines_before = _line_counter(cells)
     if len(cells.rows) < len(cells.counts):
         named = f" ({' '.join(table.names)})" if table.names and len(table.names) < 12 else ""
         for line in cells.odd_lines().tolist():
             raw = cells.line(line)
             if cells.counts[line] == 0 or (cells.counts[line] == 1 and not raw.strip()):
-                odd.append((line, raw))
+                unchanged.append((line, raw))
             else:
                 reason = f"expected {table.width} cells{named}, found {int(cells.counts[line])}"
                 broken.append(Broken(line, lines_before(line), "", reason))
     return Block(
-        numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), odd, broken, names.frames,
+        numbers, parts, cells.rows, lambda row: lines_before(int(cells.rows[row])), unchanged, broken, names.frames,
         stamps, names.bad, names.lost,
     )  # fmt: skip
 

@@ -214,14 +214,14 @@ def _shapes(poses: Sequence[PoseColumns], request: Request, asked: int) -> tuple
     return ((shapes[0] if shapes else Shape("", None))._replace(extra=asked),)
 
 
-def _by_width(width: int, given: Notation | None) -> str:
+def _by_width(width: int, expected: Notation | None) -> str:
     """Take all columns of a table without names: a point, a whole pose, or what --from says, behind a stamp or not."""
-    if given is None:
+    if expected is None:
         wholes = [notation.representation.whole for notation in wholes_of(None)]
         return f"1-{width}" if width in (len(XYZ), *(len(whole.columns) for whole in wholes if whole)) else ""
-    if width in given.counts:
+    if width in expected.counts:
         return f"1-{width}"
-    return f"2-{width}" if width - 1 in given.counts[1:] else ""
+    return f"2-{width}" if width - 1 in expected.counts[1:] else ""
 
 
 def _without_position(pose: PoseColumns, request: Request, table: Table, source: str) -> PoseColumns:
@@ -342,7 +342,7 @@ def _columns(
         at[min(pose.rotation.places)] += [*rotation, *extras]
     else:
         at[min(at)] += [*position, *rotation, *extras]
-    return [column for place, given in enumerate(columns) for column in at.get(place, [given])]
+    return [column for place, old in enumerate(columns) for column in at.get(place, [old])]
 
 
 def _extra(table: Table, columns: Sequence[Column], extras: Sequence[Column], shown: Shown) -> list[Column]:

@@ -85,7 +85,7 @@ def begin_table(stream: ByteStream, fmt: str, request: Request, *, source: str, 
     first = _first_rows(blocks)
     if first is None:
         raise FormatError("nothing in it", source=source)
-    table, rest = open_table(first, fmt, header=header, source=source, given=request.given or request.given_place)
+    table, rest = open_table(first, fmt, header=header, source=source, expected=request.given or request.given_place)
     table = as_trajectory(table, fmt, request, source)
     taken = len(first) - len(rest)
     return Begun(table, rest, blocks, taken, first.count(b"\n", 0, taken))
@@ -198,7 +198,7 @@ class TableRows(PlannedRows):
 class TablePoses(TableRows):
     """Turn one block of a table after the other into poses.
 
-    given: the numbers of the last block's good rows as read, a row a column
+    inputs: the numbers of the last block's good rows as read, a row a column
     """
 
     def __init__(self, table: Table, request: Request, source: str) -> None:
@@ -243,7 +243,7 @@ class TablePoses(TableRows):
             rows = np.array(sorted({*run.rows.tolist(), *run.reasons}), np.int64)
             results = np.full((len(rows), run.results.shape[1]), np.nan)
             results[np.searchsorted(rows, run.rows)] = run.results
-        self.given = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
+        self.inputs = np.reshape(run.columns, (len(run.columns), run.count))[:, rows]
         parts = block.parts if len(rows) == run.count else [chosen(part, rows) for part in block.parts]
         texts: dict[str, Any] = {self.table.name(place): part for place, part in zip(self.kept, parts, strict=False)}
         own = own_count(self.plan, results.shape[1])
