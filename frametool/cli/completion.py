@@ -16,8 +16,8 @@ from frametool.cli.sink import writing
 SCRIPTS = os.path.join(os.path.dirname(__file__), "completions")  # of each shell; the wheel installs them too
 
 
-def answer(command: click.Command, variable: str, wanted: str, line: str) -> None:
-    """Print what a shell asks for.
+def answer(command: click.Command, variable: str, wanted: str, line: str) -> int:
+    """Print what a shell asks for; return 0.
 
     variable: by which it asks
     wanted: `words`, those that may end the line, each between its type and its meaning; or `bash_source` and the like
@@ -33,6 +33,7 @@ def answer(command: click.Command, variable: str, wanted: str, line: str) -> Non
         raise click.UsageError(f"{variable} is {wanted!r}; it prints the completions of a shell as {known}")
     with writing(None) as write:
         write(text)
+    return 0
 
 
 def _offers(command: click.Command, variable: str, line: str) -> list[tuple[str, str, str]]:

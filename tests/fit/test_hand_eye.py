@@ -249,7 +249,7 @@ def test_small_turns_are_warned_of() -> None:
     found = solved(rig(None, seed=0, turn=np.array([0.4, 0.04, 0.04])))
     assert found.turns[0] > 0.3
     assert found.turns[1] == pytest.approx(np.radians(2.7), abs=1e-3)
-    assert found.warnings == ["turns about a second axis are small (2.7 deg rms beside 1.000 -0.008 -0.008 in gripper): turn more"]
+    assert found.warnings == ["turns about a second axis are small (2.7 deg rms, first axis 1.000 -0.008 -0.008 in gripper): turn more"]
 
 
 @pytest.mark.large

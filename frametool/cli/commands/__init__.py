@@ -158,9 +158,9 @@ def called(arguments: list[str]) -> object:
     if instruction := os.environ.get(COMPLETION):
         from frametool.cli.completion import answer
 
-        answer(group, COMPLETION, instruction, " ".join(arguments))
-        return 0
-    with group.make_context("frametool", arguments, max_content_width=100 if sys.stdout.isatty() else 80) as ctx:
+        return answer(group, COMPLETION, instruction, " ".join(arguments))
+    width = 100 if sys.stdout.isatty() else 80
+    with group.make_context("frametool", arguments, obj=(*arguments,), max_content_width=width) as ctx:
         return group.invoke(ctx)
 
 
@@ -173,7 +173,7 @@ def called_in(
     prepare: is shown the command's context before it runs
     """
     name, *rest = words
-    with group.get_command(parent, name).make_context(name, rest, parent=parent) as ctx:
+    with group.get_command(parent, name).make_context(name, rest, parent=parent, obj=(*words,)) as ctx:
         if prepare:
             prepare(ctx)
         return ctx.command.invoke(ctx)

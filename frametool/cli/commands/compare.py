@@ -98,12 +98,11 @@ def command(inputs: Inputs) -> int:
 def _write_report(found: Sequence[Comparison], path: str, *, force: bool) -> None:
     """Write the pictures of a comparison, with the command that made them."""
     import shlex
-    import sys
 
     from frametool.view.comparison_page import write_report
 
     with writing(path, force=force) as write:
-        write(write_report(found, _format_of(path), shlex.join(["frametool", *sys.argv[1:]])))
+        write(write_report(found, _format_of(path), shlex.join(["frametool", *click.get_current_context().obj])))
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
