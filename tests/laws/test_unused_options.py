@@ -87,13 +87,13 @@ VALUES = {
     "input_formats": "csv", "joints": "a=1", "joint_files": "joints.csv", "named_frames": "a,b", "stamps": "walk.tum", "notations": "matrix",
     "from_rep": "rpy", "columns": "x", "time_column": "t", "origin": "{lat: 48, lon: 11, alt: 5}", "zone": "32N", "recorded_frames": "a,b",
     "topics": "/tf", "messages": "pose", "more": "drive.yaml", "on_error": "skip", "output": "out.json", "find": "1,2,3", "axes": "optical",
-    "world": "ned_from_enu", "all_axes": "unity_from_ros", "fixed": "map", "format_name": "json", "input_path": "walk.tum", "form": "json",
+    "world": "ned_from_enu", "all_axes": "unity_from_ros", "fixed": "map", "format_name": "json", "input_path": "walk.tum", "fmt": "json",
     "stop": "0.2",
 }  # fmt: skip
 # these hold whether or not there is something that they are about: what is said, what is tolerated, how a number is spelt, when it is
 FREE = {
     "quiet", "verbose", "color", "normalize", "on_error", "max_errors", "deg", "keep_sign", "notations", "precision", "scale", "camera_axes",
-    "at", "moving", "cache", "kinds", "unwrap", "format_name", "form", "input_formats", "strict", "each", "fixed", "max_gap_ns",
+    "at", "moving", "cache", "kinds", "unwrap", "format_name", "fmt", "input_formats", "strict", "each", "fixed", "max_gap_ns",
 }  # fmt: skip
 LEFT_OPEN = {("convert", "stamps"), ("compose", "stamps"), ("mean", "stamps"), ("apply", "stamps"), ("convert", "from_rep"), ("compose", "from_rep"),
              ("mean", "from_rep"), ("convert", "time_offset")}  # of rows that the form says nothing of  # fmt: skip
