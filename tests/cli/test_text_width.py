@@ -37,7 +37,7 @@ relative '{xyz: [1, 2, 3]}' '{xyz: [1, 2, 4]}' -f text
 interpolate '{rpy_deg: [0, 0, 0]}' '{rpy_deg: [0, 0, 90]}' 0.3 --explain
 lookup examples/robot.yaml map tool --explain
 lookup examples/drive.yaml map box --at 2.5 --explain
-fk examples/arm.urdf arm_base tool -j elbow=1 -f text
+lookup examples/arm.urdf arm_base tool -j elbow=1 -f text
 tree examples/arm.urdf -f text
 tree examples/camchain.yaml -f text
 tree examples/finger.xml -f text

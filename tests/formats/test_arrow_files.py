@@ -288,7 +288,7 @@ BAD = {"x": [1.0, 2.0, float("nan"), 4.0, 5.0], "y": [1.0, 2.0, 3.0, float("inf"
 def test_the_first_bad_row_stops_the_run_and_leaves_no_file(use: Use, form: str) -> None:
     done = use("apply", "--transform", POSE, data=encoded(pa.table(BAD), form, rows=2), form=form)
     assert (done.status, done.data) == (1, b"")
-    assert done.err == "frametool: stdin: row 3, column x: not finite\n"
+    assert done.err == "frametool: stdin: row 3, column x: not finite; --on-error skip goes on\n"
 
 
 @pytest.mark.parametrize(("rule", "ids"), [("skip", [1, 2, 5]), ("null", [1, 2, 3, 4, 5])])

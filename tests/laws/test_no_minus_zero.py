@@ -62,7 +62,7 @@ STREAMED = [
 ]  # fmt: skip
 OTHERS = """
 fk examples/arm.urdf arm_base tool -i examples/joints.csv
-fk examples/arm.urdf arm_base tool -j elbow=0 -f json
+lookup examples/arm.urdf arm_base tool -j elbow=0 -f json
 lookup examples/arm.urdf arm_base tool -f json --to matrix
 tree examples/arm.urdf -f camchain
 tree examples/robot.yaml -f camchain
