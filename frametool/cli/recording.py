@@ -10,7 +10,7 @@ from click import UsageError
 from frametool.cli.command import refuse
 from frametool.errors import FileProblem, printable, shown
 from frametool.formats.table import FORMATS, by_name, is_folder, writers
-from frametool.grammar.result import Recorded
+from frametool.grammar.result import RecordingStyle
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from frametool.cli.command import Inputs
 
 
-def recorded(chosen: Inputs, fmt: str, output: str | None) -> Recorded:
+def recorded(chosen: Inputs, fmt: str, output: str | None) -> RecordingStyle:
     """Return what of results a recording of a format holds, as options say; raises UsageError."""
     place = _place(fmt, output)
     names = chosen.recorded_frames or next(iter(chosen.named_frames), "")
@@ -27,7 +27,7 @@ def recorded(chosen: Inputs, fmt: str, output: str | None) -> Recorded:
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(names)}")
     refuse(len({*frames}) < len(frames), f"--frames {names}: no frame is its own parent; give two names")
     chosen.formats_read = (*chosen.formats_read, *[("", ("frames",))] * bool(chosen.named_frames))
-    return Recorded(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
+    return RecordingStyle(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 
 def _place(fmt: str, output: str | None) -> str:

@@ -27,8 +27,8 @@ ROUNDED_TO_ZERO = 1e-12  # below it, on a screen
 SEEN = ("text", "yaml")  # what a screen shows where no format is asked for
 
 
-class Recorded(NamedTuple):
-    """The part of results that is written to a recording.
+class RecordingStyle(NamedTuple):
+    """How results are written to a recording.
 
     kinds: the messages, by their names in `recordings.made`; () for the default of each result
     topic: of all of them; "" for the usual ones
@@ -52,7 +52,7 @@ class Style:
     in_camera: whether the reference frame is the same camera at another time
     place: how positions on the Earth are written, None for x, y, z
     in_cm: whether positions are xyz_cm, for axes of tools that use centimetres
-    recording: the part of results that is written to a recording
+    recording: how results are written to a recording
     """
 
     __slots__ = (
@@ -75,7 +75,7 @@ class Style:
         self.axes = ""
         self.in_camera = self.in_cm = self.screen = False
         self.place: Place | None = None
-        self.recording = Recorded()
+        self.recording = RecordingStyle()
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
