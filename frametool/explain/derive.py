@@ -127,7 +127,6 @@ def end(sheet: Sheet, own: Result, plan: DerivationStyle) -> None:
     for each in plan.notations:
         rows += _rotation_rows(own, each, plan.style)
     rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
-    rows += _rows("covariance", own.extras.get("covariance", ()), 6)
     sheet.result(named, rows)
 
 
@@ -215,10 +214,11 @@ def invert(plan: DerivationStyle, pose: WrittenPose) -> Explanation:
 def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanation:
     """Derive the pose of B in A, with distance and angle."""
     own = pose_algebra.relative(a.pose, b.pose)
-    frames = _three_frames(a, b)
+    frames, labels = _three_frames(a, b)
 
     def way(sheet: Sheet) -> Rigid:
-        pose = operations.relative(sheet, *_both(sheet, a, b, frames), frames)
+        one, other = _written(sheet, [a, b], labels)
+        pose = operations.relative(sheet, one, other, frames)
         found = operations.extent(sheet, pose, frames[1])
         for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
@@ -232,25 +232,20 @@ def interpolate(plan: DerivationStyle, a: WrittenPose, b: WrittenPose, fraction:
     """Derive the pose at a fraction from A to B."""
     fraction = float(fraction)
     own = Result(pose_algebra.interpolated(a.pose, b.pose, fraction))
-    frames = _three_frames(a, b)
+    frames, labels = _three_frames(a, b)
 
     def way(sheet: Sheet) -> Rigid:
-        return operations.between(sheet, *_both(sheet, a, b, frames), fraction)
+        one, other = _written(sheet, [a, b], labels)
+        return operations.between(sheet, one, other, fraction)
 
     return derived_pose(plan, f"{frames[1]} to {frames[2]} at {fraction!r}", own, way)
 
 
-def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[str, str, str]:
-    """Return the common reference frame of two poses, and their bodies."""
-    world = a.pose.parent or b.pose.parent or "world"
-    return printable(world), printable(a.pose.name or "A"), printable(b.pose.name or "B")
-
-
-def _both(sheet: Sheet, a: WrittenPose, b: WrittenPose, frames: tuple[str, str, str]) -> tuple[Rigid, Rigid]:
-    """Add the derivation of both poses from what is written."""
-    world, first, second = frames
-    one, other = _written(sheet, [a, b], [(world, first), (world, second)])
-    return one, other
+def _three_frames(a: WrittenPose, b: WrittenPose) -> tuple[tuple[str, str, str], list[tuple[str, str]]]:
+    """Return the common reference frame of two poses and their bodies, and the two labels of the poses."""
+    names = a.pose.parent or b.pose.parent or "world", a.pose.name or "A", b.pose.name or "B"
+    world, first, second = map(printable, names)
+    return (world, first, second), [(world, first), (world, second)]
 
 
 def lookup(
@@ -287,12 +282,14 @@ class ByTree(NamedTuple):
     at_ns: int | None = None
 
 
+MOVED = {"point": METRES, "vector": ""}
+
+
 class MovedRecord(NamedTuple):
     """A record, and the command's result for it.
 
-    kind: point, vector, pose, twist or wrench; target, source: its new and its old frame
-    mover: target_from_source; numbers: as written, except for a pose; covariance: 36 numbers, or none
-    result: the numbers of the result, then those of its covariance
+    kind: point, vector or pose; target, source: its new and its old frame
+    mover: target_from_source; numbers: of a point or a vector, as written; result: the numbers of the result
     pose: a pose as written
     """
 
@@ -301,71 +298,32 @@ class MovedRecord(NamedTuple):
     source: str
     mover: Rigid
     numbers: Sequence[float]
-    covariance: Sequence[float]
     result: Sequence[float]
     pose: WrittenPose | None = None
-
-    @property
-    def frames(self) -> tuple[str, str]:
-        """Return the names of target and source for printing."""
-        return printable(self.target), printable(self.source)
-
-
-LABELS = {  # names of vectors, and their units
-    "point": (("point", METRES),),
-    "vector": (("vector", ""),),
-    "twist": (("linear", "m/s"), ("angular", "rad/s")),
-    "wrench": (("force", "N"), ("torque", "Nm")),
-}
 
 
 def apply(plan: DerivationStyle, way: ByTree | WrittenPose, record: MovedRecord) -> Explanation:
     """Derive a record in the target's frame; the source and the time of a lookup are those of the record."""
-    target, source = record.frames
+    kind, target, source = record.kind, printable(record.target), printable(record.source)
 
     def write(sheet: Sheet) -> None:
         if isinstance(way, WrittenPose):
-            (pose,) = _written(sheet, [way], [record.frames])
+            (pose,) = _written(sheet, [way], [(target, source)])
         else:
             pose = chain(sheet, way.frames, record.target, record.source, way.at_ns)
-        sheet.reached(pose[:3])
         check_vector(sheet, pose[:3], record.mover[:3])
-        if record.pose is None:
-            _move_vectors(sheet, pose, record)
-        else:
-            _move_pose(sheet, pose, record.pose, record, plan)
+        if (written := record.pose) is None:
+            sheet.reached(record.numbers)
+            check_vector(sheet, operations.moved(sheet, kind, pose, record.numbers, target, source), record.result)
+            sheet.result(f"in {target}", [row(kind, "xyz", record.result, MOVED[kind])])
+            return
+        name = printable(written.pose.name or "it")
+        sheet.heading("The record")
+        written.say(sheet, source, name)
+        derived = operations.compose(sheet, pose, written.components(sheet, source, name), (target, source, name))
+        end_with_pose(sheet, derived, Result(Pose.of(record.result, written.pose.name, record.target)), plan)
 
-    return explained(plan, f"{record.kind} in {target} of a {record.kind} in {source}", write)
-
-
-def _move_vectors(sheet: Sheet, pose: Rigid, record: MovedRecord) -> None:
-    """Transform a point, a vector, a twist or a wrench, and end with the result."""
-    sheet.reached(record.numbers)
-    found, own = operations.moved(sheet, record.kind, pose, record.numbers, record.frames), record.result
-    check_vector(sheet, found, own[: len(found)])
-    rows = [row(label, "xyz", own[3 * at : 3 * at + 3], unit) for at, (label, unit) in enumerate(LABELS[record.kind])]
-    if record.covariance:
-        _check_covariance(sheet, operations.twist_covariance(sheet, pose, record.covariance), own[len(found) :])
-        rows += _rows("covariance", own[len(found) :], 6)
-    sheet.result(f"in {record.frames[0]}", rows)
-
-
-def _move_pose(sheet: Sheet, pose: Rigid, written: WrittenPose, record: MovedRecord, plan: DerivationStyle) -> None:
-    """Transform a pose, and end with the result."""
-    (target, origin), name = record.frames, printable(written.pose.name or "it")
-    own = Result(Pose.of(record.result[:7], written.pose.name, record.target))
-    sheet.heading("The record")
-    written.say(sheet, origin, name)
-    derived = operations.compose(sheet, pose, written.components(sheet, origin, name), (target, origin, name))
-    if record.covariance:
-        own.extras["covariance"] = record.result[7:]
-        _check_covariance(sheet, operations.pose_covariance(sheet, pose, record.covariance), record.result[7:])
-    end_with_pose(sheet, derived, own, plan)
-
-
-def _check_covariance(sheet: Sheet, found: Sequence[float], own: Sequence[float]) -> None:
-    sheet.reached([sheet.reach**2 * max(map(abs, own))])
-    check_vector(sheet, found, own)
+    return explained(plan, f"{kind} in {target} of a {kind} in {source}", write)
 
 
 class PlanarSample(NamedTuple):
@@ -458,27 +416,16 @@ def _place(sheet: Sheet, values: Values, seen: Sighting, name: str, index: str, 
 
 
 def _law(sheet: Sheet, step: FollowStep, values: Values) -> None:
-    """Add the command for a target at x, y, and compare it with the follower's."""
+    """Add the command for a target at x, y; raises DerivationWrong if it is not the follower's."""
     bearing = math.atan2(values["y"], values["x"])
     behind = bearing * step.angular * step.gains[1] < 0.0 and abs(abs(bearing) - math.pi) < 1e-9
     values |= {"behind": float(behind), "arrived": step.arrived}
     values |= {"slow": float(step.limits[0] < math.inf), "steady": float(step.limits[1] < math.inf)}
-    names = ("linear", "angular", "max_linear", "max_angular")
-    words = dict(zip(names, map(_text, step.gains + step.limits), strict=True))
-    sheet.play("follow law", values, follower=printable(step.follower), **words)
-    _compare(step, values["d"], values["linear_x"], values["angular_z"])
-
-
-def _text(value: float) -> str:
-    """Format a constant of a formula: short if that is exact."""
-    return f"{value:g}" if float(f"{value:g}") == value else repr(value)
-
-
-def _compare(step: FollowStep, distance: float, linear: float, angular: float) -> None:
-    """Compare with the follower's command; raises DerivationWrong."""
+    names, constants = ("linear", "angular", "max_linear", "max_angular"), step.gains + step.limits
+    texts = (f"{value:g}" if float(f"{value:g}") == value else repr(value) for value in constants)
+    sheet.play("follow law", values, follower=printable(step.follower), **dict(zip(names, texts, strict=True)))
     near = CLOSE * (1.0 + step.distance + 1.0 / max(step.distance, step.arrived))  # largest for a small distance
-    for found, own, gain in zip(
-        (distance, linear, angular), (step.distance, step.linear, step.angular), (1.0, *step.gains), strict=True
-    ):
-        if not abs(found - own) <= near * max(1.0, abs(gain)):
-            raise DerivationWrong(f"the derivation of {step.follower} gives {found!r}, not {own!r}; {REPORT}")
+    for name, own, gain in (("d", step.distance, 1.0), ("linear_x", step.linear, step.gains[0]),
+                            ("angular_z", step.angular, step.gains[1])):  # fmt: skip
+        if not abs(values[name] - own) <= near * max(1.0, abs(gain)):
+            raise DerivationWrong(f"the derivation of {step.follower} gives {values[name]!r}, not {own!r}; {REPORT}")

@@ -24,12 +24,14 @@ BINDS = {ast.Add: SUM, ast.Sub: SUM, ast.Mult: PRODUCT, ast.Div: PRODUCT, ast.Po
 TEXT = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: "·", ast.Div: "/", ast.Pow: "^"}
 # readers recompute a line with their own library: the values are those of `math`, not of the kernels
 FUNCTIONS: dict[str, Callable[..., float]] = {
-    "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt, "atan2": math.atan2, "abs": abs, "min": min, "max": max,
+    "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt, "atan2": math.atan2, "hypot": math.hypot, "abs": abs,
+    "min": min, "max": max,
 }  # fmt: skip
 COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
-CALLS = {"sqrt": r"\sqrt{%s}", "abs": r"\left\lvert %s \right\rvert", "atan2": r"\operatorname{atan2}\left(%s\right)"}
+CALLS = {"sqrt": r"\sqrt{%s}", "abs": r"\left\lvert %s \right\rvert"}
+CALLS |= {name: rf"\operatorname{{{name}}}\left(%s\right)" for name in ("atan2", "hypot")}
 PI = "pi"
 EXPONENT = re.compile(r"e([+-]?)0*(\d+)$")
 

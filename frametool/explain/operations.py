@@ -6,7 +6,6 @@ The lines are those of `sheets.txt`; this module passes the numbers in and retur
 from __future__ import annotations
 
 from bisect import bisect_right
-from itertools import product as pairs
 from operator import itemgetter
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, NamedTuple
@@ -32,37 +31,28 @@ if TYPE_CHECKING:
     Sample = tuple[int, str, Rigid]
     Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
 
-class SheetNames(NamedTuple):
-    """The names of a representation's numbers in its two sheets."""
-
-    written: str
-    found: str
-
-
 ANGLES, ROLL_PITCH_YAW, ROTATION = "a1 a2 a3", "roll pitch yaw", " ".join(ENTRIES)
-BLOCKS = {
-    "quaternion": SheetNames("x y z w", "x y z w"),
-    "xyzw": SheetNames("x y z w", "x y z w"),
-    "wxyz": SheetNames("w x y z", "w x y z"),
-    "rpy": SheetNames(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
-    "euler": SheetNames(ANGLES, ANGLES),
-    "axis_angle": SheetNames("ax ay az angle", "vx vy vz angle"),
-    "rotvec": SheetNames("rx ry rz", "rx ry rz"),
-    "matrix": SheetNames(ROTATION, ROTATION),
-    "mrp": SheetNames("px py pz", "px py pz"),
-    "six_d": SheetNames("ax ay az bx by bz", "r11 r21 r31 r12 r22 r32"),
-    "rpy_unreal": SheetNames(ROLL_PITCH_YAW, ROLL_PITCH_YAW),
-    "euler_unity": SheetNames("a2 a3 a1", "a2 a3 a1"),
+BLOCKS = {  # the names of a representation's numbers in its two sheets, as written and as found
+    "quaternion": ("x y z w", "x y z w"),
+    "xyzw": ("x y z w", "x y z w"),
+    "wxyz": ("w x y z", "w x y z"),
+    "rpy": (ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler": (ANGLES, ANGLES),
+    "axis_angle": ("ax ay az angle", "vx vy vz angle"),
+    "rotvec": ("rx ry rz", "rx ry rz"),
+    "matrix": (ROTATION, ROTATION),
+    "mrp": ("px py pz", "px py pz"),
+    "six_d": ("ax ay az bx by bz", "r11 r21 r31 r12 r22 r32"),
+    "rpy_unreal": (ROLL_PITCH_YAW, ROLL_PITCH_YAW),
+    "euler_unity": ("a2 a3 a1", "a2 a3 a1"),
 }
 AXES_OF = {"rpy": "sxyz", "rpy_unreal": "sxyz", "euler_unity": "szxy"}  # Euler angles under another name
 ORDERS = {"wxyz": "w, x, y, z: the scalar w is first.", "": "x, y, z, w: the scalar w is last."}
 UNITS = {True: {"deg": "_deg", "unit": "deg"}, False: {"deg": "", "unit": "rad"}}
 PLAIN = ("quaternion", "xyzw")
-MOVERS = {"point": "p", "vector": "v", "twist": "vw", "wrench": "fm"}  # letters of their vectors
-PARTS = {0: "position", 3: "rotation"}
 
 
-def block_of(notation: Notation) -> SheetNames:
+def block_of(notation: Notation) -> tuple[str, str]:
     """Return the names of a notation's numbers; raises ValueInvalid for a representation without sheets."""
     name = notation.representation.name
     if name not in BLOCKS:
@@ -85,12 +75,14 @@ def sheet_of(notation: Notation) -> str:
 
 def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
     """Add the derivation of the quaternion from the numbers of a notation."""
-    names, name = names_of(block_of(notation).written, notation, degrees=degrees), sheet_of(notation)
+    names, name = names_of(block_of(notation)[0], notation, degrees=degrees), sheet_of(notation)
     values: Values = dict(zip(names, numbers, strict=True))
     words = UNITS[degrees].copy()
     if name.startswith("euler"):
         axes = AXES_OF.get(name) or notation.bound_axes()
-        words |= _axes(axes, values) | _elementary(axes)
+        first, third = "31" if axes[0] == "s" else "13"
+        words |= _axes(axes, values) | {"first": first, "third": third}
+        words |= {"A": axes[int(first)], "B": axes[2], "C": axes[int(third)]}
     is_plain = name in ("wxyz", "quaternion")
     sheet.play("quaternion to" if is_plain else f"{name} to", values, order=ORDERS.get(name, ORDERS[""]), **words)
     return quaternion_of(values)
@@ -100,7 +92,7 @@ def from_quaternion(
     sheet: Sheet, q: Quaternion, notation: Notation, *, degrees: bool, keep_sign: bool
 ) -> Sequence[float]:
     """Add the derivation of a notation from the quaternion; return its numbers."""
-    names = names_of(block_of(notation).found, notation, degrees=degrees)
+    names = names_of(block_of(notation)[1], notation, degrees=degrees)
     x, y, z, w = q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
@@ -119,30 +111,6 @@ def _axes(axes: str, values: Values) -> dict[str, str]:
     i, j, k, parity, symmetric, fixed = euler.AXES[axes]
     values |= {"odd": float(parity < 0.0), "symmetric": float(symmetric), "fixed": float(fixed)}
     return {"axes": axes, "turns": ", then ".join(axes[1:]), "i": "xyz"[i], "j": "xyz"[j], "k": "xyz"[k]}
-
-
-def _elementary(axes: str) -> dict[str, str]:
-    """Return the words for the product of three elementary quaternions: the formulas of the first two, then of all."""
-    first, third = (3, 1) if axes[0] == "s" else (1, 3)
-    words = {"first": str(first), "third": str(third), "A": axes[first], "B": axes[2], "C": axes[third]}
-    one = _times_elementary({"w": f"c{first}", axes[first]: f"s{first}"}, axes[2], 2)
-    both = _times_elementary({part: f"p{part}" for part in "xyzw"}, axes[third], third)
-    return words | {f"p{part}": one[part] for part in one} | {f"q{part}": both[part] for part in both}
-
-
-def _times_elementary(p: dict[str, str], axis: str, number: int) -> dict[str, str]:
-    """Return the formulas of p times the quaternion (s along an axis, c): parts of p that are 0 are omitted."""
-    after, last = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}[axis]
-    sine, cosine = f"s{number}", f"c{number}"
-    terms = {
-        axis: ((axis, cosine, "+"), ("w", sine, "+")),
-        after: ((after, cosine, "+"), (last, sine, "+")),
-        last: ((last, cosine, "+"), (after, sine, "-")),
-        "w": (("w", cosine, "+"), (axis, sine, "-")),
-    }
-    texts = {name: "".join(f" {sign} {p[part]}*{factor}" for part, factor, sign in each if part in p)
-             for name, each in terms.items()}  # fmt: skip
-    return {name: text[3:] if text.startswith(" +") else f"-{text[3:]}" for name, text in texts.items()}
 
 
 def named(prefix: str, numbers: Sequence[float]) -> Values:
@@ -175,7 +143,6 @@ def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> R
 
 def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     """Invert target_from_source."""
-    sheet.matrices["R"] = sheet.matrix(pose[3:])
     values = sheet.play("inverse", named("t", pose[:3]) | named("", pose[3:]), target=target, source=source)
     return *vector_of(values, "t"), *quaternion_of(values)
 
@@ -202,38 +169,11 @@ def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:
     return *vector_of(line, "t"), *quaternion_of(arc, "q")
 
 
-def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], frames: tuple[str, str]) -> list[float]:
-    """Transform a point, a vector, a twist or a wrench from one frame to another: `frames` are target and source."""
-    values = named("t", pose[:3]) | named("q", pose[3:])
-    for at, letter in enumerate(MOVERS[kind]):
-        values |= named(letter, numbers[3 * at : 3 * at + 3])
-    sheet.play(kind, values, target=frames[0], source=frames[1])
-    return [number for letter in MOVERS[kind] for number in vector_of(values, letter)]
-
-
-def pose_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
-    """Rotate each 3x3 block C: R C R^T."""
-    sheet.play("pose covariance", {})
-    sheet.matrices["R"] = sheet.matrix(pose[3:])
-    found = [0.0] * 36
-    for top, left in pairs((0, 3), repeat=2):
-        places = [slice(at + left, at + left + 3) for at in range(6 * top, 6 * top + 18, 6)]
-        sheet.matrices["C"] = [list(numbers[place]) for place in places]
-        sheet.play("covariance block", {}, rows=PARTS[top], columns=PARTS[left])
-        for place, row in zip(places, sheet.matrices["C'"], strict=True):
-            found[place] = row
-    return found
-
-
-def twist_covariance(sheet: Sheet, pose: Rigid, numbers: Sequence[float]) -> Sequence[float]:
-    """Transform the 6x6 covariance C: A C A^T."""
-    turn = sheet.matrix(pose[3:])
-    tx, ty, tz = pose[:3]
-    arm = sheet.product([[0.0, -tz, ty], [tz, 0.0, -tx], [-ty, tx, 0.0]], turn)
-    sheet.matrices["A"] = [[*turn[i], *arm[i]] for i in range(3)] + [[0.0, 0.0, 0.0, *turn[i]] for i in range(3)]
-    sheet.matrices["C"] = [list(numbers[6 * i : 6 * i + 6]) for i in range(6)]
-    sheet.play("twist covariance", {})
-    return [entry for row in sheet.matrices["C'"] for entry in row]
+def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Vector:
+    """Transform a point or a vector from one frame to another."""
+    values = named("t", pose[:3]) | named("q", pose[3:]) | named(kind[0], numbers)
+    sheet.play(kind, values, target=target, source=source)
+    return vector_of(values, kind[0])
 
 
 class OtherAxes(NamedTuple):

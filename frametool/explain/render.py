@@ -59,14 +59,8 @@ def equals(
 
     write, name, number: format a tree, a name and a number's text
     """
-    value = number(step.numbers[step.name])
-    if not step.formula:
-        return [value]
-    formula, shown = parsed(step.formula), parsed(step.shown)
-    plain = as_text(shown, lambda each: step.numbers.get(each, each))
-    is_said = plain in (as_text(formula, str), step.numbers[step.name])  # equal to the formula or to the value
-    with_numbers = write(shown, lambda each: number(step.numbers[each]) if each in step.numbers else name(each))
-    return [write(formula, name), *[with_numbers] * (not is_said), value]
+    shown = write(parsed(step.shown), lambda each: number(step.numbers[each]) if each in step.numbers else name(each))
+    return [*dict.fromkeys([write(parsed(step.formula), name), shown, number(step.numbers[step.name])])]
 
 
 def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
@@ -113,9 +107,6 @@ def _grid(grid: MatrixLine) -> list[str]:
     groups: list[list[str]] = []
     sign = ""
     for part in grid.parts:
-        if part == ")":
-            groups[-1] = _side_by_side("", groups[-1], " )")
-            continue
         if isinstance(part, str):
             sign = f"{part} "
             continue
@@ -242,7 +233,7 @@ def _aligned(item: SheetStep | MatrixLine) -> list[str]:
     if isinstance(item, MatrixLine):
         name = item.name.replace("'", r"^{\prime}")
         formula = re.sub(r"(?<!\+) (?!\+)", r"\\,", re.sub(r"\b([a-zM])([a-z\d])\b", r"\1_\2", item.text))
-        formula = re.sub(r"\^(-?)T", r"^{\1\\mathsf T}", formula).replace("1/2", r"\tfrac{1}{2}")
+        formula = formula.replace("^T", r"^{\mathsf T}")
         parts = [*filter(None, [formula]), " ".join(map(_matrix, item.parts))]
     else:
         name, parts = symbol(item.name), equals(item, as_latex, symbol, latex_number)
@@ -257,7 +248,7 @@ def _aligned(item: SheetStep | MatrixLine) -> list[str]:
 
 def _matrix(part: str | Sequence[Sequence[str]]) -> str:
     if isinstance(part, str):
-        return rf"{latex_number(part[:-1])} \cdot" if part.endswith("·") else part.replace("·", r" \cdot ")
+        return part
     rows = r" \\ ".join(" & ".join(map(latex_number, row)) for row in part)
     return rf"\begin{{bmatrix}} {rows} \end{{bmatrix}}"
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-import string
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -22,8 +21,6 @@ from frametool.geometry.quaternion import to_matrix
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from frametool.grammar.readers import Quaternion
-
     Values = dict[str, float]
     Matrix = list[list[float]]
 
@@ -35,8 +32,7 @@ EXACT = "Multiples of 90 deg are exact: no rounded pi comes into their sines and
 HEADING, SENTENCE, CAVEAT = "#", ">", "!"
 DIGITS = 6  # default of significant digits
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
-LAST_STEP = 1e-9  # the convergence is quadratic: after such a step there is only rounding
-MOST_STEPS = 60
+MATRIX_STEP = re.compile(r"(-?)R(?:\((\w)\))?(\^T)? (\w+)(?: \+ (\w+))?")  # R(q) of qx .. qw, R of x y z w
 STEP = re.compile(r"(\S+) = (.*?)(?:  \[(.*)\])?")
 
 
@@ -76,7 +72,7 @@ class Words(NamedTuple):
 class SheetStep(NamedTuple):
     """A name and what it equals: formula, formula with numbers, value.
 
-    shown: the formula whose numbers are shown, "" for a chosen value
+    shown: the formula whose numbers are shown
     numbers: the texts of the numbers in it, and of its value
     """
 
@@ -114,24 +110,11 @@ class SheetResult(NamedTuple):
 Item: TypeAlias = Words | SheetStep | MatrixLine | SheetResult
 
 
-class Filler(string.Formatter):
-    """Fills in words and values; a value without a format is formatted like the numbers of the sheet."""
-
-    def __init__(self, number: Callable[[float], str]) -> None:
-        """Store the formatting function of numbers."""
-        self.number = number
-
-    def format_field(self, value: Any, format_spec: str) -> str:
-        """Format one field."""
-        return self.number(value) if isinstance(value, float) and not format_spec else format(value, format_spec)
-
-
 class Sheet:
     """Collects a derivation.
 
     digits: significant digits; None shows and continues with every bit
     clean: rounding errors of terms that cancel become 0 and stay 0 in later steps
-    matrices: those named in steps of matrices
     reach: the largest of the positions, in metres, as the scale of rounding
     stretch: the factor by which rounding grows if poses are extrapolated
     """
@@ -140,12 +123,10 @@ class Sheet:
         """Create an empty sheet."""
         self.digits, self.clean = digits, clean
         self.items: list[Item] = []
-        self.matrices: dict[str, Matrix] = {}
         self.reach = 1.0
         self.stretch = 1.0
         self._headings = 0
         self._about = ""
-        self._filler = Filler(self.number)
 
     def number(self, value: float) -> str:
         """Format a number: short if that is exact, else with all its digits, so that 0.500000 is a rounded one."""
@@ -217,7 +198,7 @@ class Sheet:
                 self._play(body, values, words)
 
     def _filled(self, text: str, values: Values, words: Mapping[str, Any]) -> str:
-        return self._filler.vformat(text, (), {**values, **words})
+        return text.format_map({name: self.number(value) for name, value in values.items()} | {**words})
 
     def _line(self, line: str, values: Values, words: dict[str, Any]) -> None:
         """Add one line."""
@@ -231,7 +212,7 @@ class Sheet:
             name, _, words_text = text.partition(" = ")
             words[name] = words_text
         elif kind[0] == "@":
-            HELPERS[kind](self, values, *text.split())
+            getattr(self, kind[1:])(values, *text.split())
         elif kind == ":":
             self.matrix_step(values, text)
         elif kind == "let":
@@ -267,38 +248,25 @@ class Sheet:
         self.items.append(MatrixLine(name, text, shown, unit))
 
     def matrix_step(self, values: Values, line: str) -> None:
-        """Add a matrix, or a step of matrices: a product of them, with a sign before it or a vector added."""
+        """Add a matrix, or a step: the matrix of a quaternion times a vector, negated or with a vector added."""
         if " = " not in line:
             self.grid(line, "", [rows([values[each] for each in ENTRIES])])
             return
         name, formula, unit = _parts(line)
-        product, _, shift = formula.removeprefix("-").partition(" + ")
-        factors = [self._operand(each, values) for each in product.split()]
-        added = [self._operand(shift, values)] if shift else []
-        found = factors[0]
-        for factor in factors[1:-1]:
-            found = self.product(found, factor)
-        found = self.product(found, factors[-1], *added)
-        signs: list[str | Matrix] = ["-"] if formula.startswith("-") else []
-        if signs:
-            found = [[0.0 - entry for entry in row] for row in found]
-        plus: list[str | Matrix] = ["+", *added] if shift else []
-        self.grid(name, formula, [*signs, *factors, *plus, "=", found], unit)
-        if len(found[0]) > 1:
-            self.matrices[name] = found
-        else:
-            values.update(zip((name.rstrip("'") + each for each in "xyz"), (row[0] for row in found), strict=True))
-
-    def _operand(self, name: str, values: Values) -> Matrix:
-        """Return the matrix of a quaternion, R(q), a matrix, a transposed one, or a vector as a column."""
-        if name.endswith("^T"):
-            return transposed(self._operand(name[:-2], values))
-        if name.startswith("R("):
-            x, y, z, w = (values[name[2] + each] for each in "xyzw")
-            return self.matrix((x, y, z, w))
-        if name in self.matrices:
-            return self.matrices[name]
-        return [[values[name + each]] for each in "xyz"]
+        minus, prefix, transposed, *vectors = MATRIX_STEP.fullmatch(formula).groups("")  # type: ignore[union-attr]
+        x, y, z, w = (values[prefix + each] for each in "xyzw")
+        matrix = rows([self.settled(Value(entry, 1.0)) for entry in to_matrix(x, y, z, w)])
+        if transposed:
+            matrix = [list(column) for column in zip(*matrix, strict=True)]
+        arm, *shift = ([values[each + axis] for axis in "xyz"] for each in vectors if each)
+        found = [self.inner(row, arm, *(each[at] for each in shift)) for at, row in enumerate(matrix)]
+        found = [0.0 - entry for entry in found] if minus else found
+        parts: list[str | Matrix] = [minus] if minus else []
+        parts += [matrix, _column(arm)]
+        for each in shift:
+            parts += ["+", _column(each)]
+        self.grid(name, formula, [*parts, "=", _column(found)], unit)
+        values.update(zip((name.rstrip("'") + axis for axis in "xyz"), found, strict=True))
 
     def inner(self, row: Sequence[float], column: Sequence[float], *more: float) -> float:
         """Return the sum of products in their order, and of further terms: an entry of a product of matrices."""
@@ -308,26 +276,9 @@ class Sheet:
             total += term
         return self.settled(Value(total, max(map(abs, terms))))
 
-    def product(self, a: Matrix, b: Matrix, *added: Matrix) -> Matrix:
-        """Return a product of matrices, with others added."""
-        columns = transposed(b)
-        return [
-            [self.inner(row, column, *(each[i][k] for each in added)) for k, column in enumerate(columns)]
-            for i, row in enumerate(a)
-        ]
-
-    def matrix(self, q: Quaternion) -> Matrix:
-        """Return the matrix of a quaternion as used by the following steps."""
-        return rows([self.settled(Value(entry, 1.0)) for entry in to_matrix(*q)])
-
     def result(self, text: str, rows: Sequence[Row]) -> None:
         """End with the result."""
         self.items.append(SheetResult(text, rows))
-
-    def chosen(self, values: Values, name: str, value: str, unit: str) -> None:
-        """Add a value that is chosen, not derived."""
-        values[name] = float(value)
-        self.items.append(SheetStep(name, "", "", {name: self.number(values[name])}, f"{unit} (chosen)"))
 
     def angle(self, values: Values, name: str) -> None:
         """Read an angle as written; degrees are converted to radians."""
@@ -351,61 +302,29 @@ class Sheet:
 
     def direction(self, values: Values, name: str, parts: str, found: str, unit: str = "") -> None:
         """Add the length of a non-zero vector and its direction."""
-        names, by = self.length(values, name, parts, unit)
-        for each, part in zip(_each(found), names, strict=True):
-            self.step(values, each, f"{part}/{by}")
+        self.length(values, name, parts, unit)
+        for each, part in zip(_each(found), _each(parts), strict=True):
+            self.step(values, each, f"{part}/{name}")
 
-    def length(self, values: Values, name: str, parts: str, unit: str = "") -> tuple[Sequence[str], str]:
-        """Add the length of a vector; if squares leave the range of a double it is scaled first.
-
-        Returns the names of numbers whose quotients are the direction.
-        """
+    def length(self, values: Values, name: str, parts: str, unit: str = "") -> None:
+        """Add the length of a vector."""
         names = _each(parts)
         most = max(abs(values[each]) for each in names)
-        if most == 0.0 or TINY < most < HUGE:
-            self.step(values, name, _norm(names), unit)
-            return names, name
-        self.say("Squares of these numbers leave the range of a double; they are divided by the largest first.")
-        self.step(values, "m", f"max({', '.join(f'abs({each})' for each in names)})", unit)
-        scaled = [f"k{letter}" for letter in "xyzw"[: len(names)]]
-        for each, part in zip(scaled, names, strict=True):
-            self.step(values, each, f"{part}/m")
-        self.step(values, "k", _norm(scaled))
-        self.step(values, name, "m*k", unit)
-        return scaled, "k"
-
-    def columns(self, values: Values, *letters: str) -> None:
-        """Add the matrix of three columns."""
-        entries = [[values[letter + each] for letter in letters] for each in "xyz"]
-        self.grid("R", "(u v w)", [entries])
-        values.update(zip(ENTRIES, [entry for row in entries for entry in row], strict=True))
+        has_squares = most == 0.0 or TINY < most < HUGE
+        root = f"sqrt({' + '.join(f'{each}**2' for each in names)})"
+        self.step(values, name, root if has_squares else f"hypot({', '.join(names)})", unit)
 
     def nearest(self, values: Values) -> None:
-        """Add the steps to the rotation nearest to a matrix; a rotation is unchanged."""
-        here = rows([values[each] for each in ENTRIES])
-        off = kernel.defect(*kernel.nine(entry for row in here for entry in row), floats)
-        if off <= kernel.ORTHONORMAL:
-            return
-        self.play("nearest rotation", {"off": off})
-        for count in range(1, MOST_STEPS + 1):
-            there = rows(kernel.newton(*kernel.nine(part for row in here for part in row)))
-            other = [[2.0 * b - a for a, b in zip(*pair, strict=True)] for pair in zip(here, there, strict=True)]
-            name = f"M{count - 1 or ''}"
-            parts: list[str | Matrix] = ["1/2·(", here, "+", other, ")", "=", there]
-            self.grid(f"M{count}", f"1/2 ({name} + {name}^-T)", parts)
-            step = max(abs(a - b) for pair in zip(here, there, strict=True) for a, b in zip(*pair, strict=True))
-            here = there
-            if step < LAST_STEP:
-                break
-        values.update(zip(ENTRIES, [entry for row in here for entry in row], strict=True))
+        """Replace a matrix by the nearest rotation; a rotation is unchanged."""
+        entries = kernel.nine(values[each] for each in ENTRIES)
+        off = kernel.defect(*entries, floats)
+        if off > kernel.ORTHONORMAL:
+            values.update(zip(ENTRIES, kernel.nearest(*entries, floats), strict=True))
+            self.play("nearest rotation", values, error=f"{off:.1e}")
 
 
 WRITERS: dict[str, Callable[[Sheet, str], None]] = {
     HEADING: Sheet.heading, SENTENCE: Sheet.say, CAVEAT: Sheet.caveat,
-}  # fmt: skip
-HELPERS: dict[str, Callable[..., object]] = {
-    "@angle": Sheet.angle, "@half": Sheet.half, "@direction": Sheet.direction, "@length": Sheet.length,
-    "@columns": Sheet.columns, "@nearest": Sheet.nearest, "@chosen": Sheet.chosen,
 }  # fmt: skip
 
 
@@ -435,15 +354,10 @@ def _parts(text: str) -> tuple[str, str, str]:
     return found[1], found[2], found[3] or ""
 
 
-def _norm(names: Sequence[str]) -> str:
-    return f"sqrt({' + '.join(f'{name}**2' for name in names)})"
-
-
 def rows(entries: Sequence[float]) -> Matrix:
     """Return nine numbers as three rows."""
     return [list(entries[at : at + 3]) for at in (0, 3, 6)]
 
 
-def transposed(matrix: Sequence[Sequence[float]]) -> Matrix:
-    """Return the columns of a matrix as rows."""
-    return [list(column) for column in zip(*matrix, strict=True)]
+def _column(vector: Sequence[float]) -> Matrix:
+    return [[entry] for entry in vector]

@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING
 
 from frametool.errors import ValueInvalid, shown
 from frametool.explain import derive
-from frametool.explain.derive import LABELS, ByTree, MovedRecord
+from frametool.explain.derive import ByTree, MovedRecord
 from frametool.explain.operations import WrittenPose
 from frametool.geometry import floats
 from frametool.stream.record_values import pose_of, read_text
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_layout import POSE
+from frametool.stream.row_layout import POINT, POSE, VECTOR
 
 if TYPE_CHECKING:
     from frametool.documents.source import Source
     from frametool.explain.derive import DerivationStyle
     from frametool.explain.render import Explanation
-    from frametool.geometry.types import Rigid
     from frametool.stream.record import Record
 
 
@@ -53,30 +52,24 @@ def derive_record(
     if len(records) != 1:
         raise ValueInvalid(f"a derivation is of one record, {source.name} holds {len(records)}")
     (record,) = records
-    shape = record.shape
-    if shape.kind not in (POSE, *LABELS) or shape.covariance not in ((), (36,)):
-        what = f"of a {shape.kind}" + " with such a covariance" * bool(shape.covariance)
+    shape, operation = record.shape, request.operation
+    if shape.kind not in (POSE, POINT, VECTOR) or shape.covariance:
+        what = f"of a {shape.kind}" + " with a covariance" * bool(shape.covariance)
         raise ValueInvalid(f"no derivation {what}; leave --explain out")
     target, origin = _target_and_source(way, record.parent.text)
     if isinstance(way, WrittenPose):
-        return derive.apply(plan, way, _moved(record, request, target, origin, way.pose.components))
-    at_ns = None if timeless or way.frames.latest(target, origin) is None else record.stamp_ns
-    way = way._replace(source=origin, at_ns=at_ns if way.at_ns is None else way.at_ns)
-    mover = way.frames.lookup(target, origin, way.at_ns).components
-    return derive.apply(plan, way, _moved(record, request, target, origin, mover))
-
-
-def _moved(record: Record, request: Request, target: str, source: str, mover: Rigid) -> MovedRecord:
-    """Return a record with the result that its command has for it."""
-    shape = record.shape
-    numbers, covariance = record.values[: shape.own_size], record.values[shape.own_size :]
+        mover = way.pose.components
+    else:
+        at_ns = None if timeless or way.frames.latest(target, origin) is None else record.stamp_ns
+        way = way._replace(source=origin, at_ns=at_ns if way.at_ns is None else way.at_ns)
+        mover = way.frames.lookup(target, origin, way.at_ns).components
     if shape.kind == POSE:
         written = _written_pose(record, request)
-        result = request.operation.pose([(*written.pose.components, *covariance)], mover, floats)
-        return MovedRecord(POSE, target, source, mover, (), covariance, result, written)
-    start = shape.position(numbers) if shape.unit is not None else tuple(numbers)
-    result = request.operation.move(shape, start, covariance, mover)
-    return MovedRecord(shape.kind, target, source, mover, start, covariance, result)
+        result = operation.pose([written.pose.components], mover, floats)
+        return derive.apply(plan, way, MovedRecord(POSE, target, origin, mover, (), result, written))
+    start = tuple(record.values) if shape.unit is None else shape.position(record.values)
+    result = operation.move(shape, start, (), mover)
+    return derive.apply(plan, way, MovedRecord(shape.kind, target, origin, mover, start, result))
 
 
 def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str, str]:

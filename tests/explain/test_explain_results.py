@@ -84,8 +84,6 @@ CALLS = [
     ["lookup", "drive.yaml", "base", "base", "--at", "2", "--source-at", "0.5", "--fixed", "map"],
     ["apply", "robot.yaml", "base", "lidar", "5", "0.2", "0"], ["apply", "robot.yaml", "map", "{frame: lidar, vector: [1, 2, 3]}"],
     ["apply", "drive.yaml", "map", "lidar", "--at", "0.5", "1", "0", "0"], ["apply", "--transform", A, "{xyz: [1, 0, 0], rpy_deg: [0, 0, 45]}", "--to", "quaternion"],
-    ["apply", "--transform", A, "{linear: {x: 1, y: 2, z: 3}, angular: {x: 0.1, y: 0, z: 0.2}}"],
-    ["apply", "--transform", A, "{force: {x: 1, y: 2, z: 3}, torque: {x: 0.1, y: 0, z: 0.2}}"],
     ["apply", "drive.yaml", "map", "{header: {stamp: {sec: 1, nanosec: 500000000}, frame_id: lidar}, point: {x: 1, y: 2, z: 3}}"],
     ["convert", "--axes", "optical"], ["convert", "--axes", "optical", "--from", "rpy_deg", "10", "20", "30"],
     ["convert", "--from", "rpy_deg", "1", "2", "3", "10", "20", "30", "--to", "matrix"], ["convert", "{xyz: [1, 2, 3], inverse: true, rpy_deg: [0, 0, 30]}"],

@@ -137,7 +137,7 @@ def sheet(pose: dict[str, Any], to: str = "quaternion", precision: int | None = 
     ({"xyzw": [0, 0, 0, 1]}, "rotvec", ["No rotation: the vector is 0."]),
     ({"rotvec": [0, 0, 0]}, "quaternion", ["The vector is 0: no rotation"]),
     ({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "axis_angle", ["No rotation: the angle is 0"]),
-    ({"rotvec": [1e-300, 0, 0]}, "rotvec", ["leave the range of a double", "rx = vx·angle = 1·1e-300 = 1e-300 rad"]),
+    ({"rotvec": [1e-300, 0, 0]}, "rotvec", ["angle = hypot(rx, ry, rz)", "rx = vx·angle = 1·1e-300 = 1e-300 rad"]),
     ({"rotvec": [1e-9, 0, 0]}, "axis_angle", ["angle = 2·atan2(s, w) = 2·atan2(5e-10, 1) = 1e-09 rad"]),
     ({"rpy_deg": [0, 90, 0]}, "rpy_deg", ["! Gimbal lock", "yaw   = 0 rad (chosen)", "pitch_deg = pitch·180/pi = 1.57080·180/pi = 90 deg"]),
     ({"rpy_deg": [0, 89.99999, 10]}, "rpy_deg", ["! Near gimbal lock: roll and yaw each are known only to about"]),

@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]\d+)?")
-NAMES = {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "atan2", "pi")} | {
+NAMES = {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "atan2", "hypot", "pi")} | {
     "abs": abs, "min": min, "max": max, "__builtins__": {},
 }  # fmt: skip
 
@@ -23,7 +23,7 @@ def recheck(text: str, digits: int | None) -> int:
 
 
 def _without_functions(formula: str) -> str:
-    return re.sub(r"\b(sqrt|sin|cos|atan2|abs|min|max|pi|slerp)\b|\de[-+]\d", "", formula)
+    return re.sub(r"\b(sqrt|sin|cos|atan2|hypot|abs|min|max|pi|slerp)\b|\de[-+]\d", "", formula)
 
 
 def _compare(shown: str, value: str, digits: int | None) -> None:
@@ -121,8 +121,6 @@ def _parts(rows: list[str]) -> list[Any]:
 
 def _value(parts: list[Any]) -> Any:
     """Multiply neighbours and add: matrices as lists of rows, numbers before them."""
-    if parts[0] == "1/2·(":
-        return [[0.5 * (a + b) for a, b in zip(*pair, strict=True)] for pair in zip(parts[1], parts[3], strict=True)]
     if "+" in parts:
         at = parts.index("+")
         pairs = zip(_value(parts[:at]), _value(parts[at + 1 :]), strict=True)

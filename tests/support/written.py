@@ -49,18 +49,6 @@ def pose(random: Random) -> dict[str, Any]:
     return made | ({"inverse": "true"} if random.random() < 0.2 else {})
 
 
-def vectors(random: Random, *names: str) -> dict[str, dict[str, float]]:
-    """Draw vectors as maps, as messages have them."""
-    return {name: dict(zip("xyz", position(random), strict=True)) for name in names}
-
-
 def record(random: Random) -> dict[str, Any]:
-    """Draw a point, a vector, a pose, a twist or a wrench, with and without covariance."""
-    root = [[random.uniform(-1.0, 1.0) for _ in range(6)] for _ in range(6)]
-    covariance = {"covariance": [sum(x * y for x, y in zip(a, b, strict=True)) for a in root for b in root]}
-    orientation = {"orientation": dict(zip("xyzw", random.choice(ROTATIONS), strict=True))}
-    return random.choice((
-        {"point": position(random)}, {"vector": position(random)}, pose(random), vectors(random, "linear", "angular"),
-        vectors(random, "force", "torque"), {"pose": {"pose": vectors(random, "position") | orientation} | covariance},
-        {"twist": {"twist": vectors(random, "linear", "angular")} | covariance},
-    ))  # fmt: skip
+    """Draw a point, a vector or a pose."""
+    return random.choice(({"point": position(random)}, {"vector": position(random)}, pose(random)))
