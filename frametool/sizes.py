@@ -14,4 +14,3 @@ GROUP = 3 << 26  # bytes of a group of rows of a column file that is read as a w
 PIECE = 1 << 20  # bytes of a file of documents that are read at once
 STRETCH = 1 << 17  # characters of a recording that are parsed at once
 ASIDE = 1 << 16  # characters of YAML: plain lists in shorter texts are not worth a separate reader
-PAGE = 512  # samples of an edge over time: a longer page is split when a late sample falls into it

@@ -78,16 +78,16 @@ class TransformBuffer(Frames):
             and -1e300 < sum(components) < 1e300  # finite
         ):  # fmt: skip
             if track.last_ns < stamp_ns:
-                page = track.tail
-                page.stamps.append(stamp_ns)
-                page.parents.append(parent)
-                page.samples.append(components)
+                track.stamps.append(stamp_ns)
+                track.parents.append(parent)
+                track.samples.append(components)
                 track.last_ns = stamp_ns
                 track.table = None
                 if track.known is not None:
                     track.known.add(stamp_ns)
                 return False
-            if track.add_if_new(stamp_ns, components):
+            if not track.has(stamp_ns):
+                track.add(stamp_ns, parent, components)
                 return False
         topology.check_edge(parent, child, components)
         static = stamp_ns is None if static is None else static
@@ -135,11 +135,12 @@ class TransformBuffer(Frames):
         """Add a further sample of a moving frame; return True if it replaced another one."""
         if self.keep_ns is not None:
             _check_age(track, stamp_ns, self.keep_ns)
-        if known := track.samples_at(stamp_ns):
-            self._varies = self._varies or parent != known[-1][0]
-            self._queries.clear()
-            if known[-1] == (parent, components):
+        if track.has(stamp_ns):
+            known = track.sample_at(stamp_ns)
+            if known == (parent, components):
                 return False
+            self._varies = self._varies or parent != known[0]
+            self._queries.clear()
             track.replace(stamp_ns, parent, components)
             return True
         if parent != track.parent:
