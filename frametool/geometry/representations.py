@@ -6,19 +6,17 @@ kernels this calls, nowhere else. Knows no file syntax.
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf, isfinite, tau
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
 from frametool.geometry import euler, floats, matrix, quaternion, vectors
 
-TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from typing import Any
 
     from frametool.geometry.types import Components, Kernel, Namespace, Quaternion
-
-    Check = Callable[..., Components]
 
 LIST, MAP, NAMED, ROWS = "list", "map", "named", "rows"  # how documents hold the numbers of a rotation
 NAMED_AXES = "AXES"
@@ -26,7 +24,7 @@ WORLDS = ("enu", "ned")  # of a heading: how the axes of the frame lie in which 
 OF_WORLD = "enu|ned"
 
 
-class Whole:
+class Whole(NamedTuple):
     """How a notation writes a whole pose, position and rotation in one: the 4x4 matrix.
 
     columns: names of its numbers, in their order
@@ -35,23 +33,17 @@ class Whole:
     tail: the constant last numbers
     """
 
-    __slots__ = ("columns", "join", "split", "tail")
-
-    def __init__(
-        self, columns: str, join: Callable[..., Components], split: Callable[..., Any], tail: tuple[float, ...] = ()
-    ) -> None:
-        """Describe the numbers of a pose."""
-        self.columns = tuple(columns.split())
-        self.join = join
-        self.split = split
-        self.tail = tail
+    columns: tuple[str, ...]
+    join: Callable[..., Components]
+    split: Callable[..., Any]
+    tail: tuple[float, ...] = ()
 
 
 def _no_rotation(*_: Any) -> Any:
     raise ValueInvalid("a place is not a rotation")
 
 
-class BatchRule:
+class BatchRule(NamedTuple):
     """How many rows of a notation are checked at once, if not every finite row is a rotation.
 
     what: what the rows are, in the plural
@@ -64,112 +56,73 @@ class BatchRule:
         printed digit of each number; None if there is nothing to explain
     """
 
-    __slots__ = ("deviation", "exact", "explained", "furthest", "repair", "what")
-
-    def __init__(
-        self, what: str, deviation: Callable[..., Any], furthest: Callable[..., float], repair: Kernel, exact: float,
-        explained: Callable[..., Any] | None = None,
-    ) -> None:  # fmt: skip
-        """Store the kernels."""
-        self.what = what
-        self.deviation = deviation
-        self.furthest = furthest
-        self.repair = repair
-        self.exact = exact
-        self.explained = explained
+    what: str
+    deviation: Callable[..., Any]
+    furthest: Callable[..., float]
+    repair: Kernel
+    exact: float
+    explained: Callable[..., Any] | None = None
 
 
-class Representation:
+class Representation(NamedTuple):
     """One notation and everything that is known about it; no other list or table names it.
 
     columns: bare names of its numbers, in tables and messages; angles: the indices of those that are angles
     summary, label: a line of help; its name in text for people
-    names: short names of its numbers, for people and as keys of a map
-    shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or a dict of
-        the keys of a map with the number of values of each
+    forward, backward: kernels (components, xp, degrees, axes) to and from a quaternion
+    check: takes the components of one rotation, and `normalize`; None if any finite numbers are a rotation
+    kept: takes a unit quaternion and preserves its sign; None if the notation has no such sign
+    short: short names of its numbers, for people and as keys of a map; () for x y z, if there are three
+    shape: how documents hold the numbers: LIST, MAP (a list is accepted too), NAMED (a map only), ROWS, or the
+        keys of a map, each with the number of its values
     axes: Euler axes: "" none, NAMED_AXES if the user names them, else the fixed ones; OF_WORLD: one of WORLDS
     whole: how it holds the position too, if it can; searched: whether headers are searched for its columns
     alone: columns that suffice for the last number if the others are missing and 0
     batch: how many rows are checked at once; without it rows are refused whose quaternion is not finite
     in_degrees: whether its angles are degrees if their name states no unit
     overview: the units in which an overview shows it ("" for no unit)
-    is_place: it is a position on the Earth and not a rotation: a row of POSITIONS
-    on_earth: it is such a position, or a heading
     kernels: for a position the `module:name` of its arithmetic, a `place.Kernels`
     """
 
-    __slots__ = (
-        "_backward", "_check", "_forward", "_kept", "alone", "angles", "axes", "batch", "columns", "in_degrees",
-        "is_place", "kernels", "label", "name", "names", "on_earth", "overview", "searched", "shape", "summary",
-        "whole",
-    )  # fmt: skip
-
-    def __init__(
-        self, columns: str, angles: tuple[int, ...], summary: str, *,
-        forward: Callable[..., Any] = _no_rotation, backward: Callable[..., Any] = _no_rotation,
-        check: Check | None = None, kept: Callable[..., Components] | None = None,
-        shape: str | dict[str, int] = LIST, names: str = "", label: str = "", axes: str = "",
-        whole: Whole | None = None, searched: bool = True, alone: str = "", overview: tuple[str, ...] = (),
-        in_degrees: bool = False, batch: BatchRule | None = None, kernels: str = "",
-    ) -> None:  # fmt: skip
-        """Describe a notation.
-
-        forward, backward: take (components, xp, degrees, axes)
-        check: takes the components of one rotation, and `normalize`; None if any finite numbers are a rotation
-        kept: takes a unit quaternion and preserves its sign; None if the notation has no such sign
-        """
-        self.name = ""
-        self.columns = tuple(columns.split())
-        self.angles = angles
-        self.summary = summary
-        self.shape = shape
-        self.names = tuple(names.split()) or (("x", "y", "z") if len(self.columns) == 3 else ("",) * len(self.columns))
-        self.label = label
-        self.axes = axes
-        self.whole = whole
-        self.searched = searched
-        self.alone = tuple(alone.split())
-        self.in_degrees = in_degrees
-        self.overview = overview
-        self._forward = forward
-        self._backward = backward
-        self._check = check
-        self._kept = kept
-        self.batch = batch
-        self.is_place = forward is _no_rotation
-        self.on_earth = self.is_place or axes == OF_WORLD
-        self.kernels = kernels
-
-    def __repr__(self) -> str:
-        """Show the name."""
-        return f"<representation {self.name}>"
+    columns: tuple[str, ...]
+    angles: tuple[int, ...]
+    summary: str
+    forward: Callable[..., Any] = _no_rotation
+    backward: Callable[..., Any] = _no_rotation
+    check: Callable[..., Components] | None = None
+    kept: Callable[..., Components] | None = None
+    shape: str | tuple[tuple[str, int], ...] = LIST
+    short: tuple[str, ...] = ()
+    label: str = ""
+    axes: str = ""
+    whole: Whole | None = None
+    searched: bool = True
+    alone: tuple[str, ...] = ()
+    overview: tuple[str, ...] = ()
+    in_degrees: bool = False
+    batch: BatchRule | None = None
+    kernels: str = ""
+    name: str = ""
 
     @property
-    def can_fail(self) -> bool:
-        """Return True if finite numbers may not be a rotation (norm, axis, matrix); three angles always are."""
-        return self._check is not None
+    def names(self) -> tuple[str, ...]:
+        """Return the short names of its numbers, "" for those that have none."""
+        return self.short or (("x", "y", "z") if len(self.columns) == 3 else ("",) * len(self.columns))
+
+    @property
+    def is_place(self) -> bool:
+        """Return True if it is a position on the Earth and not a rotation: a row of POSITIONS."""
+        return self.forward is _no_rotation
+
+    @property
+    def on_earth(self) -> bool:
+        """Return True if it is such a position, or a heading."""
+        return self.is_place or self.axes == OF_WORLD
 
     @property
     def spelling(self) -> str:
         """Return the name as help shows it."""
         return f"{self.name}:{self.axes}" if self.axes in (NAMED_AXES, OF_WORLD) else self.name
-
-    def to_quaternion(
-        self, components: Components, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz"
-    ) -> Quaternion:
-        """Return x, y, z, w of components in column order; `degrees` applies to angle columns only, `axes` to Euler."""
-        result: Quaternion = self._forward(components, xp, degrees, axes)
-        return result
-
-    def from_quaternion(
-        self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, axes: str = "sxyz",
-        keep_sign: bool = False,
-    ) -> Components:  # fmt: skip
-        """Return the components in column order of a unit quaternion; `keep_sign` preserves a quaternion's sign."""
-        if keep_sign and self._kept is not None:
-            return self._kept(x, y, z, w)
-        result: Components = self._backward((x, y, z, w), xp, degrees, axes)
-        return result
 
     def checked(self, components: Sequence[float], *, normalize: bool = False) -> Components:
         """Check the floats of one rotation; return them, corrected to a rotation.
@@ -180,8 +133,8 @@ class Representation:
         if len(components) != len(self.columns):
             expected = f"{len(self.columns)} numbers ({' '.join(self.columns)})"
             raise ValueInvalid(f"{self.name} takes {expected}, found {len(components)}")
-        if self._check is not None:
-            return self._check(*components, normalize=normalize)
+        if self.check is not None:
+            return self.check(*components, normalize=normalize)
         if not all(map(isfinite, components)):
             shown = " ".join(f"{value:g}" for value in components)
             raise ValueInvalid(f"{self.name} {shown} is not finite; give finite numbers", rule="not-finite")
@@ -208,26 +161,18 @@ def _xyzw(x: Any, y: Any, z: Any, w: Any) -> Quaternion:
     return x, y, z, w
 
 
-def _from_wxyz(w: Any, x: Any, y: Any, z: Any) -> Quaternion:
-    return x, y, z, w
-
-
 def _wxyz(x: Any, y: Any, z: Any, w: Any) -> Components:
     return w, x, y, z
 
 
-def _in_wxyz(kernel: Kernel) -> Kernel:
-    """Return a kernel of w, x, y, z made from a kernel of x, y, z, w."""
-    return lambda w, x, y, z, *xp, **options: _wxyz(*kernel(x, y, z, w, *xp, **options))
-
-
-def _as_wxyz(x: Any, y: Any, z: Any, w: Any, xp: Namespace) -> Components:
-    return _wxyz(*quaternion.from_quaternion(x, y, z, w, xp))
-
-
 def _of_wxyz(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function of w, x, y, z made from a function of x, y, z, w."""
-    return lambda w, x, y, z, xp: kernel(x, y, z, w, xp)
+    """Return a kernel of w, x, y, z made from one of x, y, z, w."""
+    return lambda w, x, y, z, *xp, **options: kernel(x, y, z, w, *xp, **options)
+
+
+def _as_wxyz(kernel: Kernel) -> Kernel:
+    """Return a kernel with results w, x, y, z made from one with results x, y, z, w."""
+    return lambda *components, **options: _wxyz(*kernel(*components, **options))
 
 
 def _of_heading(components: Components, xp: Namespace, degrees: bool, axes: str) -> Quaternion:  # noqa: FBT001 - all do
@@ -246,10 +191,6 @@ def _heading(rotation: Quaternion, xp: Namespace, degrees: bool, axes: str) -> C
     return ((turn / 4.0 - yaw if axes == "enu" else yaw) % turn % turn,)  # -1e-17 % 360 is 360
 
 
-def _check_mrp(*parameters: float, normalize: bool = False) -> Components:
-    return vectors.check_rotvec(*parameters, normalize=normalize, what="mrp")
-
-
 def _homogeneous(position: Components, rows: Components) -> Components:
     upper = [number for row, moved in enumerate(position) for number in (*rows[3 * row : 3 * row + 3], moved)]
     return (*upper, *LAST_ROW)
@@ -265,7 +206,7 @@ def _of_homogeneous(m: Components) -> tuple[Components, Components]:
 
 LAST_ROW = (0.0, 0.0, 0.0, 1.0)  # of a homogeneous matrix
 HOMOGENEOUS = Whole(
-    "m11 m12 m13 m14 m21 m22 m23 m24 m31 m32 m33 m34 m41 m42 m43 m44", _homogeneous, _of_homogeneous, LAST_ROW
+    tuple(f"m{row}{column}" for row in range(1, 5) for column in range(1, 5)), _homogeneous, _of_homogeneous, LAST_ROW
 )
 QUATERNIONS = BatchRule(
     "quaternions", quaternion.deviation, quaternion.furthest, quaternion.repaired, quaternion.UNIT,
@@ -274,95 +215,101 @@ QUATERNIONS = BatchRule(
 MATRICES = BatchRule(
     "matrices", matrix.deviation, matrix.furthest, matrix.nearest, matrix.ORTHONORMAL, matrix.explained
 )
+RPY, EULER_COLUMNS = ("roll", "pitch", "yaw"), ("euler_1", "euler_2", "euler_3")
+XYZW = Representation(
+    ("qx", "qy", "qz", "qw"), (), "unit quaternion, scalar last", short=("x", "y", "z", "w"), label="quaternion",
+    forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
+    batch=QUATERNIONS,
+)  # fmt: skip
 
-REPRESENTATIONS: dict[str, Representation] = {
-    "quaternion": Representation(
-        "qx qy qz qw", (), "unit quaternion, named x y z w", names="x y z w", shape=NAMED, overview=("",),
-        forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
-        batch=QUATERNIONS,
+
+def _named(table: dict[str, Representation]) -> dict[str, Representation]:
+    return {name: row._replace(name=name) for name, row in table.items()}
+
+
+ROTATIONS = _named({
+    "quaternion": XYZW._replace(
+        summary="unit quaternion, named x y z w", label="", shape=NAMED, overview=("",)
     ),
-    "xyzw": Representation(
-        "qx qy qz qw", (), "unit quaternion, scalar last", names="x y z w", label="quaternion",
-        forward=_arithmetic(_xyzw), backward=_plain(quaternion.from_quaternion), check=quaternion.check, kept=_xyzw,
-        batch=QUATERNIONS,
-    ),
+    "xyzw": XYZW,
     "wxyz": Representation(
-        "qw qx qy qz", (), "unit quaternion, scalar first", names="w x y z", label="quaternion",
-        forward=_arithmetic(_from_wxyz), backward=_plain(_as_wxyz), check=_in_wxyz(quaternion.check), kept=_wxyz,
-        batch=BatchRule(
-            "quaternions", _of_wxyz(quaternion.deviation), _of_wxyz(quaternion.furthest),
-            _in_wxyz(quaternion.repaired), quaternion.UNIT, quaternion.explained,
+        ("qw", "qx", "qy", "qz"), (), "unit quaternion, scalar first", short=("w", "x", "y", "z"), label="quaternion",
+        forward=_arithmetic(_of_wxyz(_xyzw)), backward=_plain(_as_wxyz(quaternion.from_quaternion)),
+        check=_as_wxyz(_of_wxyz(quaternion.check)), kept=_wxyz,
+        batch=QUATERNIONS._replace(
+            deviation=_of_wxyz(quaternion.deviation), furthest=_of_wxyz(quaternion.furthest),
+            repair=_as_wxyz(_of_wxyz(quaternion.repaired)),
         ),
     ),
     "rpy": Representation(
-        "roll pitch yaw", (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
-        names="roll pitch yaw", shape=MAP, axes="sxyz", alone="yaw theta", overview=("_rad", "_deg"),
+        RPY, (0, 1, 2), "roll, pitch, yaw about the fixed axes x, y, z (URDF, tf2 setRPY)",
+        short=RPY, shape=MAP, axes="sxyz", alone=("yaw", "theta"), overview=("_rad", "_deg"),
         forward=_euler(euler.to_quaternion), backward=_euler(euler.from_quaternion),
     ),
     "euler": Representation(
-        "euler_1 euler_2 euler_3", (0, 1, 2), "three angles in the order of euler:AXES, s fixed or r rotating axes",
-        names="euler_1 euler_2 euler_3", shape={"angles": 3}, axes=NAMED_AXES, searched=False,
+        EULER_COLUMNS, (0, 1, 2), "three angles in the order of euler:AXES, s fixed or r rotating axes",
+        short=EULER_COLUMNS, shape=(("angles", 3),), axes=NAMED_AXES, searched=False,
         forward=_euler(euler.to_quaternion), backward=_euler(euler.from_quaternion),
     ),
     "axis_angle": Representation(
-        "axis_x axis_y axis_z angle", (3,), "axis of any length, then the angle about it",
-        names="x y z angle", label="axis-angle", shape={"axis": 3, "angle": 1}, overview=("_rad",),
+        ("axis_x", "axis_y", "axis_z", "angle"), (3,), "axis of any length, then the angle about it",
+        short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)), overview=("_rad",),
         forward=_angular(vectors.from_axis_angle), backward=_angular(vectors.as_axis_angle),
         check=vectors.check_axis_angle,
     ),
     "rotvec": Representation(
-        "rotvec_x rotvec_y rotvec_z", (0, 1, 2), "rotation vector: unit axis times angle", label="rotation vector",
+        ("rotvec_x", "rotvec_y", "rotvec_z"), (0, 1, 2), "rotation vector: unit axis times angle",
+        label="rotation vector",
         forward=_angular(vectors.from_rotvec), backward=_angular(vectors.as_rotvec), check=vectors.check_rotvec,
     ),
     "matrix": Representation(
-        "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "rotation matrix, row by row",
+        ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"), (), "rotation matrix, row by row",
         shape=ROWS, whole=HOMOGENEOUS, overview=("",),
         forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
         batch=MATRICES,
     ),
     "mrp": Representation(
-        "mrp_x mrp_y mrp_z", (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(vectors.from_mrp), backward=_plain(vectors.as_mrp), check=_check_mrp,
+        ("mrp_x", "mrp_y", "mrp_z"), (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
+        forward=_arithmetic(vectors.from_mrp), backward=_plain(vectors.as_mrp),
+        check=partial(vectors.check_rotvec, what="mrp"),
     ),
     "six_d": Representation(
-        "r11 r21 r31 r12 r22 r32", (), "first two columns of the matrix (Zhou's continuous 6D)", label="6d",
-        searched=False,
+        ("r11", "r21", "r31", "r12", "r22", "r32"), (), "first two columns of the matrix (Zhou's continuous 6D)",
+        label="6d", searched=False,
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
         batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
     ),
     "rpy_unreal": Representation(
-        "roll pitch yaw", (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",
-        names="roll pitch yaw", shape=MAP, axes="sxyz", alone="yaw", searched=False, in_degrees=True,
+        RPY, (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",
+        short=RPY, shape=MAP, axes="sxyz", alone=("yaw",), searched=False, in_degrees=True,
         forward=_angular(euler.from_unreal), backward=_angular(euler.as_unreal),
     ),
     "euler_unity": Representation(
-        "euler_x euler_y euler_z", (0, 1, 2), "degrees, Unity's Quaternion.Euler: about z, then x, then y",
+        ("euler_x", "euler_y", "euler_z"), (0, 1, 2), "degrees, Unity's Quaternion.Euler: about z, then x, then y",
         axes="szxy", searched=False, in_degrees=True,
         forward=_angular(euler.from_unity), backward=_angular(euler.as_unity),
     ),
-}  # fmt: skip
+})  # fmt: skip
 PLACE = "frametool.geometry.place"
-POSITIONS = {
-    "lla": Representation("lat lon alt", (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
-                          names="lat lon alt", kernels=f"{PLACE}:LLA_KERNELS"),
-    "ecef": Representation("ecef_x ecef_y ecef_z", (), "the Earth's frame: x to lat 0 lon 0, z to the north pole",
-                           kernels=f"{PLACE}:ECEF_KERNELS"),
-    "utm": Representation("utm_zone easting northing alt", (), "UTM, a zone as 32N or 32S and metres",
-                          names="zone easting northing alt", kernels=f"{PLACE}:UTM_KERNELS"),
-    "enu": Representation("east north up", (), "metres east, north, up of --origin", names="east north up",
-                          kernels=f"{PLACE}:LOCAL_KERNELS"),
-    "ned": Representation("north east down", (), "metres north, east, down of --origin", names="north east down",
-                          kernels=f"{PLACE}:LOCAL_KERNELS"),
-}  # fmt: skip
+UTM_NAMES = ("zone", "easting", "northing", "alt")
+POSITIONS = _named({
+    "lla": Representation(("lat", "lon", "alt"), (), "WGS84 latitude, longitude (degrees), metres above the ellipsoid",
+                          short=("lat", "lon", "alt"), kernels=f"{PLACE}:LLA_KERNELS"),
+    "ecef": Representation(("ecef_x", "ecef_y", "ecef_z"), (),
+                           "the Earth's frame: x to lat 0 lon 0, z to the north pole", kernels=f"{PLACE}:ECEF_KERNELS"),
+    "utm": Representation(("utm_zone", *UTM_NAMES[1:]), (), "UTM, a zone as 32N or 32S and metres",
+                          short=UTM_NAMES, kernels=f"{PLACE}:UTM_KERNELS"),
+    "enu": Representation(("east", "north", "up"), (), "metres east, north, up of --origin",
+                          short=("east", "north", "up"), kernels=f"{PLACE}:LOCAL_KERNELS"),
+    "ned": Representation(("north", "east", "down"), (), "metres north, east, down of --origin",
+                          short=("north", "east", "down"), kernels=f"{PLACE}:LOCAL_KERNELS"),
+})  # fmt: skip
 HEADING = Representation(
-    "heading", (0,), "where x points, clockwise from north, whatever the tilt; axes of the frame it is seen from",
-    axes=OF_WORLD, searched=False, forward=_of_heading, backward=_heading,
-)
+    ("heading",), (0,), "where x points, clockwise from north, whatever the tilt; axes of the frame it is seen from",
+    axes=OF_WORLD, searched=False, forward=_of_heading, backward=_heading, name="heading",
+)  # fmt: skip
 EARTH_FRAMES = ("ecef", "earth")  # one frame, by either name: that of places
-ROTATIONS = {**REPRESENTATIONS}
-REPRESENTATIONS |= {"heading": HEADING, **POSITIONS}
-for _name, _row in REPRESENTATIONS.items():
-    _row.name = _name
+REPRESENTATIONS = {**ROTATIONS, "heading": HEADING, **POSITIONS}
 
 
 class Notation:
@@ -426,16 +373,21 @@ class Notation:
 
     def to_quaternion(self, components: Components, xp: Namespace, *, degrees: bool = False) -> Quaternion:
         """Return x, y, z, w; `degrees` applies if the notation itself states no unit."""
-        unit = self.in_degrees(degrees)
-        return self.representation.to_quaternion(components, xp, degrees=unit, axes=self.bound_axes())
+        result: Quaternion = self.representation.forward(components, xp, self.in_degrees(degrees), self.bound_axes())
+        return result
 
     def from_quaternion(
         self, x: Any, y: Any, z: Any, w: Any, xp: Namespace, *, degrees: bool = False, keep_sign: bool = False
     ) -> Components:
-        """Return the components of a unit quaternion; `degrees` applies if the notation itself states no unit."""
-        return self.representation.from_quaternion(
-            x, y, z, w, xp, degrees=self.in_degrees(degrees), axes=self.bound_axes(), keep_sign=keep_sign
-        )
+        """Return the components of a unit quaternion; `degrees` applies if the notation itself states no unit.
+
+        keep_sign: preserve the sign of a quaternion
+        """
+        if keep_sign and self.representation.kept is not None:
+            return self.representation.kept(x, y, z, w)
+        unit = self.in_degrees(degrees)
+        result: Components = self.representation.backward((x, y, z, w), xp, unit, self.bound_axes())
+        return result
 
     def checked_quaternion(
         self, components: Sequence[float], xp: Namespace, *, degrees: bool = False, normalize: bool = False
@@ -462,20 +414,10 @@ class Notation:
         return Notation(self.spec, self.representation, checked_world(axes or self.axes), degrees=self.degrees)
 
 
-def _upper_rows() -> Notation:
-    """Return the notation of a pose as the first three rows of its 4x4, as in a KITTI trajectory."""
-    row = Representation(
-        "r11 r12 r13 r21 r22 r23 r31 r32 r33", (), "three rows of the matrix of a pose",
-        shape=ROWS, whole=Whole(" ".join(HOMOGENEOUS.columns[:12]), _three_rows, _of_homogeneous),
-        forward=_plain(matrix.to_quaternion), backward=_arithmetic(quaternion.to_matrix), check=matrix.check,
-        batch=MATRICES,
-    )  # fmt: skip
-    row.name = "matrix"
-    return Notation("matrix", row, None, degrees=None)
-
-
-UPPER_ROWS = _upper_rows()  # no name spells it: twelve numbers of a file say it
-
+# a pose as the first three rows of its 4x4, as in a KITTI trajectory: no name spells it, twelve numbers are it
+UPPER_ROWS = Notation("matrix", ROTATIONS["matrix"]._replace(
+    whole=Whole(HOMOGENEOUS.columns[:12], _three_rows, _of_homogeneous)
+), None, degrees=None)  # fmt: skip
 
 # of other tools
 OTHER_NAMES = {"quat": "quaternion", "ypr": "euler:rzyx", "ypr_deg": "euler_deg:rzyx", "ypr_rad": "euler_rad:rzyx"}

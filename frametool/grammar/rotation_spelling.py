@@ -138,7 +138,7 @@ def shape_of(key: str, value: Any) -> Spelled:
     shape = notation.representation.shape
     if shape == NAMED and type(value) is list:
         raise _without_order(key, notation, value)
-    return _take_parts(notation, value, shape) if isinstance(shape, dict) else SHAPES[shape](notation, value)
+    return _take_parts(notation, value, dict(shape)) if isinstance(shape, tuple) else SHAPES[shape](notation, value)
 
 
 def _read_axes(value: Any) -> Quaternion:
@@ -171,7 +171,7 @@ def read_spelled(
 def rotation_of(notation: Notation, texts: Sequence[Any], places: Sequence[Path], reading: Reading) -> Quaternion:
     """Convert one text per component into x, y, z, w, in the unit that applies, checked to be a rotation."""
     numbers, degrees = read_components(notation, texts, places, reading)
-    if not notation.representation.can_fail:
+    if notation.representation.check is None:
         return notation.to_quaternion(tuple(numbers), floats, degrees=degrees)
     return _checked(notation, numbers, reading, degrees=degrees)
 
@@ -363,10 +363,10 @@ SHAPES = {LIST: _list_or_map, MAP: _list_or_map, NAMED: _take_named, ROWS: _take
 def spelled(notation: Notation, numbers: Sequence[float]) -> Any:
     """Return the numbers of a rotation, or of a whole pose, in the shape that `shape_of` splits."""
     row = notation.representation
-    if isinstance(row.shape, dict):
+    if isinstance(row.shape, tuple):
         entry: dict[str, Any] = {"axes": notation.axes} if row.axes == NAMED_AXES else {}
         first = 0
-        for key, count in row.shape.items():
+        for key, count in row.shape:
             entry[key] = list(numbers[first : first + count]) if count > 1 else numbers[first]
             first += count
         return entry

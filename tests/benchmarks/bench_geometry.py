@@ -23,7 +23,7 @@ from scipy.spatial.transform import RigidTransform, Slerp
 from scipy.spatial.transform import Rotation as Peer
 
 from frametool.geometry import floats
-from frametool.geometry.representations import ROTATIONS
+from frametool.geometry.representations import ROTATIONS, notation
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -188,7 +188,8 @@ def scalar_cases() -> dict[str, Callable[[], Any]]:
     cases: dict[str, Callable[[], Any]] = {"rotation compose": lambda: a @ b, "transform compose": lambda: s @ t}
     cases["transform inverse"] = s.inverse
     q = Rotation.from_rpy([0.1, 0.2, 0.3]).components
-    for name, row in ROTATIONS.items():
+    for name in ROTATIONS:
+        row = notation("euler:sxyz" if name == "euler" else name)
         parts = row.from_quaternion(*q, floats)
         cases[f"{name} -> quaternion"] = partial(row.to_quaternion, parts, floats)
         cases[f"quaternion -> {name}"] = partial(row.from_quaternion, *q, floats)

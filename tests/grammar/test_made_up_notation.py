@@ -22,17 +22,15 @@ def from_quaternion(quaternion, _xp, _degrees, _axes):
     x, y, z, w = quaternion
     return x / w, y / w, z / w
 
-seven = Whole("s_1 s_2 s_3 s_4 s_5 s_6 s_7", lambda p, q: (*p, *q), lambda n: (tuple(n[:3]), tuple(n[3:])))
+seven = Whole(tuple("s_1 s_2 s_3 s_4 s_5 s_6 s_7".split()), lambda p, q: (*p, *q), lambda n: (tuple(n[:3]), tuple(n[3:])))
 REPRESENTATIONS["gibbs"] = ROTATIONS["gibbs"] = Representation(
-    "gibbs_x gibbs_y gibbs_z", (), "Gibbs vector: axis times tan(angle/2)", label="Gibbs vector", overview=("",),
-    forward=to_quaternion, backward=from_quaternion,
+    ("gibbs_x", "gibbs_y", "gibbs_z"), (), "Gibbs vector: axis times tan(angle/2)", label="Gibbs vector", overview=("",),
+    forward=to_quaternion, backward=from_quaternion, name="gibbs",
 )
 REPRESENTATIONS["seven"] = ROTATIONS["seven"] = Representation(
-    "u_1 u_2 u_3 u_4", (), "position and quaternion in one", whole=seven,
-    forward=lambda n, _xp, _degrees, _axes: n, backward=lambda q, _xp, _degrees, _axes: q,
+    ("u_1", "u_2", "u_3", "u_4"), (), "position and quaternion in one", whole=seven,
+    forward=lambda n, _xp, _degrees, _axes: n, backward=lambda q, _xp, _degrees, _axes: q, name="seven",
 )
-for name in ("gibbs", "seven"):
-    ROTATIONS[name].name = name
 from frametool.cli import run
 sys.exit(run(sys.argv[1:]))
 """

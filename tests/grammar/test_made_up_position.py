@@ -16,9 +16,8 @@ import sys
 from frametool.geometry.representations import POSITIONS, REPRESENTATIONS, Representation
 
 POSITIONS["web"] = REPRESENTATIONS["web"] = Representation(
-    "web_x web_y", (), "Web Mercator", names="web_x web_y", kernels="toy_web:WEB"
+    ("web_x", "web_y"), (), "Web Mercator", short=("web_x", "web_y"), kernels="toy_web:WEB", name="web"
 )
-POSITIONS["web"].name = "web"
 from frametool.cli import run
 sys.exit(run(sys.argv[1:]))
 """

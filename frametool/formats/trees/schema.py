@@ -114,7 +114,7 @@ def _of_key(key: str) -> Schema:
 def _rotation(notation: Notation) -> Schema:
     row = notation.representation
     about = row.summary + (UNIT[notation.degrees] if row.angles else "")
-    if isinstance(row.shape, dict) or row.shape == NAMED:
+    if isinstance(row.shape, tuple) or row.shape == NAMED:
         return {"type": ["object", "array"], "description": about}
     return _numbers(row.names if row.shape == MAP else (), about)
 
