@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 from collections import Counter
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -355,10 +354,7 @@ class GroupWriter:
 
 # --- Arrow IPC: batches as a file with a directory at its end (Feather) ---
 
-BODY_AT = 8  # after the magic and two bytes of padding
-MESSAGE = b"\xff\xff\xff\xff"  # the start of each message
-CODECS = ("lz4", "zstd")
-RECORD_BATCH = 3
+CODECS = {b"\x04\x22\x4d\x18": "lz4", b"\x28\xb5\x2f\xfd": "zstd"}
 
 
 class IpcFile(ArrowFile):
@@ -367,7 +363,7 @@ class IpcFile(ArrowFile):
     def opened(self, file: InputFile) -> Any:
         """Open the file and return its schema."""
         ipc = require_pyarrow(self.name, "ipc")
-        self.codec = codec_in(file.head()[BODY_AT:])
+        self.codec = codec_in(file.head())
         self.source = self.random_access(file)
         self.reader = ipc.open_file(self.source)
         return self.reader.schema
@@ -401,43 +397,8 @@ def bytes_of(rows: Any) -> int:
 
 
 def codec_in(data: bytes) -> str | None:
-    """Return the compression of the first batch of rows, if it is within the first bytes.
-
-    Source: format/Message.fbs and File.fbs of Arrow; a message is a flatbuffer after its length.
-    """
-    at = 0
-    with suppress(struct.error, IndexError):
-        while data[at : at + 4] == MESSAGE:
-            (size,) = struct.unpack_from("<i", data, at + 4)
-            message = memoryview(data)[at + 8 : at + 8 + size]
-            root = struct.unpack_from("<i", message, 0)[0]
-            body = _number(message, root, 3, "<q")
-            if _number(message, root, 1, "<B") == RECORD_BATCH:
-                batch = _table(message, root, 2)
-                compressed = _place(message, batch, 3)
-                return CODECS[_number(message, _table(message, batch, 3), 0, "<b")] if compressed else None
-            at += 8 + size + body
-    return None
-
-
-def _place(message: memoryview, table: int, field: int) -> int:
-    """Return the position of a field of a table; 0 if it is missing."""
-    directory = table - struct.unpack_from("<i", message, table)[0]
-    (size,) = struct.unpack_from("<H", message, directory)
-    entry = 4 + 2 * field
-    offset = struct.unpack_from("<H", message, directory + entry)[0] if entry < size else 0
-    return table + offset if offset else 0
-
-
-def _number(message: memoryview, table: int, field: int, fmt: str) -> int:
-    """Return a number of a table, 0 if it is missing."""
-    place = _place(message, table, field)
-    return int(struct.unpack_from(fmt, message, place)[0]) if place else 0
-
-
-def _table(message: memoryview, table: int, field: int) -> int:
-    """Return the position of a table in a table."""
-    return _place(message, table, field) + _number(message, table, field, "<i")
+    """Return the compression of the first batch of rows, if it is within the first bytes, by its magic number."""
+    return next((codec for magic, codec in CODECS.items() if magic in data), None)
 
 
 class IpcWriter(GroupWriter):

@@ -70,9 +70,9 @@ class CloudFile(column_file.ColumnFile):
         if self.behind and len(self.behind) == self.record.itemsize:
             raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)
 
-    def rest(self) -> Iterable[bytes]:
+    def rest(self) -> Iterator[bytes]:
         """Yield the rest of the file after the points."""
-        return (self.behind,)
+        return iter((self.behind,))
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
         """Return the header with changes, and everything before the points; raises ValueInvalid."""

@@ -94,7 +94,8 @@ class Batch(Protocol):
 
     def numbers(self, place: int) -> ColumnNumbers:
         """Return a column as floats; a null may be any number."""
-        return ColumnNumbers(self.column(place).astype(np.float64))
+        with np.errstate(invalid="ignore"):  # a signalling nan
+            return ColumnNumbers(self.column(place).astype(np.float64))
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
         """Return a column as nanoseconds, and why rows have none; in_ns: as in `whole_stamps`.

@@ -20,9 +20,9 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from itertools import chain, takewhile
+from itertools import takewhile
 from math import log
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from frametool.geometry.rigid import EXACT, SCALED
 from frametool.grammar.names import NORMALS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from typing import BinaryIO
 
     from frametool.documents.source import InputFile
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from frametool.grammar.edges import Options
     from frametool.grammar.result import Style
 
-    Ends = Literal["little", "big"]
     Fail = Callable[[str], FormatError]
 
 FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -78,13 +77,7 @@ class PlyElement(NamedTuple):
     @property
     def size(self) -> int:
         """Return the size of one instance without list properties."""
-        return sum(width for width, _, _ in self.sizes)
-
-    @property
-    def sizes(self) -> list[tuple[int, int, bool]]:
-        """Return the bytes of a value of each property, those of a list's count (0: not a list), and its sign."""
-        codes = self.properties.values()
-        return [(int(code[1:]), int(counted[1:] or 0), counted[:1] == "i") for code, counted in codes]
+        return sum(int(code[1:]) for code, _ in self.properties.values())
 
 
 def read_head(stream: BinaryIO, source: str) -> tuple[bytes, str, list[PlyElement]]:
@@ -140,72 +133,6 @@ def _add_property(element: PlyElement, words: Sequence[str], fail: Fail) -> None
     if is_list and codes[0][0] == "f":
         raise fail(f"{shown(types[0])} counts the values of a list; it has to be an integer")
     element.properties[name] = codes[-1], codes[0] if is_list else ""
-
-
-# --- the data after the vertices of a binary file are followed row by row, to detect a truncated file ---
-
-_SHORT = 16  # rows of one length that are followed singly before more are checked together
-_LOST = "the rest of the file does not fit its header: {}; is it whole?"
-
-
-def _passing(elements: Sequence[PlyElement], order: str, stream: Iterable[bytes], fail: Fail) -> Iterator[bytes]:
-    """Yield the pieces of a stream; raises FormatError if they end too early, or continue after the last row."""
-    ends: Ends = "little" if order == "<" else "big"
-    waiting = [(each, each.instances) for each in reversed(elements)]
-    data, at = b"", 0  # unprocessed data, and the start of the next row, possibly after it
-    for piece in chain(stream, (b"",)):
-        data, at = data[at:] + piece, max(at - len(data), 0)
-        while waiting and at <= len(data):
-            element, left = waiting.pop()
-            at, left = _followed(element, ends, data, at, left, fail)
-            if left:
-                waiting.append((element, left))
-                break
-        yield piece
-    if waiting or at > len(data):
-        raise fail(_LOST.format("it ends too early"))
-    if data[at:].strip():
-        raise fail(_LOST.format(f"{len(data) - at} bytes too many"))
-
-
-def _followed(element: PlyElement, ends: Ends, data: bytes, at: int, left: int, fail: Fail) -> tuple[int, int]:
-    """Return the end of the rows of an element that begin in the data, possibly after it, and the number left."""
-    if not element.lists:
-        return at + left * element.size, 0
-    sizes, alike, size = element.sizes, 0, 0
-    while left and at <= len(data):
-        end = at
-        for width, counted, is_signed in sizes:
-            values = 1
-            if counted:
-                if end + counted > len(data):
-                    return at, left
-                values = data[end] if counted == 1 else int.from_bytes(data[end : end + counted], ends)
-                if is_signed and values >> (8 * counted - 1):
-                    raise fail(_LOST.format(f"a list in {element.name!r} has fewer than no values"))
-            end += counted + values * width
-        alike = alike + 1 if end - at == size else 1
-        size = end - at
-        rows = _alike(sizes, ends, data[at : at + min(left, 8 * alike) * size], size) if alike >= _SHORT else 1
-        alike += rows - 1
-        at += rows * size
-        left -= rows
-    return at, left
-
-
-def _alike(sizes: Sequence[tuple[int, int, bool]], ends: Ends, data: bytes, size: int) -> int:
-    """Count the rows whose lists are as long as those of the first: most meshes have triangles."""
-    rows = len(data) // size
-    if rows < _SHORT:
-        return 1
-    table = np.frombuffer(data, np.uint8, rows * size).reshape(rows, size)
-    same = np.ones(rows, np.bool_)
-    place = 0
-    for width, counted, _ in sizes:
-        found = table[:, place : place + counted]
-        same &= (found == found[0]).all(axis=1)
-        place += counted + (int.from_bytes(found[0].tobytes(), ends) if counted else 1) * width
-    return rows if same.all() else int(np.argmin(same))
 
 
 class PlyFile(clouds.CloudFile):
@@ -291,14 +218,11 @@ class PlyFile(clouds.CloudFile):
         for column, values in zip(columns, turned, strict=True):
             column[:] = values
 
-    def rest(self) -> Iterable[bytes]:
-        """Yield everything after the vertices."""
+    def rest(self) -> Iterator[bytes]:
+        """Yield everything after the vertices; binary data are copied unchecked."""
         if self.is_last:
-            return (self.behind,)
-        if self.text is not None:
-            return self._counted(self.text)
-        fail = partial(FormatError, source=self.file.name)
-        return _passing(self.after, self.order, column_file.pieces(self.file.stream), fail)
+            return iter((self.behind,))
+        return column_file.pieces(self.file.stream) if self.text is None else self._counted(self.text)
 
     def _counted(self, text: clouds.TextRows) -> Iterator[bytes]:
         """Yield the lines of the other elements; raises FormatError if their number differs from the header's."""
