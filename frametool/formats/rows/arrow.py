@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from importlib import import_module
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ import numpy as np
 from frametool import sizes
 from frametool.documents.json import dump
 from frametool.documents.source import Verbatim
-from frametool.errors import FileProblem, FormatError, ValueInvalid, printable, shown, warn
+from frametool.errors import FileProblem, FormatError, ValueInvalid, shown, warn
 from frametool.formats.rows import column_file
 from frametool.frames.stamps import SUFFIXES
 from frametool.text.parse import nanoseconds_of
@@ -173,17 +173,6 @@ NULLS = True  # its columns may hold nulls
 AT_ONCE = 1 << 16  # rows of a batch: results stay near the cache
 
 
-@contextmanager
-def translated(name: str) -> Iterator[None]:
-    """Convert any exception of pyarrow for a broken file into one line; raises FormatError."""
-    pa = require_pyarrow(name)
-    try:
-        yield
-    except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError, MemoryError) as error:
-        first = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise FormatError(f"it cannot be read: {printable(first[:200].rstrip('. '))}", source=name) from None
-
-
 class ArrowFile(column_file.ColumnFile):
     """An opened file: its schema is read, its rows are not."""
 
@@ -194,7 +183,7 @@ class ArrowFile(column_file.ColumnFile):
         """Read the schema; raises FormatError."""
         self.name = file.name
         self.format = fmt
-        with translated(self.name):
+        with column_file.translated(self.name):
             self.schema = self.opened(file)
             self.names: tuple[str, ...] | None = tuple(self.schema.names)
         self.width = len(self.schema.names)
@@ -222,7 +211,7 @@ class ArrowFile(column_file.ColumnFile):
     def guarded(self, found: Iterator[Any]) -> Iterator[Any]:
         """Yield the items that pyarrow reads; raises FormatError if the file is broken."""
         while True:
-            with translated(self.name):
+            with column_file.translated(self.name):
                 rows = next(found, None)
             if rows is None:
                 return
@@ -457,7 +446,7 @@ class ParquetFile(ArrowFile):
         """Read a whole group; None for one that is too large for memory."""
         if self.about.row_group(group).total_byte_size > sizes.GROUP:
             return None
-        with translated(self.name):
+        with column_file.translated(self.name):
             return self.file.read_row_group(group)
 
     def _of_group(self, group: int, table: Any) -> Iterator[ArrowBatch]:

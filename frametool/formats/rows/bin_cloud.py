@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frametool.errors import FormatError, ValueInvalid, listing, warn
-from frametool.formats.rows.clouds import CloudFile
-from frametool.formats.rows.column_file import CountedWriter, StructuredBatch, bytes_left, record_of, seekable
+from frametool.formats.rows.column_file import RecordFile, bytes_left, record_of, seekable
 from frametool.formats.table import FORMATS
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ SINGLE = np.dtype("<f4")
 RING = "ring"
 
 
-class BinCloud(CloudFile):
+class BinCloud(RecordFile):
     """The points of a file without a header."""
 
     def __init__(self, file: InputFile) -> None:
@@ -51,7 +50,7 @@ class BinCloud(CloudFile):
         """Yield the points; raises FormatError for invalid rings."""
         done = 0
         for batch in super().batches():
-            rings = batch.column(self.names.index(RING)) if RING in self.names else np.zeros(0)
+            rings = batch.column(self.width - 1) if RING in FORMATS[self.file.format].columns else np.zeros(0)
             bad = np.flatnonzero((rings != np.rint(rings)) | (rings < 0))
             if len(bad):
                 found = f"ring: {rings[bad[0]]:g} is not a ring number; is it --in kitti-bin?"
@@ -59,19 +58,19 @@ class BinCloud(CloudFile):
             done += batch.size
             yield batch
 
-    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> CountedWriter:
+    def rewriter(self, columns: Sequence[OutColumn], style: Style, *, drops: bool) -> PointsWriter:
         """Return a writer for a cloud of either format."""
-        return _writer(style.format, columns, None if drops else self.count)
+        del drops
+        return PointsWriter(columns, style.format)
 
 
-class _Encoder:
-    """Convert columns to points; `off` is the largest rounding error of float32."""
+class PointsWriter:
+    """Writes points without a header; `off` is the largest rounding error of float32."""
 
-    def __init__(self, fmt: str, columns: Sequence[OutColumn]) -> None:
+    def __init__(self, columns: Sequence[OutColumn], fmt: str) -> None:
         """Find the columns; raises ValueInvalid if one is missing, and warns about those that are omitted."""
-        self.format = fmt
+        self.columns, self.format = columns, fmt
         self.names = FORMATS[fmt].columns
-        self.columns = columns
         self.off = 0.0
         at_input = [column.name for column in columns if column.kind is not None]
         if missing := [name for name in self.names if name not in at_input]:
@@ -79,7 +78,7 @@ class _Encoder:
         if others := [column.name for column in columns if column.name not in self.names]:
             warn(f"{fmt}: {listing(others)} left out: it holds {' '.join(self.names)} alone")
 
-    def __call__(self, batch: StructuredBatch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
+    def of_rows(self, batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes:
         """Return the bytes of some points."""
         new, found = iter(made), {}
         for column in self.columns:
@@ -98,16 +97,11 @@ class _Encoder:
             self.off = max(self.off, float(np.nanmax(far, initial=0.0)))
         return points.tobytes()
 
-    def tell(self) -> Iterator[bytes]:
-        """Warn at the end about rounding."""
+    def end(self) -> Iterator[bytes]:
+        """Warn about rounding."""
         if self.off:
             warn(f"{self.format}: numbers are float32; they were rounded by up to {self.off:.1g}")
         return iter(())
-
-
-def _writer(fmt: str, columns: Sequence[OutColumn], count: int | None) -> CountedWriter:
-    encoder = _Encoder(fmt, columns)
-    return CountedWriter(encoder, lambda _count: b"", count, encoder.tell)
 
 
 def open_columns(file: InputFile, _options: Options) -> BinCloud:
@@ -115,6 +109,6 @@ def open_columns(file: InputFile, _options: Options) -> BinCloud:
     return BinCloud(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> CountedWriter:
+def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> PointsWriter:
     """Return a writer for new points."""
-    return _writer(style.format, columns, count)
+    return PointsWriter(columns, style.format)

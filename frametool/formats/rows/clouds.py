@@ -23,10 +23,9 @@ from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import fixed_spans, rounded_to_single, shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from typing import BinaryIO
 
-    from frametool.documents.source import InputFile
     from frametool.formats.rows.column_file import Kind, Made, OutColumn
     from frametool.grammar.result import Style
     from frametool.text.cells import Cells
@@ -41,23 +40,15 @@ _EXACT = 2.0**53
 _SINGLE = np.dtype(np.float32)
 
 
-class CloudFile(column_file.ColumnFile):
+class CloudFile(column_file.RecordFile):
     """The points of a file whose header has been read."""
 
     vectors = NORMALS
-    gaps = True
-
-    def __init__(self, file: InputFile, names: Sequence[str], record: Kind, count: int, what: str = "points") -> None:
-        """Store the columns, the type of a point as a record, and the number of points and their name in messages."""
-        self.file = file
-        self.names: tuple[str, ...] = tuple(names)
-        self.width = len(names)
-        self.record = record
-        self.kinds = [record[place] for place in range(len(names))]
-        self.count, self.what = count, what
-        self.text: TextRows | None = None
-        self.is_last = True  # nothing follows the points
-        self.behind = b""
+    what = "points"  # in messages
+    text: TextRows | None = None
+    is_last = True  # nothing follows the points
+    behind = b""
+    names: tuple[str, ...]
 
     def batches(self) -> Iterator[column_file.Batch]:
         """Yield the points; raises FormatError if the file ends too early, or has more."""
@@ -65,7 +56,7 @@ class CloudFile(column_file.ColumnFile):
             yield from self.text.batches()
             self.behind = self.text.check_end() if self.is_last else b""
             return
-        yield from column_file.record_batches(self.file, self.record, self.count)
+        yield from super().batches()
         self.behind = self.file.stream.read(self.record.itemsize) if self.is_last else b""
         if self.behind and len(self.behind) == self.record.itemsize:
             raise FormatError(f"the header says {self.count} {self.what}, more follow", source=self.file.name)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import stat
+from contextlib import contextmanager
 from decimal import Decimal
 from functools import partial
 from shutil import copyfileobj
@@ -21,7 +22,7 @@ from weakref import finalize
 import numpy as np
 
 from frametool.documents.source import Verbatim
-from frametool.errors import FormatError, ValueInvalid, shown
+from frametool.errors import FormatError, FrametoolError, ValueInvalid, printable, shown
 from frametool.frames.stamps import SUFFIXES, nanoseconds_each, tell_size
 from frametool.text.parse import nanoseconds_of
 
@@ -231,24 +232,46 @@ def not_finite(values: Floats) -> Flags | None:
 # --- reading ---
 
 
+class RecordFile(ColumnFile):
+    """A file whose rows are records, one field per column."""
+
+    gaps = True
+
+    def __init__(self, file: InputFile, names: Iterable[str] | None, record: Kind, count: int) -> None:
+        """Store the names of the columns, the type of a row as a record, and the number of rows."""
+        self.file, self.record, self.count = file, record, count
+        self.names = None if names is None else tuple(names)
+        self.width = len(record.names or ())
+        kinds = [record[place] for place in range(self.width)]
+        self.kinds = [kind if is_number(kind) else None for kind in kinds]
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the rows; memory grows with the data, not with the stated count."""
+        size, count = rows_of_batch(self.record.itemsize), self.count
+        for done in range(0, count, size):
+            data = bytearray(min(size, count - done) * self.record.itemsize)
+            filled = self.file.stream.readinto(data)  # type: ignore[attr-defined]
+            if filled < len(data):
+                whole = done + filled // max(self.record.itemsize, 1)
+                raise FormatError(f"the file ends after {whole} of {count} rows", source=self.file.name)
+            yield StructuredBatch(np.frombuffer(data, self.record))
+
+
 def rows_of_batch(size: int) -> int:
     """Return how many records of this size are read at once."""
     return max(1, min(MOST_ROWS, BATCH_BYTES // max(size, 1)))
 
 
-def record_batches(file: InputFile, record: Kind, count: int) -> Iterator[StructuredBatch]:
-    """Yield records of a stream; memory grows with the data, not with the stated count.
-
-    Raises FormatError if the file ends too early.
-    """
-    size = rows_of_batch(record.itemsize)
-    for done in range(0, count, size):
-        data = bytearray(min(size, count - done) * record.itemsize)
-        filled = file.stream.readinto(data)  # type: ignore[attr-defined]
-        if filled < len(data):
-            whole = done + filled // max(record.itemsize, 1)
-            raise FormatError(f"the file ends after {whole} of {count} rows", source=file.name)
-        yield StructuredBatch(np.frombuffer(data, record))
+@contextmanager
+def translated(name: str, what: str = "it cannot be read: {}") -> Iterator[None]:
+    """Convert any exception of a library into a FormatError, with its first line in place of {}."""
+    try:
+        yield
+    except FrametoolError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a broken file makes libraries raise anything, also MemoryError
+        first = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise FormatError(what.format(printable(first[:200].rstrip(". "))), source=name) from None
 
 
 def bytes_left(stream: BinaryIO) -> int | None:

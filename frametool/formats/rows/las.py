@@ -7,14 +7,13 @@ EVLRs are preserved, including a coordinate system, with a warning.
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from copy import deepcopy
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frametool.errors import FileProblem, FormatError, FrametoolError, ValueInvalid, warn
+from frametool.errors import FileProblem, FormatError, ValueInvalid, warn
 from frametool.formats.rows import column_file
 
 if TYPE_CHECKING:
@@ -37,8 +36,6 @@ COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
 EXTRA = {f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)} | {"f4", "f8"}  # types of other dimensions
 LONGEST_NAME = 32
-RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # where the header has their number, and the minimum size of each
-MINOR_AT, LEAST_HEAD = 25, 375  # of the version, 1.4 has EVLRs; bytes of its header
 PACKED_AT, PACKED = 104, b"\x80"  # the byte that marks compression, and its lowest such value
 
 
@@ -59,40 +56,7 @@ def _laspy(name: str, *, packed: bool = False) -> Any:
     return laspy
 
 
-BROKEN = "the file cannot be read; is it whole? ({})"
 REFUSED = "it cannot be written as las: {}"
-
-
-@contextmanager
-def _translated(name: str, what: str) -> Iterator[None]:
-    """Convert any exception of the library into one error, with its text in place of {}."""
-    try:
-        yield
-    except FrametoolError:
-        raise
-    except Exception as error:  # a broken file makes the library raise anything, also MemoryError
-        if isinstance(error, MemoryError) and what == REFUSED:
-            raise
-        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
-        raise FormatError(what.format(said), source=name) from None
-
-
-class _Clipped:
-    """A file wrapper that never reads more than exists: the library allocates what a header states before it reads."""
-
-    def __init__(self, stream: Any, size: int) -> None:
-        """Store a seekable stream and its size."""
-        self._stream, self._size = stream, size
-
-    def __getattr__(self, name: str) -> Any:
-        """Delegate everything else to the file."""
-        return getattr(self._stream, name)
-
-    def read(self, size: int = -1) -> bytes:
-        """Read this many bytes, or all that are left."""
-        left = max(self._size - self._stream.tell(), 0)
-        data: bytes = self._stream.read(left if size < 0 else min(size, left))
-        return data
 
 
 class LasBatch(column_file.StructuredBatch):
@@ -120,13 +84,8 @@ class LasFile(column_file.ColumnFile):
         self.file = file
         file.stream = column_file.seekable(file, self)
         whole = column_file.bytes_left(file.stream) or 0
-        head = file.stream.read(LEAST_HEAD)
-        file.stream.seek(0)
-        for what, at, size in RECORDS[: 1 + (head[MINOR_AT : MINOR_AT + 1] >= b"\x04")]:
-            if (count := int.from_bytes(head[at : at + 4], "little")) * size > whole:
-                raise FormatError(f"the header says {count} {what}, in {whole} bytes", source=file.name)
-        with _translated(file.name, BROKEN):
-            self.reader = laspy.open(_Clipped(file.stream, whole), closefd=False)
+        with column_file.translated(file.name):
+            self.reader = laspy.open(file.stream, closefd=False)
             header = self.header = self.reader.header
             if not header.are_points_compressed:
                 file.stream.seek(header.offset_to_point_data)
@@ -151,7 +110,7 @@ class LasFile(column_file.ColumnFile):
         count, done = self.header.point_count, 0
         while done < count:
             wanted = min(column_file.MOST_ROWS, count - done)
-            with _translated(self.file.name, BROKEN):
+            with column_file.translated(self.file.name):
                 points = self.reader.read_points(wanted)
             done += len(points)
             if len(points) < wanted:
@@ -194,7 +153,7 @@ class LasWriter:
         if not there.any():
             return b""
         self._begin(new)
-        with _translated(self.name, REFUSED):
+        with column_file.translated(self.name, REFUSED):
             self.writer.write_points(self._points(batch, rows, new))
         self.count += len(there)
         return b""
@@ -205,7 +164,7 @@ class LasWriter:
             return
         if set(XYZ) <= new.keys():
             self.header.offsets = np.rint([np.median(new[name]) for name in XYZ])
-        with _translated(self.name, REFUSED):
+        with column_file.translated(self.name, REFUSED):
             writer = _laspy(self.name, packed=self.packed).LasWriter
             self.writer = writer(self.kept, self.header, do_compress=self.packed, closefd=False)
 
@@ -245,7 +204,7 @@ class LasWriter:
     def end(self) -> Iterator[bytes]:
         """Yield the bytes of the file."""
         self._begin({})
-        with _translated(self.name, REFUSED):
+        with column_file.translated(self.name, REFUSED):
             if evlrs := getattr(self.header, "evlrs", None):
                 self.writer.write_evlrs(evlrs)
             self.writer.close()
@@ -282,6 +241,6 @@ def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> La
     known = set(header.point_format.dimension_names)
     for column in columns:
         if column.kind is not None and column.name not in known and column.name not in XYZ:
-            with _translated(style.format, REFUSED):
+            with column_file.translated(style.format, REFUSED):
                 header.add_extra_dim(laspy.ExtraBytesParams(name=column.name, type=column.kind.newbyteorder("<")))
     return LasWriter(header, columns, packed=style.format == LAZ)

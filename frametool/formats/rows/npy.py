@@ -5,15 +5,16 @@ Read in pieces, never unpickled; with more than two axes the first counts the ro
 
 from __future__ import annotations
 
-import ast
 import struct
 from functools import partial
+from io import BytesIO
 from math import prod
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib import format as npy
 
-from frametool.errors import FormatError, shown
+from frametool.errors import FormatError
 from frametool.formats.rows import column_file
 
 if TYPE_CHECKING:
@@ -33,81 +34,51 @@ ALIGNED = 64  # bytes, as numpy pads its headers
 
 def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
     """Return the type of an element, the shape, and whether it is in column-major order; raises FormatError."""
-
-    def wrong(what: str) -> FormatError:
-        return FormatError(what, source=file.name)
-
-    def exactly(size: int) -> bytes:
-        data = file.stream.read(size)
-        if len(data) < size:
-            raise wrong("the file ends within its header")
-        return data
-
-    begin = exactly(len(MAGIC) + 2)
-    if not begin.startswith(MAGIC):
-        raise wrong("no NPY file: it does not begin with \\x93NUMPY")
-    version = begin[len(MAGIC)]
-    (size,) = struct.unpack("<I", exactly(4)) if version > 1 else struct.unpack("<H", exactly(2))
+    head = file.stream.read(len(MAGIC) + 4)
+    if not head.startswith(MAGIC):
+        raise FormatError("no NPY file: it does not begin with \\x93NUMPY", source=file.name)
+    is_long = head[len(MAGIC)] > 1
+    head += file.stream.read(2 * is_long)
+    size = int.from_bytes(head[len(MAGIC) + 2 :], "little")
     if size > MOST_HEADER:
-        raise wrong(f"the header says that it has {size} bytes; it is damaged")
-    text = exactly(size).decode("utf-8" if version > 2 else "latin-1", "replace").strip()
-    try:
-        found = ast.literal_eval(text)
-        kind, shape = np.lib.format.descr_to_dtype(found["descr"]), found["shape"]
-        by_columns = bool(found["fortran_order"])
-        if type(shape) is not tuple or any(type(each) is not int or each < 0 for each in shape):
-            raise ValueError(shape)
-    except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError, OverflowError):
-        raise wrong(f"the header cannot be read: {shown(text)}") from None
+        raise FormatError(f"the header says that it has {size} bytes; it is damaged", source=file.name)
+    read = npy.read_array_header_2_0 if is_long else npy.read_array_header_1_0
+    with column_file.translated(file.name, "the header cannot be read: {}"):
+        shape, by_columns, kind = read(BytesIO(head[len(MAGIC) + 2 :] + file.stream.read(size)), MOST_HEADER)
+    if min(shape, default=0) < 0:
+        raise FormatError(f"the header has the shape {shape}", source=file.name)
     if kind.hasobject:
-        raise wrong("it holds Python objects, which are never unpickled; save plain numbers")
+        raise FormatError("it holds Python objects, which are never unpickled; save plain numbers", source=file.name)
     return kind, shape, by_columns
 
 
-class NpyFile(column_file.ColumnFile):
+class NpyFile(column_file.RecordFile):
     """An array whose rows are read in batches."""
-
-    gaps = True
 
     def __init__(self, file: InputFile) -> None:
         """Read the header; raises FormatError if it is not a table of numbers."""
-        self.file = file
         kind, self.shape, self.by_columns = read_header(file)
+        columns, problem = prod(self.shape[1:]), ""
         if not self.shape:
-            wanted = "wanted are rows: an array n x 3, or one with fields"
-            raise FormatError(f"it holds a single value; {wanted}", source=file.name)
-        self.count = self.shape[0]
-        self.names: tuple[str, ...] | None = kind.names
-        self.record = kind
-        if kind.names is not None and len(self.shape) > 1:
-            raise FormatError(f"records in {len(self.shape)} axes; wanted is one row of them", source=file.name)
-        if kind.names is None:
-            if not column_file.is_number(kind):
-                raise FormatError(f"it holds {kind}; wanted are numbers, or fields", source=file.name)
-            columns = prod(self.shape[1:])
-            if columns > MOST_COLUMNS:
-                raise FormatError(f"it has {columns} columns; at most {MOST_COLUMNS} are read", source=file.name)
-            self.record = column_file.record_of([kind] * columns)
-        if self.record.itemsize > MOST_BYTES:
-            raise FormatError(f"a row of {self.record.itemsize} bytes; at most {MOST_BYTES} are read", source=file.name)
-        self.width = len(self.record.names or ())
-        kinds = [self.record[place] for place in range(self.width)]
-        self.kinds = [kind if column_file.is_number(kind) else None for kind in kinds]
-        column_file.check_declared(file, self.count, self.record.itemsize, "rows", last=True)
+            problem = "it holds a single value; wanted are rows: an array n x 3, or one with fields"
+        elif kind.names is not None and len(self.shape) > 1:
+            problem = f"records in {len(self.shape)} axes; wanted is one row of them"
+        elif kind.names is None and not column_file.is_number(kind):
+            problem = f"it holds {kind}; wanted are numbers, or fields"
+        elif columns > MOST_COLUMNS or columns * kind.itemsize > MOST_BYTES:
+            problem = f"a row of {columns} columns; at most {MOST_COLUMNS} are read, of {MOST_BYTES} bytes"
+        if problem:
+            raise FormatError(problem, source=file.name)
+        record = kind if kind.names is not None else column_file.record_of([kind] * columns)
+        super().__init__(file, kind.names, record, self.shape[0])
+        column_file.check_declared(file, self.count, record.itemsize, "rows", last=True)
 
     def batches(self) -> Iterator[Batch]:
         """Yield the rows; raises FormatError if the file ends too early."""
-        if self.by_columns and len(self.shape) > 1:
-            return self._rows_of_columns()
-        return column_file.record_batches(self.file, self.record, self.count)
-
-    def _rows_of_columns(self) -> Iterator[Batch]:
-        """Yield the rows of an array in column-major order, which has to be read completely."""
-        data, size = bytearray(), self.count * self.record.itemsize
-        while len(data) < size and (piece := self.file.stream.read(min(column_file.PIECE, size - len(data)))):
-            data += piece
-        if len(data) < size:
-            raise FormatError(f"the file ends after {len(data)} of {size} bytes", source=self.file.name)
+        if not self.by_columns or len(self.shape) == 1:
+            yield from super().batches()
+            return
+        data = column_file.read_exactly(self.file, self.count * self.record.itemsize, "its columns")
         array = np.frombuffer(data, self.record[0]).reshape(self.shape, order="F")
         for first in range(0, self.count, column_file.MOST_ROWS):
             rows = np.ascontiguousarray(array[first : first + column_file.MOST_ROWS]).reshape(-1, self.width)
@@ -135,7 +106,7 @@ def _writer(
 
     def head(rows: int) -> bytes:
         """Return the header, padded as numpy does."""
-        descr = np.lib.format.dtype_to_descr(element)
+        descr = npy.dtype_to_descr(element)
         text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {(rows, *row_shape)!r}, }}"
         long = len(text) + ALIGNED > 0xFFFF
         before = len(MAGIC) + 2 + (4 if long else 2)
@@ -162,7 +133,7 @@ def open_columns(file: InputFile, _options: Options) -> NpyFile:
     return NpyFile(file)
 
 
-def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> column_file.CountedWriter:
+def create(columns: Sequence[OutColumn], count: int | None, _style: Style) -> ColumnWriter:
     """Return a writer for new rows: n x 3 for points alone, else records with fields."""
     names = tuple(column.name for column in columns)
     return _writer(columns, np.dtype([]), count, () if names == column_file.XYZ else None)

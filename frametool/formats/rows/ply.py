@@ -139,6 +139,7 @@ class PlyFile(clouds.CloudFile):
     """A cloud, or the vertices of a mesh, read in batches."""
 
     vectors = NORMALS[::-1]
+    what = "vertices"
 
     def __init__(self, file: InputFile) -> None:
         """Read the header and everything before the vertices; raises FormatError."""
@@ -152,7 +153,7 @@ class PlyFile(clouds.CloudFile):
         _check_lists(before, vertex, self.order, file.name)
         self.codes = {name: code for name, (code, _) in vertex.properties.items()}
         record = column_file.record_of((self.order or "<") + code for code in self.codes.values())
-        super().__init__(file, tuple(self.codes), record, vertex.instances, "vertices")
+        super().__init__(file, self.codes, record, vertex.instances)
         self.line = vertex.line
         self.is_last = not self.after
         self.turn: tuple[float, ...] | None = None
