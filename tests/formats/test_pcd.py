@@ -111,11 +111,11 @@ def test_older_headers_are_read(run: Run, tmp_path: Path, version: str) -> None:
 
 
 def test_ascii_changes_only_the_cells_that_move(run: Run, tmp_path: Path) -> None:
-    rows = b"1.50  0 0\t7.100 1e0 \n\n nan nan NaN 8 -nan\r\n-0 1 2 +3 4"
+    rows = b"1.50  0 0\t7.100 1e0 \n\n nan nan nan 8 -nan\r\n-0 1 2 +3 4"
     given = np.zeros(3, [("x", "<f4"), ("y", "<f4"), ("z", "<f8"), ("a", "<f4"), ("b", "<f4")])
     head = pcd(given[:0], "ascii", width=3, points=3)
     done = move(run, tmp_path, "pcd", head + rows, "--quiet", pose='{"xyz": [1, 2, 3], "rpy_deg": [0, 0, 90]}')
-    wanted = b"1.0  3.5 3.0\t7.100 1e0 \n\n nan nan NaN 8 -nan\r\n0.0 2.0 5.0 +3 4"
+    wanted = b"1.0  3.5 3.0\t7.100 1e0 \n\n nan nan nan 8 -nan\r\n0.0 2.0 5.0 +3 4"
     assert (done.data or b"").endswith(b"DATA ascii\n" + wanted)
 
 

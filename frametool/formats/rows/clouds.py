@@ -36,7 +36,6 @@ Code = TypeVar("Code")
 LONGEST_HEAD = 1 << 20  # bytes of a header: a hundred times the longest known
 _MOST_POINTS = 1 << 62
 _NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
-_EXACT = 2.0**53
 _SINGLE = np.dtype(np.float32)
 
 
@@ -231,16 +230,13 @@ class TextBatch(column_file.Batch):
         kind, values = self.table.cloud.record[place], self.numbers(place).values
         if kind.kind not in column_file.WHOLE:
             return values.astype(kind)
-        try:
-            return np.array([int(text) for text in self.texts(place)], kind)
-        except (ValueError, OverflowError):  # written with a point, or too large
-            limits = np.iinfo(kind)
-        whole = (values == np.rint(values)) & (abs(values) < _EXACT)
-        good = whole & (values >= limits.min) & (values <= limits.max)
-        if not good.all():
-            row = int(np.argmin(good))
-            raise self._problem(row, place, f"{self.texts(place)[row]} is no {kind.name}")
-        return values.astype(kind)
+        numbers = []
+        for row, text in enumerate(self.texts(place)):
+            try:
+                numbers.append(kind.type(int(text)))
+            except (ValueError, OverflowError):  # written with a point, or too large
+                raise self._problem(row, place, f"{text} is no {kind.name}") from None
+        return np.array(numbers, kind)
 
 
 def encode_text(
@@ -260,12 +256,11 @@ def encode_text(
     for place, column in enumerate(columns):
         if column.passed is not None:
             continue
-        values = next(new).values
-        written = _written(values, column, style)
+        written = _written(next(new).values, column, style)
         if place < len(batch.table.at):
             cell = batch.table.at[place]
-            start, end = cells.starts[chosen, cell], cells.ends[chosen, cell]
-            parts += [Spans(cells.data, at, start), _unless_lost(written, values, Spans(cells.data, start, end))]
+            end = cells.ends[chosen, cell]
+            parts += [Spans(cells.data, at, cells.starts[chosen, cell]), written]
         else:
             end, blank = cells.ends[chosen, -1], np.full(len(chosen), MARGIN)
             parts += [Spans(cells.data, at, end), Spans(framed(b" "), blank, blank + 1), written]
@@ -283,17 +278,3 @@ def _written(numbers: Any, column: OutColumn, style: Style) -> Spans:
     else:
         spans = shortest_spans(rounded_to_single(values) if column.kind == _SINGLE else values, b" ")
     return Spans(spans.data, spans.starts[:, 0], spans.ends[:, 0] - 1)
-
-
-def _unless_lost(new: Spans, values: Any, old: Spans) -> Spans:
-    """Keep the text of cells that had no number, and have none now: `-nan` is unchanged."""
-    lost = np.flatnonzero(~np.isfinite(values))
-    first = old.data[old.starts[lost]]
-    first = old.data[old.starts[lost] + ((first == ord("-")) | (first == ord("+")))]
-    lost = lost[first >= ord("A")]
-    if not lost.size:
-        return new
-    starts, ends = new.starts.copy(), new.ends.copy()
-    starts[lost] = old.starts[lost] + len(new.data)
-    ends[lost] = old.ends[lost] + len(new.data)
-    return Spans(np.concatenate([new.data, old.data]), starts, ends)

@@ -36,6 +36,8 @@ COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
 EXTRA = {f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)} | {"f4", "f8"}  # types of other dimensions
 LONGEST_NAME = 32
+RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # where the header has their number, and the minimum size of each
+MINOR_AT, LEAST_HEAD = 25, 375  # of the version, 1.4 has EVLRs; bytes of its header
 PACKED_AT, PACKED = 104, b"\x80"  # the byte that marks compression, and its lowest such value
 
 
@@ -57,6 +59,24 @@ def _laspy(name: str, *, packed: bool = False) -> Any:
 
 
 REFUSED = "it cannot be written as las: {}"
+
+
+class _Clipped:
+    """A file wrapper that never reads more than exists: the library allocates what a header states before it reads."""
+
+    def __init__(self, stream: Any, size: int) -> None:
+        """Store a seekable stream and its size."""
+        self._stream, self._size = stream, size
+
+    def __getattr__(self, name: str) -> Any:
+        """Delegate everything else to the file."""
+        return getattr(self._stream, name)
+
+    def read(self, size: int = -1) -> bytes:
+        """Read this many bytes, or all that are left."""
+        left = max(self._size - self._stream.tell(), 0)
+        data: bytes = self._stream.read(left if size < 0 else min(size, left))
+        return data
 
 
 class LasBatch(column_file.StructuredBatch):
@@ -84,8 +104,13 @@ class LasFile(column_file.ColumnFile):
         self.file = file
         file.stream = column_file.seekable(file, self)
         whole = column_file.bytes_left(file.stream) or 0
+        head = file.stream.read(LEAST_HEAD)
+        file.stream.seek(0)
+        for what, at, size in RECORDS[: 1 + (head[MINOR_AT : MINOR_AT + 1] >= b"\x04")]:
+            if (count := int.from_bytes(head[at : at + 4], "little")) * size > whole:
+                raise FormatError(f"the header says {count} {what}, in {whole} bytes", source=file.name)
         with column_file.translated(file.name):
-            self.reader = laspy.open(file.stream, closefd=False)
+            self.reader = laspy.open(_Clipped(file.stream, whole), closefd=False)
             header = self.header = self.reader.header
             if not header.are_points_compressed:
                 file.stream.seek(header.offset_to_point_data)

@@ -37,7 +37,7 @@ def read_header(file: InputFile) -> tuple[Kind, tuple[int, ...], bool]:
     head = file.stream.read(len(MAGIC) + 4)
     if not head.startswith(MAGIC):
         raise FormatError("no NPY file: it does not begin with \\x93NUMPY", source=file.name)
-    is_long = head[len(MAGIC)] > 1
+    is_long = head[len(MAGIC) : len(MAGIC) + 1] > b"\x01"
     head += file.stream.read(2 * is_long)
     size = int.from_bytes(head[len(MAGIC) + 2 :], "little")
     if size > MOST_HEADER:

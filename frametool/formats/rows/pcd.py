@@ -23,7 +23,6 @@ import re
 import struct
 from collections import Counter
 from functools import partial
-from itertools import count as numbers_from
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -51,7 +50,6 @@ CODES |= {"f2": (4, "F"), "b1": (1, "U")}  # numpy's types, and the PCD types th
 PADDING = "_"
 _EACH = ("FIELDS", "SIZE", "TYPE", "COUNT")
 _KEYS = ("VERSION", "COLUMNS", *_EACH, "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
-_VERSIONS = (".5", "0.5", ".6", "0.6", ".7", "0.7")
 _WIDEST = 1 << 16  # values of one point
 
 
@@ -123,9 +121,6 @@ class PcdHead:
             missing.append("POINTS")
         if missing:
             raise self.problem("DATA", f"the header has no {', '.join(missing)}")
-        version = " ".join(self.words.get("VERSION", ()))
-        if "VERSION" in self.lines and version not in _VERSIONS:
-            raise self.problem("VERSION", f"version {shown(version)} is not known; versions: 0.5, 0.6, 0.7")
         self.fields = self._fields()
         self.points = self._points()
         self.data = " ".join(self.words["DATA"]).lower()
@@ -296,7 +291,7 @@ class PcdFile(CloudFile):
         """Read the header and check it against the file; raises FormatError."""
         head = self.head = PcdHead(file.stream, file.name)
         self.columns = columns_of(head.fields)
-        super().__init__(file, [column.name for column in self.columns], record_type(head.fields), head.points)
+        super().__init__(file, (column.name for column in self.columns), record_type(head.fields), head.points)
         self.viewpoint = ""
         if head.data == "binary":
             column_file.check_declared(file, self.count, self.record.itemsize, self.what, last=True)
@@ -357,20 +352,10 @@ class PcdFile(CloudFile):
             at = end
         return columns
 
-    def _fields(self, columns: Sequence[OutColumn]) -> list[PcdField]:
-        """Return the fields of an output; adjacent columns of one field remain one field."""
-        same = self.text is not None or same_columns(columns, self.width)
-        found = list(self.head.fields) if same else []
-        at = self.width if same else 0
-        while at < len(columns):
-            field, passed = _new_field(columns[at]), columns[at].passed
-            if passed is not None and self.columns[passed].place == 0:
-                whole = self.columns[passed].field
-                places = [column.passed for column in columns[at : at + whole.values]]
-                field = whole if places == [*range(passed, passed + whole.values)] else field
-            found.append(field)
-            at += field.values
-        return found
+    def _fields(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
+        """Return the fields of an output: those of the input with new ones after them, or one for each column."""
+        known = self.head.fields if same_columns(columns[: self.width], self.width) else ()
+        return (*known, *map(_new_field, columns[self.width * bool(known) :]))
 
     def record_with(self, columns: Sequence[OutColumn]) -> Kind:
         """Return the type of a point with other columns."""
@@ -383,7 +368,7 @@ class PcdFile(CloudFile):
         if self.head.data == "binary_compressed":
             warn(f"{self.file.name}: binary_compressed is written as binary")
             words["DATA"] = "binary"
-        if tuple(fields) != self.head.fields:
+        if fields != self.head.fields:
             words |= _words_of(fields)
         if count != self.count:
             words |= {"WIDTH": str(count), "HEIGHT": "1", "POINTS": str(count)}
@@ -413,9 +398,7 @@ def create(
 
     grid: the number of points per row, and of rows; sensor: its pose among the points
     """
-    numbers = numbers_from(1)
-    named = [each if each.name else each._replace(name=f"column_{next(numbers)}") for each in columns]
-    fields = [_new_field(column) for column in named]
+    fields = [_new_field(column) for column in columns]
 
     def head(points: int) -> bytes:
         width, height = grid or (points, 1)
@@ -425,4 +408,4 @@ def create(
         lines = "".join(f"{key} {each}\n" for key, each in words.items())
         return f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{lines}".encode()
 
-    return column_file.CountedWriter(partial(column_file.encode_records, named, record_type(fields)), head, count)
+    return column_file.CountedWriter(partial(column_file.encode_records, columns, record_type(fields)), head, count)

@@ -158,7 +158,8 @@ class PlyFile(clouds.CloudFile):
         self.is_last = not self.after
         self.turn: tuple[float, ...] | None = None
         if self.order:
-            self.before = self._skipped(sum(each.instances * each.size for each in before))
+            size = sum(each.instances * each.size for each in before)
+            self.before = column_file.read_exactly(file, size, "the elements before the vertices")
             column_file.check_declared(file, self.count, record.itemsize, self.what, last=self.is_last)
         else:
             self.before = self._lines(sum(each.instances for each in before))
@@ -166,13 +167,6 @@ class PlyFile(clouds.CloudFile):
                 raise FormatError(f"the {self.count} vertices have no properties", source=file.name)
             line = (self.head + self.before).count(b"\n") + 1
             self.text = clouds.TextRows(self, range(self.width), self.width, line)
-
-    def _skipped(self, size: int) -> bytes:
-        """Read the elements before the vertices."""
-        left = column_file.bytes_left(self.file.stream)
-        if left is not None and left < size:
-            raise FormatError(f"the file ends before its vertices, {size - left} bytes early", source=self.file.name)
-        return column_file.read_exactly(self.file, size, "the elements before the vertices")
 
     def _lines(self, count: int) -> bytes:
         """Read the lines of the elements before the vertices."""
