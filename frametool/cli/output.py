@@ -269,12 +269,11 @@ class Output:
                 say(f"note: {loses}")
             self.text(self._module("").write_tree(tree, self.style))
             return
-        from frametool.view.pose_text import print_tree, write_tree
+        from frametool.view.report_text import TREE_MARKS, write_tree
 
-        if self.path is None and (sys.stdout.isatty() or color == "always"):
-            print_tree(tree, self.style, color)
-        else:
-            self.text(write_tree(tree, self.style))
+        text, self.marks = write_tree(tree, self.style), TREE_MARKS
+        self.style.screen = self.path is None and (color == "always" or (color == "auto" and self.style.screen))
+        self.text(text)
 
     def report_lock(self, poses: Sequence[Pose]) -> None:
         """Report that the Euler angles of a single result are not unique."""
@@ -303,7 +302,7 @@ class Output:
         from frametool.view.report_text import trouble, write_report
 
         self.marks = trouble(entries)
-        self.text(write_report(entries, self.style))
+        self.text(write_report(entries))
 
     @property
     def _writes(self) -> tuple[str, ...]:

@@ -28,8 +28,8 @@ from frametool.formats.robots.model import JointValue
 from frametool.frames.buffer import TransformBuffer
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import single
-from frametool.view.pictures import page_file, write_html
-from frametool.view.scene import EYES, FrameScene, Projection, Size, can_be_drawn
+from frametool.view.pictures import SIZE, page_file, write_html
+from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -79,7 +79,7 @@ class BinaryPart:
 
 def write_glb(scene: FrameScene) -> bytes:
     """Return the scene as the bytes of a .glb."""
-    flat = Projection(scene, Size(1000.0, 700.0, 70.0, (14.0, 46.0)))
+    flat = Projection(scene, SIZE)
     part = BinaryPart()
     _add_axes(part)
     nodes, index = _nodes(scene, flat.poses, flat.axis)

@@ -8,9 +8,10 @@ from math import atan2, degrees, hypot
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import cells, printable
+from frametool.errors import printable
 from frametool.formats.rows.csv import quoted
-from frametool.view.report_text import columns
+from frametool.view.pose_text import WIDTH
+from frametool.view.report_text import columns, fixed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -18,12 +19,7 @@ if TYPE_CHECKING:
     from frametool.geometry.types import Components, Rigid
 
 
-WIDTH = 80
-NAMED, LONGEST = 9, 18  # characters of a frame before its numbers
-PLACED, LONGEST_PLACE = 30, 61  # characters of a place before its numbers
-OF_SIGMAS = 8
 MOST = 50  # frames
-LARGE, NOTHING = 1e5, 1e-6  # millimetres, degrees
 
 
 class SolvedFrame(NamedTuple):
@@ -129,24 +125,17 @@ def write_solution(found: Solution) -> str:
     """Write the summary, the frames and the rejected measurements."""
     lines = [_first(found)]
     if found.sigma is not None and found.dof > 0:
-        place, turn = found.sigma
-        lines.append(f"noise of one axis {_mm(place)}{'' if turn is None else f' {_deg(turn)}'}, estimated")
+        lines.append(f"noise of one axis {_apart(*found.sigma)}, estimated")
     if found.turns is not None:
         first, second = map(math.degrees, found.turns)
         lines.append(f"turns seen: {first:.1f} deg rms about the main axis, {second:.1f} deg about the second")
     if found.scale_sigma is not None:
         lines.append(f"scale {found.scale:.9g} sigma {found.scale_sigma:.2g}")
-    return "".join(f"{line}\n" for line in [*lines, *_frames(found), *_left_out(found)])
-
-
-def write_left_out(found: Solution) -> str:
-    """Write one line per rejected measurement."""
-    return "".join(f"{line}\n" for line in _left_out(found))
+    return "".join(f"{line}\n" for line in [*lines, *_frames(found)]) + write_left_out(found)
 
 
 def _first(found: Solution) -> str:
-    count = f"{found.used} of {len(found.rows)}"
-    rms = f"rms {_mm(found.rms_distance)}" + ("" if found.rms_angle is None else f" {_deg(found.rms_angle)}")
+    count, rms = f"{found.used} of {len(found.rows)}", f"rms {_apart(found.rms_distance, found.rms_angle)}"
     if found.shape == "tree":
         loops = sum(each.used and each.checked for each in found.rows)
         return f"{len(found.frames)} frames from {count} measurements, {loops} in loops; {rms}"
@@ -156,27 +145,9 @@ def _first(found: Solution) -> str:
     return f"hand-eye from {count} samples; {noise}{rms}"
 
 
-def _mm(metres: float) -> str:
-    return f"{_fixed(1e3 * metres, 1)} mm"
-
-
-def _deg(radians: float) -> str:
-    return f"{_degrees(math.degrees(radians))} deg"
-
-
-def _degrees(value: float) -> str:
-    """Write a sigma in at most five characters."""
-    return f"{value:.2f}" if value < NOTHING or 0.005 <= value < 100 else f"{value:.0e}"
-
-
-def _fixed(value: float, decimals: int) -> str:
-    is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
-    return f"{value:.{decimals}f}" if is_plain else f"{value:.1e}"
-
-
-def _metres(value: float) -> str:
-    decimals = 4 if abs(value) < 100 else 2
-    return f"{round(value, decimals) + 0.0:.{decimals}f}" if abs(value) < 10_000 else f"{value:.1e}"
+def _apart(metres: float, radians: float | None) -> str:
+    turn = "" if radians is None else f" {fixed(math.degrees(radians), 2)} deg"
+    return f"{fixed(1e3 * metres, 1)} mm{turn}"
 
 
 def _pair(each: SolvedFrame, root: str | None) -> str:
@@ -187,55 +158,34 @@ def _pair(each: SolvedFrame, root: str | None) -> str:
 def _frames(found: Solution) -> Iterator[str]:
     root = found.root if found.shape == "tree" else None
     shown = [each for each in found.frames if each.parent is not None or each.name == root][:MOST]
-    width = min(max([NAMED, *(cells(_pair(each, root)) for each in shown)]), LONGEST)
-    yield f"  {'frame':<{width}}{'x':>9}{'y':>9}{'z':>9}{'sigma mm':>10}{'deg':>6}{'rows':>6}"
+    rows = [["  frame", *"xyz", "sigma mm", "deg", "rows", ""]]
     for each in shown:
+        name, count = f"  {_pair(each, root)}", str(each.rows)
         if each.parent is None:
-            yield from _aligned(_pair(each, root), width, f"{each.rows:>49}  root")
+            rows.append([name, *[""] * 5, count, "root"])
             continue
-        place = "".join(f" {_metres(part):>8}" for part in each.components[:3])
+        place = [fixed(round(part, 4), 4) for part in each.components[:3]]
         sigmas = _sigmas(each)
-        worst = ("-", "-")
-        if sigmas is not None:
-            worst = _fixed(1e3 * max(sigmas["xyz"]), 1), _degrees(max(sigmas["rpy_deg"]))
-        mark = "  fixed" if each.fixed else "" if each.checked else "  unchecked"
-        numbers = f"{place} {worst[0]:>9} {worst[1]:>5} {each.rows:>5}"
-        yield from _aligned(_pair(each, root), width, numbers + mark)
+        length, angle = (1e3 * max(sigmas["xyz"]), max(sigmas["rpy_deg"])) if sigmas else (None, None)
+        remark = "fixed" if each.fixed else "" if each.checked else "unchecked"
+        rows.append([name, *place, fixed(length, 1), fixed(angle, 2), count, remark])
+    yield from columns(rows, [True, *[False] * 6, True])
     if (more := len(found.frames) - len(shown)) > 0 and found.shape == "tree":
         yield f"  .. and {more} more; --report FILE.json has all"
 
 
-def _left_out(found: Solution) -> Iterator[str]:
-    rows = found.left_out
-    if not rows:
-        return
-    in_sigmas = found.shape != "tree"
-    names = [printable(_row_name(each, in_sigmas=in_sigmas)) for each in rows]
-    width = min(max([PLACED, *map(cells, names)]), LONGEST_PLACE - OF_SIGMAS * in_sigmas)
-    yield f"{'left out':<{width + 2}}{'off mm':>9}{'deg':>7}" + (f"{'u':>{OF_SIGMAS}}" if in_sigmas else "")
-    for each, name in zip(rows, names, strict=True):
+def write_left_out(found: Solution) -> str:
+    """Write a table of the rejected measurements: where each is, what it measures, how far it is off."""
+    if not found.left_out:
+        return ""
+    in_tree = found.shape == "tree"
+    rows = [["left out", "off mm", "deg", "" if in_tree else "u", ""]]
+    for each in found.left_out:
+        what = f"{each.parent}<-{each.child}" if in_tree else each.id or f"row {each.row}"
         angle = "-" if each.angle is None else f"{math.degrees(each.angle):.1f}"
-        numbers = f"{_fixed(1e3 * each.distance, 1):>9} {angle:>6}" + (f" {_fixed(each.u, 1):>7}" if in_sigmas else "")
-        lines = [*_aligned(name, width, numbers)]
-        if each.fits:
-            words = f"fits when {each.fits}"
-            fits_behind = len(lines[-1]) + 2 + len(words) <= WIDTH
-            lines = [*lines[:-1], f"{lines[-1]}  {words}"] if fits_behind else [*lines, f"    {words}"]
-        yield from lines
-
-
-def _row_name(each: SolvedRow, *, in_sigmas: bool) -> str:
-    """Return the location of a measurement and, in a tree, what it measures."""
-    return f"{each.place} {each.id or f'row {each.row}' if in_sigmas else f'{each.parent}<-{each.child}'}"
-
-
-def _aligned(name: str, width: int, rest: str) -> Sequence[str]:
-    """Put a name before numbers; a name that is too long gets its own line, cut at the width."""
-    if cells(name) <= width:
-        return [f"  {name}{' ' * (width - cells(name))}{rest}"]
-    while cells(name) > WIDTH - 2:
-        name = f"{name[:-3]}.."
-    return [f"  {name}", f"  {'':<{width}}{rest}"]
+        numbers = fixed(1e3 * each.distance, 1), angle, "" if in_tree else fixed(each.u, 1)
+        rows.append([printable(f"  {each.place} {what}"), *numbers, f"fits when {each.fits}" if each.fits else ""])
+    return "".join(f"{line}\n" for line in columns(rows, [True, False, False, False, True]))
 
 
 LABEL, CELL, NAME, LONGEST_NAME = 16, 10, 18, 24  # characters; a longer name does not push the rest aside
@@ -246,6 +196,8 @@ CSV_TITLES = (
     "paired",
 )  # fmt: skip
 RANKED = range(1, TITLES.index("scale"))
+LARGE = 1e5  # from where on numbers have an exponent
+
 
 def write_comparison(found: dict[str, Any]) -> str:
     """Write one comparison: pairs, alignment, errors."""
@@ -374,13 +326,7 @@ def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
     if fmt == "latex":
         body = "".join(f"{' & '.join(line)} \\\\\n" for line in (TITLES, *shown))
         return f"\\begin{{tabular}}{{l{'r' * (len(TITLES) - 1)}}}\n{body}\\end{{tabular}}\n"
-    table: list[Sequence[str]] = [TITLES, *shown]
-    numeric = [False] * len(TITLES[1:])
-    aligned = columns(table, [True, *numeric])
-    if max(map(cells, aligned)) > WIDTH:  # numbers go below their name
-        numbers = columns([row[1:] for row in table], numeric)
-        aligned = [line for row, below in zip(table, numbers, strict=True) for line in (row[0], below)]
-    return "".join(f"{line}\n" for line in aligned)
+    return "".join(f"{line}\n" for line in columns([TITLES, *shown], [True, *[False] * len(TITLES[1:])]))
 
 
 def _best(rows: Sequence[Sequence[Any]]) -> list[float | None]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
 from frametool.errors import FileProblem, printable
-from frametool.view.scene import SLANTED, Projection, Size, axis_tips, nice, place_labels
+from frametool.view.scene import SLANTED, Labels, Projection, Size, axis_tips, nice, text_width
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -353,7 +353,7 @@ def _paint_shape(axes: Any, shape: Any, order: int) -> None:
 
 
 WIDTH, HEIGHT = 1000.0, 700.0
-SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0))
+SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0), cell=(4, 4), line=16.0, measure=text_width)
 CORNER = 46.0  # pixels from the corner to the little axes
 AXES = ("x", "y", "z")
 
@@ -375,7 +375,8 @@ def still_picture(
     """
     flat = Projection(scene, SIZE, eye)
     blocked = [(0.0, HEIGHT - 92.0, 100.0, HEIGHT), (WIDTH - 330.0, HEIGHT - 58.0, WIDTH, HEIGHT)]
-    labels, hidden = place_labels(flat, blocked=blocked)
+    labels = Labels(flat, blocked)
+    labels.place_all()
     step, ground = flat.ground()
     shapes: list[Shape] = [
         PictureLine([flat.at(a)[:2], flat.at(b)[:2]], "zero" if zero else "faint") for a, b, zero in ground
@@ -390,10 +391,10 @@ def still_picture(
             shapes += _other(flat, name, pose)
     for name in flat.nearest_last():
         shapes += _frame(flat, name)
-    for label in labels:
+    for label in labels.placed:
         shapes += _label(label)
     shapes += [*_corner(flat), *_scale(flat, step)]
-    return StillPicture(Picture(WIDTH, HEIGHT, shapes, title), hidden, flat.crowded())
+    return StillPicture(Picture(WIDTH, HEIGHT, shapes, title), labels.hidden, flat.crowded())
 
 
 def _frame(flat: Projection, name: str) -> Iterator[Shape]:
@@ -426,7 +427,7 @@ def _other(flat: Projection, name: str, pose: Rigid) -> Iterator[Shape]:
 def _label(label: Label) -> Iterator[Shape]:
     """Draw a name, with a leader line if it is away from its frame."""
     left, top, right, bottom = label.box
-    if label.away > 16.0:
+    if label.away > 1.1:
         end = min(max(label.point.x, left), right), top if top > label.point.y else bottom
         yield PictureLine([label.point[:2], end], "soft", 0.7)
     yield PictureWords(left + 2.0, (top + bottom) / 2.0, label.words)

@@ -1,29 +1,22 @@
-"""Poses and trees for a person: every notation aligned on the decimal point, blocks as tf2_echo prints them, drawings.
-
-A tree is a drawing of lines, on a terminal in colour, through rich; so is how far a long stream is.
-"""
+"""Poses and points for a person: every notation aligned on the decimal point, and blocks as tf2_echo prints them."""
 
 from __future__ import annotations
 
 import math
-import re
-import sys
 from itertools import zip_longest
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json import dump
-from frametool.errors import ValueInvalid, cells, printable
+from frametool.errors import printable
 from frametool.frames.stamps import format_stamp
 from frametool.geometry import floats, rigid
 from frametool.geometry.representations import ROTATIONS, ROWS, notation
-from frametool.geometry.transform import Transform
 from frametool.grammar.names import EARTH_FRAMES
 from frametool.grammar.pose import TIMES, Pose
 from frametool.grammar.result import (
     ROUNDED_TO_ZERO,
     Result,
-    edge_label,
     is_locked,
     placed,
     rotation_entry,
@@ -33,12 +26,7 @@ from frametool.grammar.result import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from rich.console import Console
-
-    from frametool.frames.lookups import Frames
-    from frametool.frames.track import Track
     from frametool.geometry.representations import Notation
-    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
 
 
@@ -321,136 +309,3 @@ def _block(result: Result, style: Style) -> str:
     cells = [f" {cell:>{decimals + 3}}" for cell in fixed(rigid.to_homogeneous(*components, floats))]
     lines += ["".join(cells[at : at + 4]) for at in range(0, 16, 4)]
     return "\n".join(lines) + "\n"
-
-
-WIDEST = 80  # cells of a line, if names and depth leave that much
-DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
-
-
-class DrawnFrame(NamedTuple):
-    """One frame of the drawing: the lines before its name, and its pose in its parent."""
-
-    branch: str
-    frame: str
-    label: tuple[str, ...]
-
-
-def write_tree(tree: Frames, style: Style) -> str:
-    """Draw a tree with plain lines: each frame below its parent, its pose behind it."""
-    return "".join(
-        f"{line.branch}{line.frame}{pad}{'  '.join(line.label)}".rstrip() + "\n" for line, pad in _padded(tree, style)
-    )
-
-
-def print_tree(tree: Frames, style: Style, color: str = "auto") -> None:
-    """Draw a tree on the terminal, in colour where it has any, or as `color` says: always or never."""
-    from rich.text import Text
-
-    console = coloured_console(color)
-    for line, pad in _padded(tree, style):
-        name = "bold green" if not line.label else "bold"
-        console.print(Text.assemble((line.branch, "dim"), (line.frame, name), pad, ("  ".join(line.label), "cyan")))
-
-
-def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
-    """Return an output, in colour where the terminal has any, or as `color` says: always or never.
-
-    Where there is no colour, also by NO_COLOR, nothing is bold or dim either.
-    """
-    import os
-
-    from rich.console import Console
-
-    plain = color == "never" or (color == "auto" and bool(os.environ.get("NO_COLOR")))
-    return Console(
-        file=sys.stderr if stderr else sys.stdout, highlight=False, soft_wrap=True, no_color=plain,
-        force_terminal=True if color == "always" else None,
-        color_system=None if plain else "auto" if color == "auto" else "standard",
-    )  # fmt: skip
-
-
-def _label(track: Track, style: Style, covariance: Components | None) -> tuple[str, ...]:
-    """Return the pose of an edge, how uncertain it is, and how it moves: its newest pose then."""
-    label: tuple[str, ...] = edge_label(Transform.of(*track.components), style, track.parent)
-    if covariance is not None:
-        label = *label, largest_sigmas(covariance)
-    if track.is_static:
-        return label
-    from frametool.frames.edge_log import motion
-
-    return *label, motion(track)
-
-
-def _padded(tree: Frames, style: Style) -> Iterator[tuple[DrawnFrame, str]]:
-    """Yield the lines with the blanks that bring their poses below one another.
-
-    Where that makes them too long levels are closer, sigmas are left out; where that is not enough either poses follow
-    their names.
-    """
-    lines = list(_lines(tree, style))
-    turns = max((len(line.label[1]) for line in lines if _is_uncertain(line)), default=0)
-    wide = [_in_column(line, turns) if _is_uncertain(line) else line for line in lines]
-    narrow = [line._replace(branch=re.sub("(.)..(.)", r"\1\2", line.branch)) for line in wide]  # 2 cells, not 4
-    plain = [
-        line._replace(label=(*each.label[:2], *each.label[2 + _is_uncertain(each) :]))
-        for line, each in zip(narrow, lines, strict=True)
-    ]
-    for lines in (wide, narrow, plain):
-        labels, names = [line.label for line in lines if line.label], _widest(lines)
-        positions = max((len(label[0]) for label in labels), default=0)
-        poses = 2 + positions + max((sum(2 + cells(part) for part in label[1:]) for label in labels), default=0)
-        if names + poses <= WIDEST:
-            break
-    else:
-        yield from ((part, "  " * bool(part.label)) for line in lines for part in _folded(line))
-        return
-    for line in lines:
-        label = (f"{line.label[0]:<{positions}}", *line.label[1:]) if line.label else ()
-        yield line._replace(label=label), " " * bool(label) * (names - len(line.branch) - cells(line.frame) + 2)
-
-
-def _is_uncertain(line: DrawnFrame) -> bool:
-    return len(line.label) > 2 and line.label[2].startswith("±")
-
-
-def _in_column(line: DrawnFrame, width: int) -> DrawnFrame:
-    position, rotation, *others = line.label
-    return line._replace(label=(position, f"{rotation:<{width}}", *others))
-
-
-def _folded(line: DrawnFrame) -> Iterator[DrawnFrame]:
-    """Yield a line, what comes behind its pose on one of its own where they are too long for one."""
-    begin = len(line.branch) + cells(line.frame)
-    if not line.label or begin + sum(2 + cells(part) for part in line.label) <= WIDEST:
-        yield line
-        return
-    first = 2 if begin + sum(2 + cells(part) for part in line.label[:2]) <= WIDEST else 0
-    yield line._replace(label=line.label[:first])
-    below = re.sub("[└─]", " ", line.branch).replace("├", "│")
-    rest = line.label[first:]
-    fits = len(below) + sum(2 + cells(part) for part in rest) <= WIDEST
-    yield from (DrawnFrame(below, "", part) for part in ([rest] if fits else [rest[:2], rest[2:]]) if part)
-
-
-def _widest(lines: Sequence[DrawnFrame]) -> int:
-    """Return how many cells the widest name takes, with the lines before it."""
-    return max((len(line.branch) + cells(line.frame) for line in lines), default=0)
-
-
-def _lines(tree: Frames, style: Style) -> Iterator[DrawnFrame]:
-    """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
-    children: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
-    for track in tree.tracks():
-        drawn = tree.drawn.get(track.child)
-        label = (drawn,) if drawn is not None else _label(track, style, tree.covariances.get(track.child))
-        children.setdefault(track.parent, []).append((track.child, label))
-    pending: list[tuple[str, tuple[str, ...], str, str]] = [(root, (), "", "") for root in reversed(tree.roots)]
-    while pending:
-        frame, label, branch, below = pending.pop()
-        if len(branch) > 4 * DEEPEST:
-            raise ValueInvalid(f"the tree is more than {DEEPEST} frames deep, too deep to draw; use --format json")
-        yield DrawnFrame(branch, printable(frame), label)
-        inner = children.get(frame, ())
-        for at in range(len(inner) - 1, -1, -1):
-            last = at == len(inner) - 1
-            pending.append((*inner[at], below + ("└── " if last else "├── "), below + ("    " if last else "│   ")))

@@ -1,7 +1,8 @@
-"""Progress bars on stderr, if it is a terminal and the job takes longer than two seconds."""
+"""The terminal through rich: in which colours, and progress bars on stderr for jobs longer than two seconds."""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from contextlib import suppress
@@ -9,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from typing import Self
+
+    from rich.console import Console
 
 PATIENCE = 2.0  # seconds before anything is shown
 
@@ -52,10 +55,23 @@ class ProgressBar:
 def _bar(total: int | None, counted: str) -> Any:
     from rich import progress
 
-    from frametool.view.pose_text import coloured_console
-
     text = f"{{task.fields[rows]}} {counted}  {{task.fields[rate]}} {counted}/s" if counted else "solving"
     columns: list[Any] = [progress.TextColumn(text)]
     if total:
         columns += [progress.BarColumn(), progress.TaskProgressColumn(), progress.TimeRemainingColumn()]
     return progress.Progress(*columns, console=coloured_console(stderr=True), transient=True)
+
+
+def coloured_console(color: str = "auto", *, stderr: bool = False) -> Console:
+    """Return an output, in colour where the terminal has any, or as `color` says: always or never.
+
+    Where there is no colour, also by NO_COLOR, nothing is bold or dim either.
+    """
+    from rich.console import Console
+
+    plain = color == "never" or (color == "auto" and bool(os.environ.get("NO_COLOR")))
+    return Console(
+        file=sys.stderr if stderr else sys.stdout, highlight=False, soft_wrap=True, no_color=plain,
+        force_terminal=True if color == "always" else None,
+        color_system=None if plain else "auto" if color == "auto" else "standard",
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Reports within 80 columns: edges of a recording, differences between trees, file formats."""
+"""Tables and reports within 80 columns: trees, edges of a recording, differences between trees, file formats."""
 
 from __future__ import annotations
 
@@ -8,80 +8,156 @@ from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from frametool.errors import cells, printable
+from frametool.errors import ValueInvalid, cells, printable
 from frametool.formats.table import CHOICES, FORMATS
+from frametool.frames.edge_log import motion
 from frametool.frames.stamps import format_stamp
-from frametool.view.pose_text import WIDTH, in_width
+from frametool.geometry.transform import Transform
+from frametool.grammar.result import edge_label
+from frametool.view.pose_text import WIDTH, in_width, largest_sigmas
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from frametool.frames.lookups import Frames
+    from frametool.frames.track import Track
     from frametool.grammar.result import Style
     from frametool.lint.tree_diff import Apart, Difference
 
 
+LARGE, NOTHING = 1e6, 1e-9  # from where on numbers have an exponent, and below which they are rounding
+BELOW = str.maketrans("├└─", "│  ")  # the lines of a drawing, a line further down
+
+
+def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> list[str]:
+    """Return rows as lines of aligned cells, within WIDTH or the terminal's if possible; empty columns are left out.
+
+    left: which columns are aligned to the left; if the last one is, it holds remarks, of any length.
+    A first cell that leaves its row no room has a line of its own, and so has a remark.
+    """
+    width = max(WIDTH, get_terminal_size((WIDTH, 0)).columns)
+    widths = [max(map(cells, column)) for column in zip(*rows, strict=True)]
+    numeric = widths[1:-1] if left[-1] else widths[1:]
+    room = width - sum(2 + size for size in numeric if size)
+    widths[0] = max((cells(row[0]) for row in rows if cells(row[0]) <= room), default=0)
+    lines = []
+    for first, *others in rows:
+        indent = first[: len(first) - len(first.lstrip("│├└─ "))].translate(BELOW)
+        begin = first if cells(first) <= room else indent
+        padded = [
+            cell + pad if is_left else pad + cell
+            for cell, is_left, size in zip((begin, *others), left, widths, strict=True)
+            if (pad := " " * (size - cells(cell))) or size
+        ]
+        line = "  ".join(padded).rstrip()
+        lines += [short(first, width)] * (begin != first)
+        if left[-1] and cells(line) > width:
+            lines += ["  ".join(padded[:-1]).rstrip(), *folded(others[-1], f"{indent}  ")]
+        elif begin == first or any(others):
+            lines.append(line)
+    return lines
+
+
+def folded(text: str, indent: str = "  ") -> Iterator[str]:
+    """Wrap a text by display width, with a hanging indent."""
+    line = indent[:-1]
+    for word in (short(word, WIDTH - len(indent) - 2) for word in text.split(" ")):
+        if cells(line) + cells(word) >= WIDTH and line.strip():
+            yield line
+            line = f"{indent} "
+        line += f" {word}"
+    yield line
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """Write a number with some decimals; with an exponent where that says nothing or too much; no minus zero."""
+    if value is None:
+        return "-"
+    is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
+    return f"{round(value, decimals) + 0.0:.{decimals}f}" if is_plain else f"{value:.1e}"
+
+
+DEEPEST = 1000  # levels; the lines of a drawing grow with its depth
+TREE_MARKS = (r"(?m)^(?P<green>[^│├└ \n].*)", r"(?m)^(?P<dim>[│├└─ ]*)(?P<bold>\S.*?)?(?P<cyan>  +\S.*)?$")
+
+
+def write_tree(tree: Frames, style: Style) -> str:
+    """Draw a tree: each frame below its parent, with its pose there, how uncertain that is, and how it moves."""
+    return "".join(f"{line}\n" for line in columns([*_frames(tree, style)], (True, True, True, True)))
+
+
+def _frames(tree: Frames, style: Style) -> Iterator[tuple[str, ...]]:
+    """Walk the tree from its roots, children in the order they were added; a stack, so that no tree is too deep."""
+    children: dict[str, list[Track]] = {}
+    for each in tree.tracks():
+        children.setdefault(each.parent, []).append(each)
+    pending: list[tuple[str, Track | None, str, str]] = [(root, None, "", "") for root in reversed(tree.roots)]
+    while pending:
+        frame, track, branch, below = pending.pop()
+        if len(branch) > 2 * DEEPEST:
+            raise ValueInvalid(f"the tree is more than {DEEPEST} frames deep, too deep to draw; use --format json")
+        yield branch + printable(frame), *(("", "", "") if track is None else _label(tree, track, style))
+        line, further = "└ ", "  "
+        for each in reversed(children.get(frame, ())):
+            pending.append((each.child, each, below + line, below + further))
+            line, further = "├ ", "│ "
+
+
+def _label(tree: Frames, track: Track, style: Style) -> tuple[str, str, str]:
+    """Return position, rotation and remarks of an edge, its newest pose if it moves."""
+    if (drawn := tree.drawn.get(track.child)) is not None:
+        return "", "", drawn
+    covariance = tree.covariances.get(track.child)
+    remarks = [] if covariance is None else [largest_sigmas(covariance)]
+    remarks += [] if track.is_static else [motion(track)]
+    return *edge_label(Transform.of(*track.components), style, track.parent), "  ".join(remarks)
+
+
 HEADINGS = {
-    "rate_hz": "rate Hz", "first_ns": "first", "last_ns": "last", "gap_s": "gap s", "delay_mean_s": "delay s",
-    "delay_max_s": "max s", "backward": "back", "parent_changes": "parents",
+    "parent": "parent <- child", "rate_hz": "rate Hz", "first_ns": "first", "last_ns": "last", "gap_s": "gap s",
+    "delay_mean_s": "delay s", "delay_max_s": "max s", "backward": "back", "parent_changes": "parents",
 }  # fmt: skip
 MOTION = ("length_m", "duration_s", "speed_mean", "speed_max", "gaps")  # a sentence for each edge that moves
-HIDDEN = ("kind", "gap_until_ns", "parents", "overlap", *MOTION)
+HIDDEN = ("kind", "child", "gap_until_ns", "parents", "overlap", *MOTION)
 RARE = ("parent_changes",)  # left out where all are 0
-LEFT = ("parent", "child", "topics")
 
 
-def write_report(entries: Sequence[dict[str, Any]], style: Style) -> str:  # noqa: ARG001 - the numbers here are for reading
+def write_report(entries: Sequence[dict[str, Any]]) -> str:
     """Return the edges as an aligned table without empty columns."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key not in RARE) for entry in edges)]
-    rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry[key]) for key in shown] for entry in edges)]
-    lines = columns(rows, [key in LEFT for key in shown])
-    if max(map(cells, lines)) > max(WIDTH, get_terminal_size((WIDTH, 0)).columns):
-        lines = [line for row in rows[1:] for line in _folded_edge(dict(zip(shown, row, strict=True)), rows[0])]
+    rows = [[HEADINGS.get(key, key) for key in shown], *([_cell(key, entry) for key in shown] for entry in edges)]
+    lines = columns(rows, [key in ("parent", "topics") for key in shown])
     table = "".join(f"{line}\n" for line in lines)
     table += "".join(map(_motion, (entry for entry in edges if entry["length_m"])))
     return table + "".join(map(_chain, (entry for entry in entries if entry["kind"] == "chain")))
 
 
-def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> list[str]:
-    """Return rows as lines with aligned cells; left: which columns are aligned to the left."""
-    widths = [max(map(cells, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for row in rows:
-        padded = ((cell, " " * (width - cells(cell))) for cell, width in zip(row, widths, strict=True))
-        parts = (cell + pad if is_left else pad + cell for (cell, pad), is_left in zip(padded, left, strict=True))
-        lines.append("  ".join(parts).rstrip())
-    return lines
-
-
 def trouble(entries: Sequence[dict[str, Any]]) -> tuple[str, ...]:
     """Return the patterns that highlight problems in a report; each group is named by its colour."""
-    bad = [entry for entry in entries if entry["jumps"] or entry["backward"]]
-    names = ((re.escape(printable(entry["parent"])), re.escape(printable(entry["child"]))) for entry in bad)
-    rows = (rf"(?m)^(?P<red>{parent} +{child} .*)$" for parent, child in names)
-    said = r"(?P<red>\b(?:jumps|back) [1-9]\d*)", r"(?m)(?P<magenta>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
-    return *rows, *said
+    bad = [re.escape(_edge(entry)) for entry in entries if entry["jumps"] or entry["backward"]]
+    rows = (rf"(?m)^(?P<red>{edge} .*)$" for edge in bad)
+    return *rows, r"(?m)(?P<magenta>\b[1-9]\d* gaps?)$", r"(?P<red>share no time)"
 
 
-def _folded_edge(row: dict[str, str], titles: Sequence[str]) -> list[str]:
-    """Return one edge as lines, for when the table is too wide: its frames, then its values."""
-    parent, child = (short(row[key], WIDTH // 2 - 4) for key in ("parent", "child"))
-    said = [f"{title} {short(cell, WIDTH - 20)}" for title, (key, cell) in zip(titles, row.items(), strict=True)
-            if cell and key not in ("parent", "child")]  # fmt: skip
-    return [f"{parent} <- {child}", *wrap(", ".join(said), WIDTH - 2, initial_indent="  ", subsequent_indent="  ")]
+def _edge(entry: dict[str, Any]) -> str:
+    return f"{printable(entry['parent'])} <- {printable(entry['child'])}"
 
 
 def _motion(entry: dict[str, Any]) -> str:
     """Return the sentence on a moving edge: length, duration, speed, gaps."""
     speed = f"{entry['speed_mean']:.3f} m/s (at most {entry['speed_max']:.3f})"
     gaps = f"{entry['gaps']} gap{'s' * (entry['gaps'] != 1)}"
-    begin = f"{short(entry['parent'], WIDTH // 2 - 4)} <- {short(entry['child'], WIDTH // 2 - 4)}:"
+    begin = f"{short(_edge(entry), WIDTH - 1)}:"
     return in_width(begin, f"{entry['length_m']:.3f} m in {entry['duration_s']:.3f} s, {speed}, {gaps}")
 
 
-def _cell(key: str, value: Any) -> str:
+def _cell(key: str, entry: dict[str, Any]) -> str:
     """Write a value; its key ends with its unit."""
+    if key == "parent":
+        return _edge(entry)
+    value = entry[key]
     if value is None:
         return "static" if key == "rate_hz" else ""
     if key.endswith("_ns"):
@@ -102,10 +178,6 @@ def _chain(entry: dict[str, Any]) -> str:
     return in_width(f"{entry['parents']}:", sentence)
 
 
-NUMBER = 11  # columns of each number
-LABEL = WIDTH - 4 * NUMBER
-
-
 def write_diff(found: Iterable[Difference]) -> str:
     """Return the differences grouped under headings."""
     kinds: dict[str, list[Difference]] = {}
@@ -120,6 +192,7 @@ def write_diff(found: Iterable[Difference]) -> str:
 
 _HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "other parent", "motion": "stands or moves",
              "no-data": "no data", "samples": "other samples", "camera": "other intrinsics"}  # fmt: skip
+LONGEST = 22  # characters of a heading over two columns
 
 
 def _said(each: Difference) -> str:
@@ -134,39 +207,23 @@ def _said(each: Difference) -> str:
     elif each.own:
         text += f" by up to {each.own}"
     text += f": {each.note}" if each.note else ""
-    lines = list(_folded(text))
+    lines = list(folded(text))
     if each.kind == "parent" and each.seen:
         lines.append(f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}")
     return "".join(f"{line}\n" for line in lines)
 
 
-def _folded(text: str) -> Iterator[str]:
-    """Wrap a text by display width, with a hanging indent."""
-    line = " "
-    for word in (short(word, WIDTH - 4) for word in text.split(" ")):
-        if cells(line) + cells(word) >= WIDTH and line.strip():
-            yield line
-            line = "   "
-        line += f" {word}"
-    yield line
-
-
 def _table(start: str | None, found: Sequence[Difference]) -> str:
     """Return the table of moved frames, seen from one frame."""
-    both = 2 * NUMBER
-    seen = short(f"seen from {start}" if start is not None else "seen from elsewhere", both - 2)
-    head = f"{'moved':<{LABEL}}{'in its parent':>{both}}{' ' * (both - cells(seen))}{seen}\n"
-    units = f"{'':{LABEL}}" + 2 * f"{'mm':>{NUMBER}}{'deg':>{NUMBER}}" + "\n"
-    return head + units + "".join(map(_row, found))
+    seen = short(f"seen from {start}" if start is not None else "seen from elsewhere", LONGEST)
+    rows = [["moved", "in its parent", "", seen, ""], ["", "mm", "deg", "mm", "deg"], *map(_row, found)]
+    return "".join(f"{line}\n" for line in columns(rows, (True, False, False, False, False)))
 
 
-def _row(each: Difference) -> str:
-    """Return the row of one frame; two lines if its name is long."""
+def _row(each: Difference) -> list[str]:
+    """Return the row of one frame."""
     label = f"  {each.frame} in {each.parent_a}" if each.parent_a is not None else f"  {each.frame}"
-    numbers = "".join(f"{text:>{NUMBER}}" for text in (*_numbers(each.own), *_numbers(each.seen)))
-    label = short(label, WIDTH)
-    gap = LABEL - cells(label)
-    return f"{label}{' ' * gap}{numbers}\n" if gap > 0 else f"{label}\n{'':{LABEL}}{numbers}\n"
+    return [printable(label), *_numbers(each.own), *_numbers(each.seen)]
 
 
 def _numbers(apart: Apart | None) -> tuple[str, str]:
@@ -175,11 +232,7 @@ def _numbers(apart: Apart | None) -> tuple[str, str]:
         return "-", "-"
     metres = 0.0 if apart.metres <= apart.rounding else apart.millimetres
     turn = 0.0 if apart.radians <= apart.turn_rounding else apart.degrees
-    length, angle = (
-        f"{value:.{decimals}f}" if value == 0.0 or 0.5 * 10.0**-decimals <= value < 1e6 else f"{value:.2e}"
-        for value, decimals in ((metres, 3), (turn, 4))
-    )
-    return length, angle
+    return fixed(metres, 3), fixed(turn, 4)
 
 
 def short(name: str, width: int) -> str:

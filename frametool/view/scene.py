@@ -1,7 +1,7 @@
 """The scene: which frames of a tree are drawn, in which fixed frame, at which time; poses and trails in metres.
 
 Shared by the page, SVG, PNG, GLB and the terminal.  Also the orthographic projection to pixels, and the placement of
-names without overlaps; a grid of cells holds the taken boxes, so that only near ones are compared.
+names without overlaps, in a grid of cells.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,7 +25,6 @@ from frametool.text.numbers import parse_angle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-    from typing import TypeVar
 
     import numpy as np
     from numpy.typing import NDArray
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 
     Point = tuple[float, float, float]
     Box = tuple[float, float, float, float]  # left, top, right, bottom
-    Spot = TypeVar("Spot")
 
 PARTS = 8  # of the way between two stamps, so that a trail is round where a frame turns
 FEW_STAMPS = 500  # above, a trail has one point a stamp
@@ -299,12 +297,17 @@ class Size(NamedTuple):
     width, height: in pixels, or dots of a terminal.
     margin: pixels left free on each side, for names.
     axes: the least and the greatest length of drawn axes, in pixels.
+    cell: width and height of the cells that names are placed in; line: height of a name, whole cells.
+    measure: returns the width of a text.
     """
 
     width: float
     height: float
     margin: float
     axes: tuple[float, float]
+    cell: tuple[int, int]
+    line: float
+    measure: Callable[[str], float]
 
 
 class Projection:
@@ -444,17 +447,17 @@ def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]
     return [min(column) for column in columns], [max(column) for column in columns]
 
 
-CELL = 64.0  # pixels
-DISTANCES = (9.0, 16.0, 26.0, 40.0, 58.0, 80.0)  # pixels from a frame to its name
+DISTANCES = (0.6, 1.1, 1.75, 2.7, 3.9, 5.4)  # lines from a frame to its name
 SIDES = ((1.0, -0.6), (1.0, 0.6), (-1.0, -0.6), (-1.0, 0.6), (0.0, -1.3), (0.0, 1.3), (1.0, 0.0), (-1.0, 0.0))
 SAME = 3.0  # pixels within which frames share a name
+MOST_SHARED = 2  # names that are side by side
+MARGIN = 2.0  # pixels on both sides of a name
 LONGEST = 60  # characters of a name
-FONT = 12.0  # pixels
 WIDE, THIN = "mwMW_@", "il.·tfjrI "
 
 
 class Label(NamedTuple):
-    """A placed name: its text, the point it labels, its box, and its distance from the point."""
+    """A placed name: its text, the point it labels, its box in whole cells with margins, its distance in lines."""
 
     words: str
     point: Flat
@@ -462,99 +465,69 @@ class Label(NamedTuple):
     away: float
 
 
-class TakenBoxes:
-    """Boxes that must not be covered.
+class Labels:
+    """Names next to frames that cover neither one another nor, if possible, an axis."""
 
-    Boxes that are equal to a pixel are stored once, so that a million frames on one spot cost no more than one.
-    """
+    def __init__(self, flat: Projection, blocked: Iterable[Box] = ()) -> None:
+        """Reserve the cells of frames and of some boxes."""
+        self._flat, self._size = flat, flat.size
+        self.placed: list[Label] = []
+        self.hidden = 0  # names without room
+        self._taken = {cell for box in blocked for cell in self._cells(box)}
+        self._taken |= {cell for x, y, _ in flat.origins.values() for cell in self._cells((x, y, x, y))}
+        parts = (0.4, 0.7, 1.0)
+        tips = (tip for name in flat.poses for part in parts for tip in flat.tips(name, part))
+        self._axes = {cell for x, y, _ in tips for cell in self._cells((x, y, x, y))}
 
-    def __init__(self) -> None:
-        """Create an empty grid."""
-        self._cells: dict[tuple[int, int], list[Box]] = {}
-        self._known: set[tuple[int, ...]] = set()
+    def place_all(self) -> None:
+        """Place a name next to each group of frames on one point inside the picture, nearest first."""
+        outside = {*self._flat.outside()}
+        for point, everybody in self._flat.groups(SAME):
+            names = [name for name in everybody if name not in outside]
+            if names and not self.place(self._around(words_of(names), point)):
+                self.hidden += len(names)
 
-    def add(self, box: Box) -> None:
-        """Add a box."""
-        rounded = tuple(map(round, box))
-        if rounded in self._known:
-            return
-        self._known.add(rounded)
-        for cell in _cells(box):
-            self._cells.setdefault(cell, []).append(box)
+    def place(self, spots: Iterable[Label]) -> bool:
+        """Place a name at the first free spot, or else at the first that covers axes only; return False for none."""
+        free = (spot for spot in spots if self._taken.isdisjoint(self._cells(spot.box)))
+        first = next(free, None)
+        if first is None:
+            return False
+        found = next((spot for spot in chain([first], free) if self._axes.isdisjoint(self._cells(spot.box))), first)
+        self._taken.update(self._cells(found.box))
+        self.placed.append(found)
+        return True
 
-    def meets(self, box: Box) -> bool:
-        """Return True if a box overlaps one of them."""
-        left, top, right, bottom = box
-        return any(
-            left < other[2] and right > other[0] and top < other[3] and bottom > other[1]
-            for cell in _cells(box)
-            for other in self._cells.get(cell, ())
-        )
+    def at(self, words: str, point: Flat, left: float, middle: float, away: float = 0.0) -> Iterator[Label]:
+        """Yield the label at a place, moved to the nearest cells, if it is inside the picture."""
+        wide, high = self._size.cell
+        left, top = wide * round(left / wide), high * round((middle - self._size.line / 2.0) / high)
+        right, bottom = left + wide * math.ceil(self._size.measure(words) / wide), top + self._size.line
+        if left >= 0.0 and right <= self._size.width and top >= 0.0 and bottom <= self._size.height:
+            yield Label(words, point, (left - MARGIN, top, right + MARGIN, bottom), away)
 
+    def _around(self, words: str, point: Flat) -> Iterator[Label]:
+        """Yield the candidate positions of a name, best first."""
+        wide, line = self._size.measure(words), self._size.line
+        for away in DISTANCES:
+            for dx, dy in SIDES:
+                left = point.x + dx * away * line - (wide if dx < 0.0 else wide / 2.0 if dx == 0.0 else 0.0)
+                yield from self.at(words, point, left, point.y + dy * away * line, away)
 
-def _cells(box: Box) -> Iterator[tuple[int, int]]:
-    left, top, right, bottom = (math.floor(edge / CELL) for edge in box)
-    return product(range(left, right + 1), range(top, bottom + 1))
-
-
-def place_labels(flat: Projection, *, blocked: Iterable[Box] = ()) -> tuple[list[Label], int]:
-    """Place a name next to each group of frames on one point, nearest first.
-
-    blocked: boxes to keep free.
-    Returns the placed names and the number without room.
-    """
-    taken, axes = TakenBoxes(), TakenBoxes()
-    for box in blocked:
-        taken.add(box)
-    for name in flat.poses:
-        x, y, _ = flat.origins[name]
-        taken.add((x - 3.0, y - 3.0, x + 3.0, y + 3.0))
-        for part in (0.4, 0.7, 1.0):
-            for tip in flat.tips(name, part):
-                axes.add((tip.x - 2.0, tip.y - 2.0, tip.x + 2.0, tip.y + 2.0))
-    placed, hidden = [], 0
-    for point, names in flat.groups(SAME):
-        spots = _spots(flat, words_of(names), point)
-        found = best_spot(spots, lambda spot: taken.meets(spot.box), lambda spot: axes.meets(spot.box))
-        if found is None:
-            hidden += len(names)
-        else:
-            taken.add(found.box)
-            placed.append(found)
-    return placed, hidden
+    def _cells(self, box: Box) -> Iterator[tuple[int, int]]:
+        """Return the cells that a box covers; a point covers one."""
+        (wide, high), (left, top, right, bottom) = self._size.cell, box
+        across = range(math.floor(left / wide), max(math.ceil(right / wide), math.floor(left / wide) + 1))
+        return product(across, range(math.floor(top / high), max(math.ceil(bottom / high), math.floor(top / high) + 1)))
 
 
-def best_spot(spots: Iterable[Spot], is_taken: Callable[[Spot], bool], on_axes: Callable[[Spot], bool]) -> Spot | None:
-    """Return the first free spot, or else the first that covers axes only."""
-    second = None
-    for spot in spots:
-        if is_taken(spot):
-            continue
-        if not on_axes(spot):
-            return spot
-        second = second or spot
-    return second
-
-
-def _spots(flat: Projection, words: str, point: Flat) -> Iterator[Label]:
-    """Yield the candidate positions of a name inside the picture, best first."""
-    wide = text_width(words, FONT)
-    for away in DISTANCES:
-        for dx, dy in SIDES:
-            left = point.x + dx * away - (wide if dx < 0.0 else wide / 2.0 if dx == 0.0 else 0.0)
-            middle = point.y + dy * away
-            box = left - 2.0, middle - 0.62 * FONT, left + wide + 2.0, middle + 0.62 * FONT
-            if box[0] > 2.0 and box[2] < flat.size.width - 2.0 and box[1] > 2.0 and box[3] < flat.size.height - 2.0:
-                yield Label(words, point, box, away)
-
-
-def text_width(words: str, size: float) -> float:
+def text_width(words: str, size: float = 12.0) -> float:
     """Estimate the width of a text in pixels, rather too wide than too narrow."""
     return size * sum(0.9 if letter in WIDE else 0.36 if letter in THIN else 0.62 for letter in words) + 2.0
 
 
-def words_of(names: list[str], most: int = 2) -> str:
+def words_of(names: list[str]) -> str:
     """Return the label of frames on one point: some of their names, and the number of others."""
-    shown_names = map(printable, names[:most])
+    shown_names = map(printable, names[:MOST_SHARED])
     words = " · ".join(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in shown_names)
-    return words + (f" +{len(names) - most}" if len(names) > most else "")
+    return words + (f" +{len(names) - MOST_SHARED}" if len(names) > MOST_SHARED else "")

@@ -10,13 +10,12 @@ from itertools import groupby, pairwise
 from operator import itemgetter
 from time import monotonic
 from typing import TYPE_CHECKING
-from unicodedata import east_asian_width
 
-from frametool.errors import printable
+from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE
-from frametool.view.pose_text import coloured_console
-from frametool.view.scene import SLANTED, Flat, Projection, Size, best_spot, nice, words_of
+from frametool.view.progress import coloured_console
+from frametool.view.scene import SLANTED, Flat, Labels, Projection, Size, nice, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import IssuedCommand, SimulationStep
-    from frametool.view.scene import FrameScene
+    from frametool.view.scene import FrameScene, Label
 
     Run = tuple[str, str]  # text and its style
     Spot = tuple[int, int]  # line and column
@@ -68,10 +67,6 @@ class Canvas:
         across, down = self._dots(x, y)
         return down // 4, across // 2
 
-    def rank(self, line: int, column: int) -> int:
-        """Return the rank of a cell; -1 if it is empty."""
-        return self._cells.get((line, column), (0, "", -1))[2]
-
     def row(self, line: int) -> Iterator[tuple[str, str]]:
         """Yield the characters of a line, each with its colour."""
         for column in range(self.columns):
@@ -93,8 +88,6 @@ LINK, TRAIL, AXIS = range(3)  # ranks of dots
 AXES = ("red", "green", "blue")
 ARROWS = "→↗↑↖←↙↓↘"
 LEAST_LINES, LEAST_COLUMNS = 4, 20
-SAME = 3.0  # dots within which frames share a name
-MOST_SHARED = 8  # names that are side by side
 MOST_OUTSIDE = 12  # frames that are pointed to
 
 
@@ -105,14 +98,20 @@ class TerminalPicture:
         """Draw it."""
         self._canvas = Canvas(max(lines, LEAST_LINES) - 1, max(columns, LEAST_COLUMNS))
         wide, high = 2.0 * self._canvas.columns, 4.0 * self._canvas.lines
-        self._flat = Projection(scene, Size(wide, high, min(14.0, wide / 8.0, high / 8.0), (6.0, 14.0)), eye, most=True)
-        self._names: dict[Spot, Run] = {}  # letter by letter
+        margin = min(14.0, wide / 8.0, high / 8.0)
+        size = Size(wide, high, margin, (6.0, 14.0), cell=(2, 4), line=4.0, measure=lambda words: 2.0 * cells(words))
+        self._flat = Projection(scene, size, eye, most=True)
         self._draw()
-        outside = self._flat.outside()
-        pointed, apart = sum(map(self._point_to, outside[:MOST_OUTSIDE])), {*outside}
-        groups = [(place, [name for name in names if name not in apart]) for place, names in self._flat.groups(SAME)]
-        hidden = len(outside) - pointed + sum(bool(names) and not self._place(place, names) for place, names in groups)
-        self._scale = self._scale_line(eye, hidden)
+        labels, outside = Labels(self._flat), self._flat.outside()
+        pointed = sum(labels.place(self._at_edge(labels, name)) for name in outside[:MOST_OUTSIDE])
+        arrows = len(labels.placed)
+        labels.place_all()
+        self._names: dict[Spot, Run] = {}  # letter by letter
+        for number, label in enumerate(labels.placed):
+            line, column = int(label.box[1]) // 4, int(label.box[0]) // 2 + 1
+            style = "dim" if number < arrows else "bold"
+            self._names |= {(line, column + at): (letter, style) for at, letter in enumerate(_letters(label.words))}
+        self._scale = self._scale_line(eye, len(outside) - pointed + labels.hidden)
 
     def lines(self) -> Iterator[list[Run]]:
         """Yield the lines as runs of one style."""
@@ -157,45 +156,20 @@ class TerminalPicture:
     def _is_inside(self, place: Flat) -> bool:
         return 0.0 <= place.x < 2.0 * self._canvas.columns and 0.0 <= place.y < 4.0 * self._canvas.lines
 
-    def _place(self, place: Flat, names: list[str]) -> bool:
-        """Write a name where it covers no other and, if possible, no axis; return False if there is no room."""
-        for most in range(min(len(names), MOST_SHARED), 0, -1):
-            letters = list(_cells(words_of(names, most)))
-            around = _around(math.floor(place.y) // 4, math.floor(place.x) // 2, len(letters))
-            spots = ([(line, column + offset) for offset in range(-1, len(letters) + 1)] for line, column in around)
-            found = best_spot(spots, self._is_taken, self._is_on_axes)
-            if found:
-                self._names |= zip(found[1:-1], ((letter, "bold") for letter in letters), strict=True)
-                return True
-        return False
-
-    def _point_to(self, name: str) -> bool:
-        """Point at the edge to a frame beyond it, with its distance; return False if there is no room."""
+    def _at_edge(self, labels: Labels, name: str) -> Iterator[Label]:
+        """Yield the places at an edge for a frame beyond it: its name and distance with an arrow, the nearest first."""
         x, y, _ = self._flat.origins[name]
-        across, down = x - self._canvas.columns, y - 2.0 * self._canvas.lines
+        half_wide, half_high = self._flat.size.width / 2.0, self._flat.size.height / 2.0
+        across, down = x - half_wide, y - half_high
         arrow = ARROWS[round(math.atan2(-down, across) / (math.pi / 4.0)) % 8]
         away = math.dist(self._flat.poses[name][:3], self._flat.centre)
         said = f"{words_of([name])} {away:.0f} m" if away >= 10.0 else f"{words_of([name])} {away:.2g} m"
-        letters = list(_cells(f"{said} {arrow}" if across > 0.0 else f"{arrow} {said}"))
-        part = min(self._canvas.columns / max(abs(across), 1e-9), 2.0 * self._canvas.lines / max(abs(down), 1e-9))
-        middle = round(self._canvas.columns / 2.0 + across * part / 2.0 - (len(letters) if across > 0.0 else 0.0))
-        column = min(max(middle, 0), self._canvas.columns - len(letters))
-        line = round(self._canvas.lines / 2.0 + down * part / 4.0)
-        for near in sorted(range(self._canvas.lines), key=lambda each: abs(each - line))[:MOST_OUTSIDE]:
-            cells = [(near, column + offset) for offset in range(-1, len(letters) + 1)]
-            if not self._is_taken(cells):
-                self._names |= zip(cells[1:-1], ((letter, "dim") for letter in letters), strict=True)
-                return True
-        return False
-
-    def _is_on_axes(self, cells: list[Spot]) -> bool:
-        return any(self._canvas.rank(*cell) >= AXIS for cell in cells)
-
-    def _is_taken(self, cells: list[Spot]) -> bool:
-        """Return True if cells are beyond the picture or hold another name; the first and the last are margins."""
-        (line, before), (_, behind) = cells[0], cells[-1]
-        inside = 0 <= line < self._canvas.lines and before >= -1 and behind <= self._canvas.columns
-        return not inside or any(cell in self._names for cell in cells)
+        words = f"{said} {arrow}" if across > 0.0 else f"{arrow} {said}"
+        part = min(half_wide / max(abs(across), 1e-9), half_high / max(abs(down), 1e-9))
+        room = self._flat.size.width - 2.0 * cells(words)
+        left = min(max(half_wide + across * part - (2.0 * cells(words) if across > 0.0 else 0.0), 0.0), room)
+        for line in sorted(range(self._canvas.lines), key=lambda line: abs(4 * line + 2 - half_high - down * part)):
+            yield from labels.at(words, self._flat.origins[name], left, 4 * line + 2)
 
     def _scale_line(self, eye: tuple[float, float], hidden: int) -> list[Run]:
         """Return the scale, the direction of view, and the number of names without room."""
@@ -225,26 +199,11 @@ def _rich_text(picture: TerminalPicture) -> Text:
     return Text("\n").join(Text.assemble(*line) for line in picture.lines())
 
 
-def _cells(words: str) -> Iterator[str]:
+def _letters(words: str) -> Iterator[str]:
     """Yield the content of each cell of a text; a wide letter takes two, the second one empty."""
     for letter in words:
         yield letter
-        if east_asian_width(letter) in "WF":
-            yield ""
-
-
-def _around(line: int, column: int, wide: int) -> Iterator[Spot]:
-    """Yield the candidate positions of a name of some cells, best first."""
-    yield line, column + 2
-    yield line, column - 1 - wide
-    for away in (1, -1):
-        yield line + away, column + 1
-        yield line + away, column - wide
-    for away in (2, -2):
-        yield line + away, column - wide // 2
-        yield line + away, column + 2
-    for away in (3, -3):
-        yield line + away, column - wide // 2
+        yield from [""] * (cells(letter) - 1)
 
 
 SCREEN_FRAME = 1.0 / 20.0  # seconds

@@ -131,7 +131,8 @@ def test_trouble_is_no_limit_passed(run: Run) -> None:
 
 
 @pytest.mark.parametrize("form", ["text", "csv", "markdown", "latex"])
-def test_several_estimates_are_a_table(run: Run, form: str) -> None:
+def test_several_estimates_are_a_table(run: Run, monkeypatch: pytest.MonkeyPatch, form: str) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     lines = run("compare", "drone-ref.tum", "drone-est.tum", "handheld-est.tum", "-f", form, files=FILES).out.splitlines()
     names = [at for at, line in enumerate(lines) if "est.tum" in line]
     assert len(names) == 2

@@ -42,9 +42,9 @@ def test_different_trees_are_1_and_told_in_parts(run: Run) -> None:
     assert (found.status, found.err) == (1, "")
     assert found.out == (
         "only in A:\n  old in base\n\nonly in B:\n  new in base\n\n"
-        "moved                                        in its parent        seen from base\n"
-        "                                             mm        deg         mm        deg\n"
-        "  camera in mast                          2.000     0.0000      2.000     0.0000\n"
+        "moved             in its parent          seen from base\n"
+        "                             mm     deg              mm     deg\n"
+        "  camera in mast          2.000  0.0000           2.000  0.0000\n"
     )
 
 
@@ -138,7 +138,7 @@ def test_intrinsics_that_cannot_be_compared_are_noted(run: Run) -> None:
 def test_all_lists_the_frames_that_did_not_move_too(run: Run) -> None:
     entries = [json.loads(line) for line in run("diff", "a.yaml", "b.yaml", "--all", "-f", "json", files=FILES).out.splitlines()]
     assert {each["frame"] for each in entries if each["kind"] == "same"} == {"base", "mast", "lidar"}
-    assert "  lidar in mast                           0.000     0.0000      0.000" in run("diff", "a.yaml", "b.yaml", "--all").out
+    assert "  lidar in mast           0.000  0.0000           0.000" in run("diff", "a.yaml", "b.yaml", "--all").out
 
 
 @pytest.mark.parametrize(
@@ -197,9 +197,12 @@ def test_a_report_goes_into_a_file_whose_suffix_says_its_form(run: Run, tmp_path
 
 
 @pytest.mark.parametrize("name", ["a" * 100, "\u6a5f\u68b0" * 30, "x\x1b[31m", "with blank " * 9])
-def test_the_report_fits_80_columns_and_steers_no_terminal(run: Run, name: str) -> None:
+def test_the_report_fits_80_columns_and_steers_no_terminal(
+    run: Run, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     from frametool.errors import cells
 
+    monkeypatch.setenv("COLUMNS", "80")
     one = f"frames: {{{json.dumps(name)}: {{{json.dumps(name + 'b')}: {{xyz: [0, 0, 1]}}, old: {{xyz: [1, 0, 0]}}}}}}"
     other = one.replace("0, 1]", "1000, 1]").replace("old", "new") + f"\n---\n{{name: {json.dumps(name)}, parent: top}}"
     for pair in ((one, other), (other, one)):

@@ -213,7 +213,10 @@ def test_a_tree_written_and_read_again_has_the_same_bits(name: str, run: Run) ->
     assert run("lookup", "-", *asked, stdin=first.out).out == run("lookup", name, *asked).out
 
 
-def test_a_tree_at_a_time_keeps_its_covariances_and_the_drawing_shows_the_largest(run: Run) -> None:
+def test_a_tree_at_a_time_keeps_its_covariances_and_the_drawing_shows_the_largest(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     done = run("tree", "drive.yaml", "--at", "0.5", "-f", "json", files=FILES)
     assert sum("covariance" in each for each in json.loads(done.out)["frames"]) == 3
     done = run("tree", "drive.yaml", "-f", "text")

@@ -27,9 +27,9 @@ edge [style=invis];
 }}"""
 SHOWN = """\
 odom
-└── base link  30.21 Hz over 4.7 s
-    ├── laser  static
-    └── tag    one at 12.5 s
+└ base link  30.21 Hz over 4.7 s
+  ├ laser    static
+  └ tag      one at 12.5 s
 """
 OLD = """digraph G {
 "/world" -> "/turtle1"[label="Broadcaster: /a\\nAverage rate: 62.7 Hz\\nMost recent transform: 5.9 ( 0.1 sec old)\\n\
@@ -59,10 +59,10 @@ REMEDY = "no poses in it (frametool tree shows the frames); give what it was mad
     [
         ("frames.gv", ROS, SHOWN),
         ("frames.txt", f"\ufeff// of the robot\n{ROS}\n", SHOWN),
-        ("frames.gv", OLD, "world\n└── turtle1  62.7 Hz over 4.9 s\n"),
-        ("frames.yaml", LISTING, "odom\n└── base       20.5 Hz over 4 s\n    └── laser  static\n"),
-        ("a.dot", "digraph { map->odom->base; map -> tag [color=red] }", "map\n├── odom\n│   └── base\n└── tag\n"),
-        ("a.dot", 'digraph {\n"a \\"b\\"";\n"a \\"b\\"" -> c\n}', 'a "b"\n└── c\n'),
+        ("frames.gv", OLD, "world\n└ turtle1  62.7 Hz over 4.9 s\n"),
+        ("frames.yaml", LISTING, "odom\n└ base     20.5 Hz over 4 s\n  └ laser  static\n"),
+        ("a.dot", "digraph { map->odom->base; map -> tag [color=red] }", "map\n├ odom\n│ └ base\n└ tag\n"),
+        ("a.dot", 'digraph {\n"a \\"b\\"";\n"a \\"b\\"" -> c\n}', 'a "b"\n└ c\n'),
     ],
 )
 def test_tree_shows_names_and_rates_and_says_that_there_are_no_poses(
@@ -132,7 +132,7 @@ def test_what_is_no_tree_is_named(run: Callable[..., Any], text: str, message: s
 
 def test_what_we_draw_ourselves_is_shown_with_its_labels(run: Callable[..., Any]) -> None:
     drawn = run("tree", "-", "-f", "dot", stdin="frames: {base: {lidar: {xyz: [1, 2, 3]}}}").out
-    assert run("tree", "-", stdin=drawn).out == "base\n└── lidar  xyz 1 2 3 rpy_deg 0 0 0\n"
+    assert run("tree", "-", stdin=drawn).out == "base\n└ lidar  xyz 1 2 3 rpy_deg 0 0 0\n"
 
 
 def test_a_drawing_of_many_edges_is_read_in_one_pass(tmp_path: Path) -> None:

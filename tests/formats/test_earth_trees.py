@@ -178,10 +178,10 @@ def test_only_frames_of_the_earth_are_written_by_places_and_samples_too(run: Cal
 def test_a_drawing_says_where_frames_stand(run: Callable[..., Any]) -> None:
     assert run("tree", "-", "-f", "text", stdin=SITE).out == (
         "ecef\n"
-        "├── map      lat 48.1 lon 11.5 alt 520                  enu rpy_deg 0 0 0\n"
-        "├── site     lat 48.137222106 lon 11.575555999 alt 519  enu rpy_deg 0 0 28.08\n"
-        "│   └── gps  xyz 1 2 3                                  rpy_deg 0 0 10\n"
-        "└── plane    lat 48.2 lon 11.6 alt 3000                 enu rpy_deg -180 0 -30\n"
+        "├ map    lat 48.1 lon 11.5 alt 520                  enu rpy_deg 0 0 0\n"
+        "├ site   lat 48.137222106 lon 11.575555999 alt 519  enu rpy_deg 0 0 28.08\n"
+        "│ └ gps  xyz 1 2 3                                  rpy_deg 0 0 10\n"
+        "└ plane  lat 48.2 lon 11.6 alt 3000                 enu rpy_deg -180 0 -30\n"
     )
     assert "alt" not in run("tree", "-", "-f", "text", stdin="frames: {earth: {base: {xyz: [1, 2, 3]}}}").out
 
