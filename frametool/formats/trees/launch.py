@@ -12,18 +12,18 @@ are named, and calls that start under a condition are read and listed.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import format_error, locate_many, parse_documents
 from frametool.documents.xml import XmlFile
 from frametool.errors import ValueInvalid, shown
 from frametool.formats.detect import Beginning
-from frametool.formats.trees.launch_actions import COMPOSABLE, COMPOSED, PACKAGES, Action, runs_publisher
 from frametool.grammar.readers import Misfit, kind
 from frametool.ros import publisher
+from frametool.ros.publisher import CALL
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frametool.documents.source import InputFile, Source
     from frametool.frames.lookups import Frames
@@ -31,9 +31,168 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
 
+PACKAGES = ("tf", "tf2_ros")
+COMPOSABLE = "tf2_ros::StaticTransformBroadcasterNode"
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
 _SUBSTITUTION = re.compile(r"\$\([^()]*\)?")
 _NO, _YES = ("0", "false"), ("1", "true")
+
+
+class Action(NamedTuple):
+    """One action of a launch file in any language: node, executable, composable_node, include or another kind.
+
+    fields: named as in XML; a Misfit for a value that is not literal
+    conditions: under which it starts, as written
+    """
+
+    kind: str
+    fields: Mapping[str, Any]
+    conditions: Sequence[str]
+    line: int = 0
+    column: int = 0
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the edge of each call, and record what could not be read."""
+    for action in filter(_is_reported, _actions(file)):
+        try:
+            arguments, conditions = _arguments(action), _open_conditions(action)
+        except Misfit as reason:
+            options.tally.note_each(str(reason), action.line)
+            continue
+        if edge := publisher.read_edge(arguments, file, options, action.line, action.column):
+            if conditions:
+                message = f"frame {shown(edge.child)} is published under a condition: {' and '.join(conditions)}"
+                options.tally.note_each(message, action.line)
+            yield edge
+
+
+def _actions(file: InputFile) -> Iterator[Action]:
+    """Yield the calls and included files, in the order of the text, by the reader of the language."""
+    begin = Beginning(file.head())
+    if begin.xml:
+        return _of_xml(file)
+    if file.path.endswith(".py") or _PYTHON.search(begin.text):
+        from frametool.formats.trees import launch_python
+
+        return (Action(*each) for each in launch_python.actions(file.source))
+    return _of_yaml(file.source)
+
+
+def _key(action: Action) -> str:
+    """Return the field with the arguments of a call."""
+    return "cmd" if action.kind == "executable" else "args"
+
+
+def _is_reported(action: Action) -> bool:
+    """Return True for a call of the publisher, which is read or listed, and for an included file."""
+    fields = action.fields
+    if action.kind == "executable":
+        command = fields.get("cmd")
+        words = command.split() if isinstance(command, str) else command if isinstance(command, list) else []
+        return isinstance(command, Misfit) or any(str(word).rsplit("/", 1)[-1] == CALL for word in words)
+    if action.kind == "composable_node":
+        return bool(fields.get("plugin") == COMPOSABLE)
+    is_call = fields.get("pkg") in PACKAGES and fields.get("exec", fields.get("type")) == CALL
+    return action.kind == "include" or (action.kind == "node" and is_call)
+
+
+def _arguments(action: Action) -> str | Sequence[str]:
+    """Return the arguments of a call, as one text for a shell or as words; raises Misfit."""
+    if action.kind == "include":
+        raise Misfit(f"include {shown(action.fields.get('file', ''))} is not followed; read that file too: --with FILE")
+    key = _key(action)
+    arguments = action.fields.get(key)
+    problem = ""
+    if action.kind == "composable_node":
+        problem = "it is a composable node, whose transform is in its parameters"
+    elif key not in action.fields:
+        problem = f"it has no {key}"
+    elif isinstance(arguments, Misfit):
+        problem = str(arguments)
+    elif not isinstance(arguments, str | list):
+        problem = f"its {key} must be text, found {kind(arguments)}"
+    elif isinstance(arguments, str) and (substitution := _SUBSTITUTION.search(arguments)):
+        problem = f"its arguments have {shown(substitution[0])}"
+    if problem:
+        raise Misfit(f"{CALL} not read: {problem}")
+    return arguments if isinstance(arguments, str) else [str(word) for word in arguments or ()]
+
+
+def _open_conditions(action: Action) -> list[str]:
+    """Return the conditions that the file does not decide, each once; raises Misfit for one that is never met."""
+    found = []
+    for condition in dict.fromkeys(action.conditions):
+        word, _, value = condition[:-1].lower().partition('="')
+        if word in ("if", "unless") and value in (_NO if word == "if" else _YES):
+            raise Misfit(f"{CALL} not read: it never starts ({condition})")
+        if value not in (*_NO, *_YES):
+            found.append(condition)
+    return found
+
+
+def _of_xml(file: InputFile) -> Iterator[Action]:
+    """Yield the actions of XML."""
+    xml = XmlFile(file)
+    groups: list[tuple[int, list[str]]] = []  # enclosing groups: their depth, their conditions
+    for element in xml.elements():
+        if element.depth == 1 and element.tag != "launch":
+            raise xml.error(element, f"expected <launch>, found <{element.tag}>")
+        if element.ends:
+            if groups and groups[-1][0] == element.depth:
+                groups.pop()
+            continue
+        own = _conditions(element.attributes)
+        if element.tag == "group":
+            groups.append((element.depth, own))
+            continue
+        action = Action(element.tag, element.attributes, [each for _, group in groups for each in group] + own)
+        if _is_reported(action):
+            line, column = xml.place(element, _key(action))
+            yield action._replace(line=line, column=column)
+
+
+def _of_yaml(source: Source) -> Iterator[Action]:
+    """Yield the actions below `launch:`."""
+    found: dict[Path, Action] = {}
+    for document in parse_documents(source.text, source.name):
+        top = (document.index, "launch")
+        try:
+            if type(document.value) is not dict or "launch" not in document.value:
+                raise Misfit(f"expected launch: and a list of actions, found {kind(document.value)}", top)
+            for path, action in _entries(document.value["launch"] or [], top, []):
+                if _is_reported(action):
+                    found[*path, _key(action)] = action
+        except Misfit as misfit:
+            raise format_error(source, misfit.path, str(misfit)) from None
+    for action, (line, column) in zip(found.values(), locate_many(source.text, [*found]), strict=True):
+        yield action._replace(line=line, column=column)
+
+
+def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[Path, Action]]:
+    """Yield the actions of a list and of the groups in it, with their paths."""
+    if type(entries) is not list:
+        raise Misfit(f"expected a list of actions, found {kind(entries)}", path)
+    for index, entry in enumerate(entries):
+        if type(entry) is not dict:
+            raise Misfit(f"expected an action as - node: .., found {kind(entry)}", (*path, index))
+        for tag, inner in entry.items():
+            here = (*path, index, tag)
+            fields = inner if type(inner) is dict else {}
+            under = conditions + _conditions(fields)
+            if tag == "group":
+                children, where = (fields.get("children"), (*here, "children")) if fields else (inner, here)
+                yield from _entries(children or [], where, under)
+            elif tag == "node_container":
+                nodes = [{"composable_node": node} for node in fields.get("composable_node") or ()]
+                yield from _entries(nodes, (*here, "composable_node"), under)
+            else:
+                yield here, Action(tag, fields, under)
+
+
+def _conditions(fields: Mapping[str, Any]) -> list[str]:
+    """Return the fields `if` and `unless`."""
+    return [f'{key}="{fields[key]}"' for key in ("if", "unless") if type(fields.get(key)) is str]
 
 
 def write_tree(tree: Frames, style: Style) -> str:
@@ -51,124 +210,3 @@ def write_tree(tree: Frames, style: Style) -> str:
         raise ValueInvalid(f"a frame name with $( cannot be written in a launch file: {shown(names)}")
     node = f'  <node pkg="tf2_ros" exec="{publisher.CALL}" args="{{}}"/>\n'
     return f"<launch>\n{''.join(node.format(escape(line)) for line in lines)}</launch>\n"
-
-
-def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edge of each call, and record what could not be read."""
-    for action in _actions(file):
-        if action.unread:
-            options.tally.note_each(action.unread, action.line)
-        elif edge := publisher.read_edge(action.arguments, file, options, action.line, action.column):
-            if action.conditions:
-                conditions = " and ".join(dict.fromkeys(action.conditions))
-                message = f"frame {shown(edge.child)} is published under a condition: {conditions}"
-                options.tally.note_each(message, action.line)
-            yield edge
-
-
-def _actions(file: InputFile) -> Iterator[Action]:
-    """Select the reader of one of the three languages of launch files."""
-    begin = Beginning(file.head())
-    if begin.xml:
-        return _of_xml(file)
-    if file.path.endswith(".py") or _PYTHON.search(begin.text):
-        from frametool.formats.trees import launch_python
-
-        return launch_python.actions(file.source)
-    return _of_yaml(file.source)
-
-
-def _of_xml(file: InputFile) -> Iterator[Action]:
-    """Yield the calls and the included files in XML, in order."""
-    xml = XmlFile(file)
-    groups: list[tuple[int, list[str]]] = []  # enclosing groups: their depth, their conditions
-    for element in xml.elements():
-        if element.depth == 1 and element.tag != "launch":
-            raise xml.error(element, f"expected <launch>, found <{element.tag}>")
-        if element.ends:
-            if groups and groups[-1][0] == element.depth:
-                groups.pop()
-            continue
-        own = _conditions(element.attributes)
-        if element.tag == "group":
-            groups.append((element.depth, own))
-            continue
-        conditions = [each for _, group in groups for each in group] + own
-        if action := _action(element.tag, element.attributes, conditions, "<include>"):
-            line, column = xml.place(element, action.key)
-            yield action._replace(line=line, column=column)
-
-
-def _of_yaml(source: Source) -> Iterator[Action]:
-    """Yield the calls and the included files below `launch:`, in order."""
-    found: list[tuple[Path, Action]] = []
-    for document in parse_documents(source.text, source.name):
-        top = (document.index, "launch")
-        try:
-            if type(document.value) is not dict or "launch" not in document.value:
-                raise Misfit(f"expected launch: and a list of actions, found {kind(document.value)}", top)
-            for path, tag, entry, conditions in _entries(document.value["launch"], top, []):
-                if action := _action(tag, entry, conditions, "include"):
-                    found.append(((*path, action.key) if action.key else path, action))
-        except Misfit as misfit:
-            raise format_error(source, misfit.path, str(misfit)) from None
-    places = locate_many(source.text, [path for path, _ in found])
-    for (_, action), (line, column) in zip(found, places, strict=True):
-        yield action._replace(line=line, column=column)
-
-
-def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[Path, str, dict[str, Any], list[str]]]:
-    """Yield the actions of a list: the path, the kind, the fields, and the conditions of each."""
-    if entries is None:
-        return
-    if type(entries) is not list:
-        raise Misfit(f"expected a list of actions, found {kind(entries)}", path)
-    for index, entry in enumerate(entries):
-        if type(entry) is not dict:
-            raise Misfit(f"expected an action as - node: .., found {kind(entry)}", (*path, index))
-        for tag, inner in entry.items():
-            here = (*path, index, tag)
-            under = conditions + _conditions(inner) if type(inner) is dict else conditions
-            if tag == "group" and type(inner) is list:
-                yield from _entries(inner, here, under)
-            elif tag == "group" and type(inner) is dict:
-                yield from _entries(inner.get("children"), (*here, "children"), under)
-            elif tag == "node_container" and type(inner) is dict and type(inner.get("composable_node")) is list:
-                for number, node in enumerate(inner["composable_node"]):
-                    if type(node) is dict:
-                        yield (*here, "composable_node", number), "composable_node", node, under
-            elif type(inner) is dict:
-                yield here, tag, inner, under
-
-
-def _conditions(entry: Mapping[str, Any]) -> list[str]:
-    """Return the attributes `if` and `unless`."""
-    return [f'{key}="{entry[key]}"' for key in ("if", "unless") if type(entry.get(key)) is str]
-
-
-def _action(tag: str, entry: Mapping[str, Any], conditions: list[str], include: str) -> Action | None:
-    """Return the action of one element or entry; None if it starts no publisher."""
-    command = entry.get("cmd")
-    if tag == "include":
-        return Action.not_followed(include, entry.get("file", ""))
-    if tag == "composable_node":
-        return COMPOSED if entry.get("plugin") == COMPOSABLE else None
-    if tag == "node" and entry.get("pkg") in PACKAGES and entry.get("exec", entry.get("type")) == publisher.CALL:
-        key = "args"
-    elif tag == "executable" and type(command) is str and runs_publisher(command.split()):
-        key = "cmd"
-    else:
-        return None
-    text = entry.get(key)
-    if type(text) is not str:
-        return Action.not_read(f"its {key} must be text, found {kind(text)}" if key in entry else f"it has no {key}")
-    if substitution := _SUBSTITUTION.search(text):
-        return Action.not_read(f"its arguments have {shown(substitution[0])}", key)
-    open_conditions = []
-    for condition in conditions:
-        word, value = condition[:-1].lower().split('="', 1)
-        if value in (_NO if word == "if" else _YES):
-            return Action.not_read(f"it never starts ({condition})", key)
-        if value not in (*_NO, *_YES):
-            open_conditions.append(condition)
-    return Action(text, conditions=open_conditions, key=key)
