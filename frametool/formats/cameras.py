@@ -175,7 +175,7 @@ def _read(file: InputFile) -> Found:
             return _in_bag(file)
         if file.head().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
             from frametool.documents.xml import XmlFile
-            from frametool.formats.trees.opencv import StoredXml
+            from frametool.formats.trees.matrix_files import StoredXml
 
             return _in_document(StoredXml(XmlFile(file)).value, file)
     if re.search(r"(?m)^(?:P[0-3]|P_rect_0\d|K_0\d):", file.text):

@@ -298,7 +298,7 @@ FORMATS = {
         required_options=("frames", "direction", "order"),
     ),
     "camchain": _tree(
-        "camera chain of Kalibr, OpenVINS or okvis; matrices by name", "frametool.formats.trees.camchain",
+        "camera chain of Kalibr, OpenVINS or okvis; matrices by name", "frametool.formats.trees.matrix_files",
         magic=(
             ("yaml inner", r"T_cam_\w+|T_\w+_cam|T_cn_cnm1|T_i_b|T_SC|T_BS"),
             ("json path", "*/T_BS/data"),
@@ -319,7 +319,7 @@ FORMATS = {
         "+- and timeshifts not read", required_options=("frames",),
     ),
     "opencv": _tree(
-        "OpenCV FileStorage", "frametool.formats.trees.opencv",
+        "OpenCV FileStorage", "frametool.formats.trees.matrix_files",
         magic=(
             ("xml", "opencv_storage"),
             ("json path", "*/type_id"),
@@ -331,7 +331,8 @@ FORMATS = {
         required_options=("direction", "frames"), cameras=True,
     ),
     "euroc-sensor": _read_tree(
-        "sensor.yaml of EuRoC", "frametool.formats.trees.camchain", magic=(("yaml key", "T_BS"), ("json key", "T_BS")),
+        "sensor.yaml of EuRoC", "frametool.formats.trees.matrix_files",
+        magic=(("yaml key", "T_BS"), ("json key", "T_BS")),
         conventions="T_BS is body<-sensor, metres", required_options=("frames",), cameras=True,
     ),
     "apollo": _read_tree(

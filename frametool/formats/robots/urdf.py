@@ -280,15 +280,12 @@ def write_tree(tree: Frames, style: Style) -> str:
 
 def _joint(parent: str, child: str, components: Rigid, style: Style) -> str:
     """Write one edge."""
-    from frametool.formats.trees.written_poses import of_angles
+    from frametool.formats.trees.written_poses import angles_of, of_angles
 
-    pose = Pose.of(components)
-    exact = tuple(rotation_numbers(pose, notation("xyzw"), style))
-    angles = rotation_numbers(pose, notation("rpy_rad"), style)
-    short = [float(f"{angle:.15g}") for angle in angles]  # as people write them
-    said = next((each for each in (short, angles) if of_angles(each) == exact), None)
-    origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(said or angles, style)}"'
-    if said is None and style.precision is None:
+    angles = angles_of(components[3:])
+    origin = f'xyz="{_numbers(components[:3], style)}" rpy="{_numbers(angles, style)}"'
+    exact = tuple(rotation_numbers(Pose.of(components), notation("xyzw"), style))
+    if of_angles(angles) != exact and style.precision is None:
         origin += f' quat_xyzw="{_numbers(exact, style)}"'
     return (
         f'  <joint name="{_attribute(child)}_joint" type="fixed">\n    <origin {origin}/>\n'

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.documents.yaml_writer import flow, quoted
 from frametool.errors import bare, listing, shown, warn
 from frametool.formats.trees.tree_reader import XYZ, document_edges, read_flat_pose
-from frametool.formats.trees.written_poses import Precision, angles_of, static_edges, warn_lonely_roots
+from frametool.formats.trees.written_poses import angles_of, static_edges, warn_lonely_roots
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.readers import Misfit, Reading, as_mapping, within
@@ -61,16 +61,12 @@ def _edge(parent: str, child: str, pose: Any, reading: Reading) -> Edge:
 
 def write_tree(tree: Frames, style: Style) -> str:
     """Return one map per parent; raises ValueInvalid for moving frames."""
-    precision = Precision(NAME, "x y z roll pitch yaw")
     texts: dict[str, list[str]] = {}
     for parent, child, pose in static_edges(tree, NAME):
-        angles, back = angles_of(pose[3:])
-        precision.add(pose, (*pose[:3], *back))
-        numbers = zip(KEYS, (*pose[:3], *angles), strict=True)
+        numbers = zip(KEYS, (*pose[:3], *angles_of(pose[3:])), strict=True)
         lines = "".join(f"    {key}: {flow(number, style.number)}\n" for key, number in numbers)
         texts.setdefault(parent, []).append(f"  {quoted(child)}:\n{lines}")
     if len(texts) > 1:
         warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
     warn_lonely_roots(tree, NAME)
-    precision.tell(style)
     return "".join(f"{quoted(parent)}:\n{''.join(children)}" for parent, children in texts.items())

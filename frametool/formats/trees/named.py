@@ -25,7 +25,7 @@ from frametool.geometry import floats, quaternion, rigid
 from frametool.grammar.edges import Edge, Options
 from frametool.grammar.loose import WORDS, read_loose_pose
 from frametool.grammar.pose import read_angle_unit
-from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping
+from frametool.grammar.readers import Misfit, Reading, as_mapping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -106,8 +106,7 @@ def _entry(
         return read.components, (parent, child, child)
     meaning = meaning_of(child, dict.fromkeys(("before", "sensor"), "") | _SELF, options.answers.frames)
     if isinstance(meaning, Ambiguous):
-        ways = " or ".join(f"{bare(a)},{bare(b)}" for a, b in meaning.names)
-        raise Unclear(f"{bare(child)} may name its two frames in several ways; give --frames {ways}", key=True)
+        raise meaning.error(child)
     if meaning is None and (pair := [key for key in fields if key in _OF_CAMERAS]) and len(pair) == len(fields) == 2:
         meaning = directed(" and ".join(pair), (), options.answers.names("base")[0], child, options.answers)
     elif isinstance(meaning, Meaning) and not meaning.said:
