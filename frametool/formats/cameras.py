@@ -339,7 +339,7 @@ def _kitti(file: InputFile) -> Found:
 
 def _nuscenes(records: list[dict[str, Any]], file: InputFile) -> Found:
     """Yield the cameras of calibrated_sensor.json by the names of their frames."""
-    from frametool.formats.trees.nuscenes import read
+    from frametool.formats.trees.calibrations import read
 
     for edge in read(file, _options(file)):
         record = records[edge.path[-1]] if edge.parent is not None else {}  # type: ignore[index]

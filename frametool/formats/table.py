@@ -288,7 +288,7 @@ FORMATS = {
         poses=Poses("quaternion", counted="ids of vertices"), required_options=("frames", "stamps", "edges"),
     ),
     "autoware": _tree(
-        "Autoware sensor calibration", "frametool.formats.trees.autoware",
+        "Autoware sensor calibration", "frametool.formats.trees.calibrations",
         magic=(("leaves", "//(?:x|y|z|roll|pitch|yaw)"),),
         conventions="parent<-child, metres, radians, roll pitch yaw about fixed axes",
     ),
@@ -345,12 +345,12 @@ FORMATS = {
         required_options=("frames", "camera_axes"), cameras=True,
     ),
     "handeye": _tree(
-        "hand-eye calibration of easy_handeye", "frametool.formats.trees.handeye",
+        "hand-eye calibration of easy_handeye", "frametool.formats.trees.calibrations",
         magic=(("yaml inner", "eye_on_hand|tracking_base_frame"), ("yaml key", "eye_on_hand|tracking_base_frame")),
         conventions="effector (base if not on the hand)<-tracking base, metres, x y z w",
     ),
     "nuscenes": _read_tree(
-        "nuScenes table", "frametool.formats.trees.nuscenes",
+        "nuScenes table", "frametool.formats.trees.calibrations",
         magic=(("text", r'\A\s*\[\s*\{[^{}]*?"(?:sensor_)?token"\s*:\s*"'),),
         conventions="ego<-sensor, global<-ego, metres, w first, microseconds", required_options=("frames",),
         cameras=True,

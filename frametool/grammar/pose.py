@@ -152,7 +152,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
             uncertain = read_covariance(mapping, reading)
         for key, value in mapping.items():
             if key in POSITION_KEYS and is_position(key, value):
-                position = _agreeing_position(position, read_position(value, POSITION_KEYS[key]))
+                found = read_position(value, POSITION_KEYS[key], bare=reading.bare_numbers)
+                position = _agreeing_position(position, found)
             elif key in LISTED_WORDS and not is_rotation(key, value):
                 raise Misfit(f"expected the numbers of {'a position' if key in POSITION_WORDS else 'a rotation'}")
             elif key in ROTATION_KEYS or key == AXES_KEY:
@@ -247,10 +248,10 @@ def refuse_scale(value: Any) -> None:
         raise NotARotation(SIMILARITY, (SCALE,))
 
 
-def read_position(value: Any, unit: float) -> Vector:
-    """Read [x, y, z] or {x, y, z}, in metres or in the unit, such as 0.001."""
+def read_position(value: Any, unit: float, *, bare: bool = False) -> Vector:
+    """Read [x, y, z] or {x, y, z}, in metres or in the unit, such as 0.001; bare: numbers without units only."""
     parts = round(1.0 / unit)  # dividing rounds once: 0.1 from 100
-    x, y, z = read_numbers(value, XYZ, partial=True, each=length_reader(parts))
+    x, y, z = read_numbers(value, XYZ, partial=True, each=read_number if bare else length_reader(parts))
     return (x, y, z) if parts == 1 else (x / parts, y / parts, z / parts)
 
 

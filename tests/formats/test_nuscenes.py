@@ -66,7 +66,7 @@ def test_frames_are_called_as_told(tmp_path: Path) -> None:
     [
         ("1.7", '"x"', "'x' is not a number"),
         ("1.7", "NaN", "'NaN' is not finite"),
-        ("[0.5, -0.5, 0.5, -0.5]", "[0.5, -0.5, 0.5]", "expected [w, x, y, z] or a 3 x 3 matrix, found 1 x 3"),
+        ("[0.5, -0.5, 0.5, -0.5]", "[0.5, -0.5, 0.5]", "expected 4 numbers (qw qx qy qz), found 3"),
         ("[0.5, -0.5, 0.5, -0.5]", "[[0, 0, 0], [0, 0, 0], [0, 0, 0]]", "is singular; no rotation is nearest to it"),
         ("[0.5, -0.5, 0.5, -0.5]", "[1, -0.5, 0.5, -0.5]", "quaternion"),
         ('"translation"', '"translatio"', "missing translation"),

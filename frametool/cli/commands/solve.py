@@ -107,7 +107,7 @@ def _write(output: Output, found: Solution, *, on_hand: bool) -> None:
         poses = [Pose.of(each.components, each.name, each.parent)._replace(scale=found.scale) for each in entries]
         output.values([Result(pose, uncertain(each.covariance)) for pose, each in zip(poses, entries, strict=True)])
     elif output.style.format == "handeye" and found.shape == "hand-eye":
-        from frametool.formats.trees.handeye import write_mount
+        from frametool.formats.trees.calibrations import write_mount
 
         camera, target = entries
         warn(f"handeye: {shown(target.name)} in {shown(str(target.parent))} and covariances left out")

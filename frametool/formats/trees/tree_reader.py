@@ -23,8 +23,8 @@ from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.edges import Diagnostics, Edge, Options
 from frametool.grammar.names import EARTH_FRAMES, may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS, NAMES, POSE_KEYS, Pose, read_angle_unit, read_name, read_pose
-from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, read_numbers, tell, within
-from frametool.grammar.rotation_spelling import AXES_KEY, rotation_of
+from frametool.grammar.readers import Misfit, Reading, Unclear, as_mapping, kind, tell, within
+from frametool.grammar.rotation_spelling import AXES_KEY
 from frametool.ros import messages
 from frametool.text.numbers import parse_number
 
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
     from frametool.geometry.place import Earth
-    from frametool.geometry.representations import Notation
-    from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
 
     Take = Callable[[Any, Reading], Iterable[Edge]]
@@ -348,16 +346,6 @@ def named(fields: dict[str, Any], key: str) -> str:
     if name is None:
         raise Misfit(f"missing {key}")
     return name
-
-
-def read_flat_pose(pose: dict[str, Any], rotation: Notation, reading: Reading) -> Rigid:
-    """Read a pose whose numbers are under x, y, z and the names of a rotation, in any order; raises Misfit."""
-    keys = (*XYZ, *rotation.columns)
-    if missing := [key for key in keys if key not in pose]:
-        raise Misfit(f"missing {', '.join(missing)}; a pose has {', '.join(keys)}")
-    x, y, z = read_numbers({key: pose[key] for key in XYZ}, XYZ)
-    places: list[Path] = [(name,) for name in rotation.columns]
-    return x, y, z, *rotation_of(rotation, [pose[name] for name in rotation.columns], places, reading)
 
 
 def line_error(file: InputFile, line: int, column: int, message: str) -> FormatError:

@@ -1,0 +1,233 @@
+"""Calibrations in YAML and JSON whose keys are fixed: Autoware's, easy_handeye's, and tables of nuScenes.
+
+    base_link: {sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}}
+        Autoware: the pose of the inner frame in the outer one; radians, about the fixed axes x, y, z
+
+    parameters: {eye_on_hand: true, robot_effector_frame: tool0, tracking_base_frame: camera_link, ..}
+    transformation: {x: .., y: .., z: .., qx: .., qy: .., qz: .., qw: ..}
+    parameters: {calibration_type: eye_in_hand, ..}                        easy_handeye2
+    transform: {translation: {x: .., ..}, rotation: {x: .., y: .., z: .., w: ..}}
+        easy_handeye: the pose of tracking_base_frame in robot_effector_frame if the eye is on the hand, else in
+        robot_base_frame
+
+    calibrated_sensor.json   [{"token": .., "sensor_token": .., "translation": [x, y, z], "rotation": [w, x, y, z]}, ..]
+    ego_pose.json            [{"token": .., "timestamp": 1531883530449377, "translation": .., "rotation": ..}, ..]
+    sensor.json              [{"token": .., "channel": "CAM_FRONT", "modality": "camera"}, ..]
+        nuScenes: ego<-sensor, and global<-ego, which moves; w first, microseconds.  Names of sensors are in
+        sensor.json, in the same folder or passed with the other files.
+
+Metres.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from frametool.documents.document import parse_documents
+from frametool.documents.source import InputFile
+from frametool.documents.yaml_writer import flow, quoted
+from frametool.errors import FormatError, ValueInvalid, bare, listing, shown, warn
+from frametool.formats.trees.tree_reader import XYZ, document_edges, named
+from frametool.formats.trees.written_poses import angles_of, static_edges, warn_lonely_roots
+from frametool.geometry import floats, quaternion
+from frametool.geometry.rigid import IDENTITY
+from frametool.grammar.edges import Edge, Options
+from frametool.grammar.loose import read_loose_pose
+from frametool.grammar.readers import Misfit, Reading, as_mapping, kind, read_numbers, within
+from frametool.grammar.rotation_spelling import read_rotation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from frametool.frames.lookups import Frames
+    from frametool.geometry.types import Rigid
+    from frametool.grammar.readers import Path
+    from frametool.grammar.result import Style
+
+ANGLES = (*XYZ, "roll", "pitch", "yaw")
+QUATERNION = (*XYZ, "qx", "qy", "qz", "qw")
+CHILD = "tracking_base_frame"
+EFFECTOR, BASE = "robot_effector_frame", "robot_base_frame"
+# a parameter -> the reference frame of the camera
+MOUNTS = {
+    "eye_on_hand": {"true": EFFECTOR, "false": BASE},
+    "calibration_type": {"eye_in_hand": EFFECTOR, "eye_on_hand": EFFECTOR, "eye_on_base": BASE, "eye_to_hand": BASE},
+}
+POSES = {"transformation": QUATERNION, "transform": ("translation", "rotation")}
+SENSORS = "sensor.json"
+
+
+def read(file: InputFile, options: Options) -> Iterator[Edge]:
+    """Yield the edges of a calibration."""
+    take = {"autoware": _autoware, "handeye": _handeye}.get(file.format) or partial(_nuscenes, file, options)
+    return document_edges(file, options, take)
+
+
+def _pose(value: Any, keys: tuple[str, ...], what: str, reading: Reading) -> Rigid:
+    """Read a pose that has exactly these keys; raises Misfit."""
+    pose = as_mapping(value, f"{what} as {{{', '.join(keys)}}}")
+    for key in pose:
+        if key not in keys:
+            raise Misfit(f"unknown key {shown(key)}; a pose has {', '.join(keys)}", (key,), key=True)
+    if missing := [key for key in keys if key not in pose]:
+        raise Misfit(f"missing {', '.join(missing)}; a pose has {', '.join(keys)}")
+    return read_loose_pose(pose, reading).components
+
+
+def _autoware(value: Any, reading: Reading) -> Iterator[Edge]:
+    for parent, children in as_mapping(value, "frames with the poses of others in them").items():
+        inner = within((parent,), as_mapping, children, f"the poses of frames in {shown(parent)}")
+        for child, pose in inner.items():
+            path: Path = (parent, child)
+            reading.here = path
+            try:
+                yield Edge(parent, child, _pose(pose, ANGLES, f"the pose of {shown(child)}", reading), path=path)
+            except Misfit as misfit:
+                reading.refuse(misfit.below(*path))
+
+
+def _handeye(value: Any, reading: Reading) -> Iterator[Edge]:
+    calibration = as_mapping(value, "parameters and transformation")
+    inner = "parameters" in calibration  # the first easy_handeye had none around them
+    path: Path = ("parameters",) if inner else ()
+    parameters = within(path, as_mapping, calibration["parameters"] if inner else calibration, "the parameters")
+    parent = within(path, named, parameters, within(path, _mount, parameters))
+    child = within(path, named, parameters, CHILD)
+    key = next((key for key in POSES if key in calibration), None)
+    if key is None:
+        raise Misfit("missing transformation (easy_handeye) or transform (easy_handeye2)")
+    reading.here = (key,)
+    pose = within((key,), _pose, calibration[key], POSES[key], "the pose of the camera", reading)
+    yield Edge(parent, child, pose, path=(key,))
+
+
+def _mount(parameters: dict[str, Any]) -> str:
+    """Return the key of the reference frame of the camera."""
+    key = next((key for key in MOUNTS if key in parameters), None)
+    if key is None:
+        raise Misfit("missing eye_on_hand (easy_handeye) or calibration_type (easy_handeye2)")
+    if str(found := parameters[key]) not in MOUNTS[key]:
+        raise Misfit(f"{key} must be {' or '.join(MOUNTS[key])}, found {kind(found)}", (key,))
+    return MOUNTS[key][found]
+
+
+def _nuscenes(file: InputFile, options: Options, value: Any, reading: Reading) -> Iterator[Edge]:
+    """Yield one edge per sensor, or one sample per ego pose; of sensor.json only the frame above the sensors."""
+    world, ego = options.answers.names("global", "ego")
+    records = _records(value)
+    if "sensor_token" in records[0]:
+        yield from _sensors(records, ego, channels_of(file), reading, options)
+    elif {"translation", "rotation", "timestamp"} <= records[0].keys():
+        for index, record in enumerate(records):
+            try:
+                stamp = within((index,), _text, record, "timestamp")
+                if not re.fullmatch(r"(?a)\d{1,18}", stamp):
+                    raise Misfit(f"expected whole microseconds, found {shown(stamp)}", (index, "timestamp"))
+                pose = _sensor_pose(record, index, reading)
+                yield Edge(world, ego, pose, int(stamp) * 1000, path=(index,))
+            except Misfit as misfit:
+                reading.refuse(misfit)
+    elif "channel" in records[0]:
+        yield Edge(None, ego, IDENTITY)
+    else:
+        raise Misfit("no poses in this table of nuScenes: they are in calibrated_sensor.json and ego_pose.json")
+
+
+def _records(value: Any) -> list[dict[str, Any]]:
+    if type(value) is not list or not value:
+        raise Misfit(f"expected a list of records, found {kind(value) if value else 'an empty one'}")
+    return [within((index,), as_mapping, record, "a record") for index, record in enumerate(value)]
+
+
+def _sensors(
+    records: Iterable[dict[str, Any]], ego: str, channels: dict[str, str] | None, reading: Reading, options: Options
+) -> Iterator[Edge]:
+    """Yield an edge for each pose of each sensor; if it has several, each name includes the token."""
+    poses: dict[str, dict[Rigid, tuple[str, Path]]] = {}
+    for index, record in enumerate(records):
+        try:
+            sensor = within((index,), _text, record, "sensor_token")
+            pose = _sensor_pose(record, index, reading)
+        except Misfit as misfit:
+            reading.refuse(misfit)
+            continue
+        name = (channels or {}).get(sensor, sensor)
+        poses.setdefault(name, {}).setdefault(pose, (str(record.get("token")), (index,)))
+    unnamed = f"sensors are called by their tokens ({SENSORS} has the names: --with it)" if channels is None else ""
+    several = next((name for name, found in poses.items() if len(found) > 1), None)
+    more = f"those of several poses as {bare(several)}/TOKEN" if several else ""
+    options.tally.assumed = ", ".join(filter(None, (unnamed, more)))
+    for name, found in poses.items():
+        for pose, (token, path) in found.items():
+            yield Edge(ego, f"{name}/{token}" if len(found) > 1 else name, pose, path=path)
+
+
+def _text(record: dict[str, Any], key: str) -> str:
+    found = record.get(key)
+    if type(found) is not str or not found:
+        raise Misfit(f"{key} must be one word, found {kind(found or None)}", (key,) if key in record else ())
+    return found
+
+
+def _sensor_pose(record: dict[str, Any], index: int, reading: Reading) -> Rigid:
+    """Read a translation, and a rotation as w, x, y, z, or as the 3x3 matrix of some forks."""
+    reading.here = (index,)
+    for key in ("translation", "rotation"):
+        if key not in record:
+            raise Misfit(f"missing {key}", (index,))
+    rotation = record["rotation"]
+    representation = "matrix" if type(rotation) is list and any(type(row) is list for row in rotation) else "wxyz"
+    x, y, z = within((index, "translation"), read_numbers, record["translation"], XYZ)
+    return x, y, z, *within((index, "rotation"), read_rotation, representation, rotation, reading)[1]
+
+
+def channels_of(file: InputFile) -> dict[str, str] | None:
+    """Return the names of sensors, by their tokens; None without the table of them."""
+    table = next((each for each in file.siblings if os.path.basename(each.path) == SENSORS), None)
+    if table is None:
+        path = os.path.join(os.path.dirname(file.path), SENSORS)
+        if file.path == "-" or not os.path.exists(path):
+            return None
+        table = InputFile(path)
+    documents = parse_documents(table.text, table.name)
+    try:
+        records = _records(documents[0].value if len(documents) == 1 else None)
+        return {_text(record, "token"): _text(record, "channel") for record in records}
+    except Misfit as misfit:
+        raise FormatError(str(misfit), source=table.name) from None
+
+
+def write_tree(tree: Frames, style: Style) -> str:
+    """Return the tree as Autoware or easy_handeye has it; raises ValueInvalid for what either cannot hold."""
+    edges = static_edges(tree, style.format)
+    warn_lonely_roots(tree, style.format)
+    if style.format == "handeye":
+        if len(edges) != 1:
+            children = listing(child for _, child, _ in edges)
+            raise ValueInvalid(f"handeye holds one pose, and here are {len(edges)}: {children}")
+        ((parent, child, pose),) = edges
+        warn(f"handeye: {shown(parent)} is written as the hand; for a fixed camera write eye_on_hand: false and {BASE}")
+        return write_mount(parent, child, pose, style, on_hand=True)
+    texts: dict[str, str] = {}
+    for parent, child, pose in edges:
+        lines = _lines(ANGLES, (*pose[:3], *angles_of(pose[3:])), style, "    ")
+        texts[parent] = f"{texts.get(parent, '')}  {quoted(child)}:\n{lines}"
+    if len(texts) > 1:
+        warn(f"Autoware has a file for each frame that holds others; here in one: {listing(texts)}")
+    return "".join(f"{quoted(parent)}:\n{children}" for parent, children in texts.items())
+
+
+def write_mount(parent: str, child: str, pose: Rigid, style: Style, *, on_hand: bool) -> str:
+    """Return the pose of a camera on the hand, or fixed to the base, as easy_handeye has it."""
+    turned = quaternion.from_quaternion(*pose[3:], floats)
+    mount = EFFECTOR if on_hand else BASE
+    frames = f"  eye_on_hand: {str(on_hand).lower()}\n  {mount}: {quoted(parent)}\n  {CHILD}: {quoted(child)}\n"
+    return f"parameters:\n{frames}transformation:\n{_lines(QUATERNION, (*pose[:3], *turned), style, '  ')}"
+
+
+def _lines(keys: Iterable[str], numbers: Iterable[float], style: Style, indent: str) -> str:
+    pairs = zip(keys, numbers, strict=True)
+    return "".join(f"{indent}{key}: {flow(number, style.number)}\n" for key, number in pairs)
