@@ -30,25 +30,23 @@ if TYPE_CHECKING:
 
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
-    from frametool.grammar.readers import Quaternion
 
 CAMERAS = ("cam0", "cam1", "cam2", "cam3")
-# name of a line -> parent, child of the pose of twelve numbers
-POSES = {
-    "Tr": ("cam0", "velo"),
-    "Tr_velo_to_cam": ("cam0", "velo"),
-    "Tr_velo_cam": ("cam0", "velo"),
-    "Tr_imu_to_velo": ("velo", "imu"),
-    "Tr_imu_velo": ("velo", "imu"),
-}
 RECTIFICATIONS = ("R0_rect", "R_rect")
+# name of a rotation, or of a pose of twelve numbers; that of its translation; parent, child; whether it is the inverse
+POSES = (
+    *((name, "", "cam0", "velo", False) for name in ("Tr", "Tr_velo_to_cam", "Tr_velo_cam")),
+    *((name, "", "velo", "imu", False) for name in ("Tr_imu_to_velo", "Tr_imu_velo")),
+    *((f"R_0{i}", f"T_0{i}", "cam0", f"cam{i}", True) for i in (1, 2, 3)),
+    *((name, "", "cam0", "cam0_rect", True) for name in RECTIFICATIONS),
+    *((f"R_rect_0{i}", "", camera, f"{camera}_rect", True) for i, camera in enumerate(CAMERAS)),
+)
 _NO_NUMBERS = ("calib_time",)
 _COUNTS = (  # pattern of a name, number of values
     (r"P[0-3]|P_rect_0\d|Tr\w*", 12),
     (r"R|R_0\d|R0_rect|R_rect(?:_0\d)?|K_0\d", 9),
     (r"T|T_0\d", 3),
 )
-_LINE = r"(\w+)(:?)[ \t]+(\S.*?)\s*"
 
 
 class Field(NamedTuple):
@@ -75,7 +73,6 @@ class Calibration:
     def __init__(self, file: InputFile, options: Options) -> None:
         """Read the lines; raises FormatError."""
         self.file, self.options = file, options
-        self.reading = Reading(file.source, normalize=options.normalize)
         self.names = dict(zip((*CAMERAS, "velo", "imu"), options.answers.names(*CAMERAS, "velo", "imu"), strict=True))
         self.fields: dict[str, Field] = {}
         for number, text in enumerate(file.text.split("\n"), 1):
@@ -92,109 +89,85 @@ class Calibration:
 
     def edges(self) -> Iterator[tuple[str, str, Rigid, int]]:
         """Yield parent, child, pose and line; raises FormatError if there are none."""
+        poses, found = POSES, False
         if "R" in self.fields or "T" in self.fields:
-            yield self._single()
-            return
-        found = [*self._whole(), *self._between(), *self._rectified(), *self._baselines()]
+            poses = (("R", "T", *self._ends(), False),)
+        for turn, shift, parent, child, inverse in poses:
+            if turn in self.fields and (not shift or shift in self.fields):
+                pose, found = self._pose(turn, shift), True
+                yield parent, child, rigid.inverse(*pose) if inverse else pose, self.fields[turn].line
+        for edge in self._baselines() if poses is POSES else ():
+            found = True
+            yield edge
         if not found:
-            raise FormatError(
-                "no pose in it: expected P0: to P3:, Tr:, R: and T:, or R_01: and T_01:", source=self.file.name
-            )
-        yield from found
+            message = "no pose in it: expected P0: to P3:, Tr:, R: and T:, or R_01: and T_01:"
+            raise FormatError(message, source=self.file.name)
 
     def _take(self, line: int, text: str) -> None:
         """Store the numbers of a line; raises FormatError with the place."""
-        match = re.fullmatch(_LINE, text)
-        if match is None:
+        first, *words = re.finditer(r"\S+", text)
+        name = first[0].removesuffix(":")
+        if not words or not re.fullmatch(r"\w+", name):
             raise line_error(self.file, line, 1, f"expected NAME: numbers, found {text.strip()[:40]!r}")
-        name = match[1]
         if name in _NO_NUMBERS:
             return
         if name in self.fields:
             raise line_error(self.file, line, 1, f"{name} appears twice; first in line {self.fields[name].line}")
-        words = list(re.finditer(r"\S+", match[3]))
         numbers = []
         for word in words:
             try:
                 numbers.append(parse_number(word[0]))
             except ValueInvalid as error:
-                raise line_error(self.file, line, match.start(3) + word.start() + 1, f"{name}: {error}") from None
+                raise line_error(self.file, line, word.start() + 1, f"{name}: {error}") from None
         expected = next((count for pattern, count in _COUNTS if re.fullmatch(pattern, name)), len(numbers))
         if len(numbers) != expected:
-            raise line_error(
-                self.file, line, match.start(3) + 1, f"{name}: expected {expected} numbers, found {len(numbers)}"
-            )
+            message = f"{name}: expected {expected} numbers, found {len(numbers)}"
+            raise line_error(self.file, line, words[0].start() + 1, message)
         self.fields[name] = Field(line, tuple(numbers), [word[0] for word in words])
 
-    def _turn(self, name: str, texts: list[str]) -> Quaternion:
-        """Check that a matrix of nine numbers is a rotation; warnings are recorded."""
-        line = self.fields[name].line
+    def _pose(self, name: str, shift: str) -> Rigid:
+        """Return the pose of twelve numbers, or of a rotation and its translation, if any; warnings are recorded."""
+        line, numbers, texts = self.fields[name]
+        x, y, z = self.fields[shift].numbers if shift else numbers[3::4] if len(numbers) == 12 else IDENTITY[:3]
+        turn = [text for at, text in enumerate(texts) if len(texts) == 9 or at % 4 < 3]
+        reading = Reading(self.file.source, normalize=self.options.normalize)
         try:
-            turned = rotation_of(MATRIX, texts, [()] * 9, self.reading)
+            rotation = rotation_of(MATRIX, turn, [()] * 9, reading)
         except ValueInvalid as error:
             raise line_error(self.file, line, 1, f"{name}: {error}") from None
-        for note in self.reading.notes:
+        for note in reading.notes:
             self.options.tally.note_each(f"{name}: {note.message}", line, note.rule)
-        self.reading.notes.clear()
-        return turned
+        return x, y, z, *rotation
 
-    def _single(self) -> tuple[str, str, Rigid, int]:
-        """Read the pose of R: and T: of the raw recordings; the file's name, or its contents, identify the frames."""
+    def _ends(self) -> tuple[str, str]:
+        """Return parent and child of the pose of R: and T: of the raw recordings, by the file's name or contents."""
         for name, other in (("R", "T"), ("T", "R")):
             if name not in self.fields:
                 raise FormatError(f"missing {name}: together with {other}:", source=self.file.name)
         chosen = self.options.answers.frames
         base = os.path.basename(self.file.name)
         if len(chosen) == 2:
-            parent, child = chosen
-        elif "velo_to_cam" in base or "delta_f" in self.fields:
-            parent, child = "cam0", "velo"
+            return chosen[0], chosen[1]
+        if "velo_to_cam" in base or "delta_f" in self.fields:
             rect = "R_rect_00 of calib_cam_to_cam turns it to cam0_rect"
             self.options.tally.assumed = f"cam0<-velo (--frames), cam0 as it is before rectification ({rect})"
-        elif "imu_to_velo" in base:
-            parent, child = "velo", "imu"
+            return "cam0", "velo"
+        if "imu_to_velo" in base:
             self.options.tally.assumed = "velo<-imu (--frames)"
-        else:
-            message = (
-                "R: and T: do not say between which frames; give --frames cam0,velo (of calib_velo_to_cam) or velo,imu"
-            )
-            raise Unanswered(message, source=self.file.name, line=self.fields["R"].line)
-        field = self.fields["R"]
-        return parent, child, (*self.fields["T"].numbers, *self._turn("R", field.texts)), field.line  # type: ignore[return-value]
-
-    def _whole(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield the poses of twelve numbers."""
-        for name, (parent, child) in POSES.items():
-            if name in self.fields:
-                line, (_, _, _, x, _, _, _, y, _, _, _, z), texts = self.fields[name]
-                turned = self._turn(name, [*texts[0:3], *texts[4:7], *texts[8:11]])
-                yield parent, child, (x, y, z, *turned), line
-
-    def _between(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield the cameras of calib_cam_to_cam: R_01 and T_01 map points of cam0 to cam1."""
-        for index, camera in enumerate(CAMERAS):
-            turn, shift = self.fields.get(f"R_0{index}"), self.fields.get(f"T_0{index}")
-            if turn is not None and shift is not None and index:
-                x, y, z = shift.numbers
-                yield "cam0", camera, rigid.inverse(x, y, z, *self._turn(f"R_0{index}", turn.texts)), turn.line
-
-    def _rectified(self) -> Iterator[tuple[str, str, Rigid, int]]:
-        """Yield the rectified cameras: R_rect maps points of a camera to the rectified one."""
-        names = dict.fromkeys(RECTIFICATIONS, "cam0") | {f"R_rect_0{i}": name for i, name in enumerate(CAMERAS)}
-        for name, camera in names.items():
-            if field := self.fields.get(name):
-                yield camera, f"{camera}_rect", rigid.inverse(0.0, 0.0, 0.0, *self._turn(name, field.texts)), field.line
+            return "velo", "imu"
+        ways = "give --frames cam0,velo (of calib_velo_to_cam) or velo,imu"
+        message = f"R: and T: do not say between which frames; {ways}"
+        raise Unanswered(message, source=self.file.name, line=self.fields["R"].line)
 
     def _baselines(self) -> Iterator[tuple[str, str, Rigid, int]]:
         """Yield the cameras of projections, with the axes of the rectified first one: the centre -K^-1 p."""
         rect = "_rect" if any(name in self.fields for name in RECTIFICATIONS) else ""
-        for index, camera in enumerate(CAMERAS):
-            field = self.fields.get(f"P{index}")
-            if field is None or not index:
+        for index in (1, 2, 3):
+            if (field := self.fields.get(f"P{index}")) is None:
                 continue
             fx, _, cx, px, _, fy, cy, py, _, _, _, pz = field.numbers
             for focal in (fx, fy):
                 if not focal > 0.0:
                     raise line_error(self.file, field.line, 1, f"P{index}: the focal length {focal:g} is not positive")
             centre = 0.0 - (px - cx * pz) / fx, 0.0 - (py - cy * pz) / fy, 0.0 - pz
-            yield f"cam0{rect}", f"{camera}{rect}", (*centre, *IDENTITY[3:]), field.line
+            yield f"cam0{rect}", f"cam{index}{rect}", (*centre, *IDENTITY[3:]), field.line
