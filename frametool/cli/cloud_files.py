@@ -64,7 +64,7 @@ class BagOfClouds:
         chosen = inputs().topics
         with ExitStack() as opened:
             self.reader = opened.enter_context(opened_recording(path, self.tally))
-            self.topics = cloud_topics(self.reader, chosen, path)
+            self.topics = cloud_topics(self.reader, chosen)
             self.opened = opened.pop_all()
         clouds = {topic.strip("/") for topic in self.topics}
         inputs().leave(topics=tuple(topic for topic in chosen if topic.strip("/") not in clouds))
@@ -81,7 +81,7 @@ class BagOfClouds:
         count = points = 0
         once: Any = cache(say_warning)
         with self.opened, heard_by(once):
-            for cloud in read_clouds(self.reader, self.topics, self.path, self.tally):
+            for cloud in read_clouds(self.reader, self.topics, self.tally):
                 count += 1
                 if isinstance(cloud, FormatError):
                     bad.take([Fault(cloud.line, "", cloud.message)])

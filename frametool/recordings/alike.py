@@ -6,28 +6,77 @@ in which other messages must agree exactly.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from json import dumps
+from math import isfinite
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
 
+from frametool.errors import ValueInvalid
+from frametool.ros.messages import PATH
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import shortest_spans
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from frametool.recordings.made import MessageTypes
+    from frametool.recordings.read import Channel, Recorded
 
 CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "uint16": "<u2", "int16": "<i2",
          "uint8": "<u1", "int8": "<i1"}  # fmt: skip
 MOST_NUMBERS = 200  # per message
+MOST_LAYOUTS = 16  # of messages of one length
 CDR_LE = b"\0\1"
 HOLE = "\0"  # a placeholder for a number; no JSON text contains it
 POINT_ZERO = 2  # the characters `.0` that an integer written as a float has too many
+
+
+POSE_ARRAY = "geometry_msgs/msg/PoseArray"
+
+
+def posed_messages(message: Any, kind: str) -> list[Any]:
+    """Return the poses of a message that is a list of them, each with its header; else the message itself.
+
+    A pose of a Path has its own header; a missing frame or stamp is that of the path.  A stamp of 0 with a frame is
+    a valid time if other poses have stamps.
+    """
+    if kind == POSE_ARRAY:
+        return [SimpleNamespace(header=message.header, pose=pose) for pose in message.poses]
+    if kind != PATH:
+        return [message]
+    outer, found = message.header, []
+    has_stamps = any(each.header.stamp.sec or each.header.stamp.nanosec for each in message.poses)
+    for each in message.poses:
+        own = each.header
+        says_when = own.stamp.sec or own.stamp.nanosec or (has_stamps and own.frame_id)
+        header = replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)
+        found.append(SimpleNamespace(header=header, pose=each.pose))
+    return found
+
+
+def text_of(types: MessageTypes, channel: Channel, data: bytes) -> bytes:
+    """Return a message as a line of JSON, a list of poses as a line for each."""
+    found = posed_messages(types.read(channel, data), channel.type)
+    return "".join(f"{dumps(_plain(each), ensure_ascii=False)}\n" for each in found).encode()
+
+
+def _plain(value: Any) -> Any:
+    """Return a message, or a part of one, as plain values; numbers that JSON does not have are written by name."""
+    if isinstance(value, float):
+        return value if isfinite(value) else str(value)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [*map(_plain, value)]
+    if isinstance(value, str | int):
+        return value
+    return {name: _plain(each) for name, each in vars(value).items() if name[0].islower()}  # others are constants
 
 
 class Varies(Exception):
@@ -35,33 +84,37 @@ class Varies(Exception):
 
 
 class BinaryLayout(NamedTuple):
-    """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between."""
+    """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between.
+
+    sample: the message that it was learned from
+    """
 
     numbers: np.dtype[Any]
-    shared: Sequence[tuple[slice, bytes]]
+    shared: Sequence[slice]
     texts: Sequence[bytes]
+    sample: bytes
 
     def values(self, messages: Sequence[bytes]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the numbers of messages of equal length, (n, k), and which of the messages differ in no more."""
+        """Return the numbers of messages of equal length, (n, k), and which differ from the sample in nothing else.
+
+        Those with numbers that are not finite do not count as alike.
+        """
         text = b"".join(messages)
         rows = np.frombuffer(text, np.uint8).reshape(len(messages), -1)
         columns = np.frombuffer(text, self.numbers)
-        alike = np.ones(len(messages), np.bool_)
-        for part, said in self.shared:
-            alike &= (rows[:, part] == np.frombuffer(said, np.uint8)).all(axis=1)
-        return np.stack([columns[name].astype(np.float64) for name in self.numbers.names or ()], axis=-1), alike
+        numbers = np.stack([columns[name].astype(np.float64) for name in self.numbers.names or ()], axis=-1)
+        same = [rows[:, part] == np.frombuffer(self.sample[part], np.uint8) for part in self.shared]
+        alike: Any = np.hstack([np.isfinite(numbers), *same]).all(axis=1)
+        return numbers, alike
 
-    def lines(self, messages: Sequence[bytes]) -> bytes | None:
-        """Return messages of equal length as lines; None if they differ in more than finite numbers."""
-        numbers, alike = self.values(messages)
-        if not (alike.all() and np.isfinite(numbers).all()):
-            return None
+    def lines(self, numbers: NDArray[np.float64]) -> bytes:
+        """Return messages with these numbers, (n, k), as lines."""
         names = self.numbers.names or ()
         written = shortest_spans(numbers, b" " * len(names))
         ends = written.ends - np.array([1 + POINT_ZERO * (self.numbers[name].kind != "f") for name in names])
-        parts = [_repeated(self.texts[0], len(messages))]
+        parts = [_repeated(self.texts[0], len(numbers))]
         for at, each in enumerate(self.texts[1:]):
-            parts += [Spans(written.data, written.starts[:, at], ends[:, at]), _repeated(each, len(messages))]
+            parts += [Spans(written.data, written.starts[:, at], ends[:, at]), _repeated(each, len(numbers))]
         return join(parts)
 
 
@@ -119,19 +172,53 @@ class _Reader:
         return dumps(self.data[begin + 4 : self.at].rstrip(b"\0").decode(), ensure_ascii=False)
 
 
-def layout_of(types: MessageTypes, kind: str, data: bytes, line: bytes | None = None) -> BinaryLayout | None:
+def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayout | None:
     """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
     reader = _Reader(types, data)
     if reader.aligned and data[:2] != CDR_LE:
         return None
     try:
-        texts = f"{reader.line(kind)}\n".encode().split(HOLE.encode())
-    except (Varies, UnicodeDecodeError):
+        line = text_of(types, channel, data)
+        texts = f"{reader.line(channel.type)}\n".encode().split(HOLE.encode())
+    except (Varies, UnicodeDecodeError, ValueInvalid):
         return None
     if not reader.places or reader.at != len(data):
         return None
     places, codes = zip(*reader.places, strict=True)
     names = [f"f{at}" for at in range(len(codes))]
     numbers: Any = {"names": names, "formats": codes, "offsets": places, "itemsize": len(data)}
-    made = BinaryLayout(np.dtype(numbers), [(part, data[part]) for part in reader.shared], texts)
-    return made if line is None or made.lines([data]) == line else None
+    made = BinaryLayout(np.dtype(numbers), reader.shared, texts, data)
+    values, alike = made.values([data])
+    return made if alike.all() and made.lines(values) == line else None
+
+
+class Layouts:
+    """The layouts that were learned of the messages of a recording, by channel and length."""
+
+    def __init__(self, types: MessageTypes) -> None:
+        """Create an empty set."""
+        self.types = types
+        self._known: dict[Any, list[BinaryLayout | None]] = {}
+
+    def groups(
+        self, messages: Sequence[Recorded]
+    ) -> Iterator[tuple[list[int], BinaryLayout | None, NDArray[np.float64]]]:
+        """Yield the places of messages of one layout, and their numbers, (n, k); without a layout where it varies."""
+        groups: dict[Any, list[int]] = {}
+        for at, each in enumerate(messages):
+            groups.setdefault((each.channel, len(each.data)), []).append(at)
+        for key, group in groups.items():
+            left, known = np.array(group), self._known.setdefault(key, [])
+            for tried in range(MOST_LAYOUTS):
+                if tried == len(known):
+                    known.append(layout_of(self.types, key[0], messages[left[0]].data))
+                if (layout := known[tried]) is None:
+                    break
+                values, alike = layout.values([messages[at].data for at in left.tolist()])
+                if alike.any():
+                    yield left[alike].tolist(), layout, values[alike]
+                left = left[~alike]
+                if not left.size:
+                    break
+            if left.size:
+                yield left.tolist(), None, np.empty((0, 0))

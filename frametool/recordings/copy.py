@@ -17,8 +17,8 @@ from frametool.frames.stamps import BILLION
 from frametool.frames.topology import resolve_name, static_and_moving, to_root, two_parents
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
+from frametool.recordings.alike import POSE_ARRAY, posed_messages
 from frametool.recordings.made import KINDS, serialised, typestore
-from frametool.recordings.messages import POSE_ARRAY, posed_messages
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
 from frametool.recordings.write import RecordingFile, new_channel
 from frametool.ros.messages import PATH, STAMPS, stamp_problem

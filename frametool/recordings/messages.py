@@ -8,13 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
-from functools import cache
 from io import BufferedReader
 from itertools import groupby
-from json import JSONEncoder
-from math import isfinite
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,9 +18,10 @@ from frametool.errors import FormatError, Unanswered, ValueInvalid, first_of, li
 from frametool.frames.stamps import BILLION
 from frametool.geometry import quaternion
 from frametool.grammar.edges import Edge, EdgeColumns
+from frametool.recordings.alike import POSE_ARRAY, Layouts, posed_messages, text_of
 from frametool.recordings.read import opened_recording
 from frametool.ros.messages import PATH, POSES, STAMPS, body_of, stamp_problem
-from frametool.ros.plain_messages import unit_components
+from frametool.ros.plain_messages import unit_components, unit_rows
 from frametool.text.lines import Pieces
 
 if TYPE_CHECKING:
@@ -36,7 +32,6 @@ if TYPE_CHECKING:
     from frametool.documents.source import InputFile
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Diagnostics, Options
-    from frametool.recordings.alike import BinaryLayout
     from frametool.recordings.made import MessageTypes
     from frametool.recordings.read import Channel, Recorded, RecordingReader
 
@@ -65,36 +60,30 @@ class PointCloud(NamedTuple):
     height: int
 
 
-def cloud_topics(reader: Any, chosen: Collection[str], path: str) -> list[str]:
+def cloud_topics(reader: RecordingReader, chosen: Collection[str]) -> list[str]:
     """Return the topics of clouds to read: those chosen, or the only one.
 
-    chosen: with or without a leading `/`
+    chosen: with or without a leading `/`; those of anything else are left out
     Raises Unanswered if there are several, FormatError if there is none.
     """
-    there = sorted({each.topic for each in reader.channels if each.type == CLOUD})
-    wanted = {topic.strip("/") for topic in chosen}
-    found = [topic for topic in there if topic.strip("/") in wanted]
-    if found:
-        return found
+    there, found = reader.on_topics({CLOUD}), reader.on_topics({CLOUD}, chosen)
     if not there:
         known = listing({each.topic for each in reader.channels}) or "none"
-        raise FormatError(f"no clouds (PointCloud2) in the bag; its topics: {known}", source=path)
-    if wanted:
-        known = listing(there, near=next(iter(chosen)))
-        raise FormatError(f"no clouds on {listing(chosen)}; topics with clouds: {known}", source=path)
-    if len(there) > 1:
-        raise Unanswered(f"several topics hold clouds; give --topic {first_of(there, 8, gap='|')}", source=path)
-    return there
+        raise FormatError(f"no clouds (PointCloud2) in the bag; its topics: {known}", source=reader.path)
+    if not found:
+        known = listing({each.topic for each in there}, near=next(iter(chosen)))
+        raise FormatError(f"no clouds on {listing(chosen)}; topics with clouds: {known}", source=reader.path)
+    _refuse_several(found, chosen, "clouds", reader.path)
+    return sorted({each.topic for each in found})
 
 
-def read_clouds(reader: Any, topics: list[str], path: str, tally: Diagnostics) -> Iterator[PointCloud | FormatError]:
+def read_clouds(reader: RecordingReader, topics: list[str], tally: Diagnostics) -> Iterator[PointCloud | FormatError]:
     """Yield the clouds of some topics in the order of the recording; an invalid one is replaced by its error."""
-    channels = [each for each in reader.channels if each.topic in topics and each.type == CLOUD]
-    for number, (channel, _, data, *_) in enumerate(reader.messages(channels), 1):
+    for number, (channel, _, data, *_) in enumerate(reader.messages(reader.on_topics({CLOUD}, topics)), 1):
         try:
             yield _cloud(reader.types.read(channel, data), number, channel.topic, tally)
         except ValueInvalid as error:
-            yield FormatError(str(error), source=path, line=number)
+            yield FormatError(str(error), source=reader.path, line=number)
 
 
 def _cloud(message: Any, number: int, topic: str, tally: Diagnostics) -> PointCloud:
@@ -156,40 +145,7 @@ def _rows(message: Any, kind: np.dtype[Any], width: int, height: int) -> NDArray
     return grid.reshape(-1)
 
 
-POSE_ARRAY = "geometry_msgs/msg/PoseArray"
-
-
-@dataclass
-class Posed:
-    """A pose of a list, with the fields of a PoseStamped."""
-
-    header: Any
-    pose: Any
-
-
-def posed_messages(message: Any, kind: str) -> Sequence[Any] | Iterator[Any]:
-    """Return the poses of a message that is a list of them, each with its header; else the message itself.
-
-    A pose of a Path has its own header; a missing frame or stamp is that of the path.  A stamp of 0 with a frame is
-    a valid time if other poses have stamps.
-    """
-    if kind == POSE_ARRAY:
-        return (Posed(message.header, pose) for pose in message.poses)
-    if kind == PATH:
-        has_stamps = any(each.header.stamp.sec or each.header.stamp.nanosec for each in message.poses)
-        return (Posed(_completed(each.header, message.header, has_stamps), each.pose) for each in message.poses)
-    return (message,)
-
-
-def _completed(own: Any, outer: Any, has_stamps: bool) -> Any:  # noqa: FBT001 - it reads so
-    """Return a header in which a missing frame and stamp are those of the outer header."""
-    says_when = own.stamp.sec or own.stamp.nanosec or (has_stamps and own.frame_id)
-    return replace(own, stamp=own.stamp if says_when else outer.stamp, frame_id=own.frame_id or outer.frame_id)
-
-
 MANY = 4000  # messages
-FEW = 16  # messages: fewer are read one by one
-MOST_LAYOUTS = 16  # of messages of one length
 FIX = "sensor_msgs/msg/NavSatFix"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
@@ -199,42 +155,33 @@ RECORDS = frozenset((
 ))  # fmt: skip
 
 
-def record_channels(reader: RecordingReader, chosen: Collection[str]) -> list[Channel]:
-    """Return the channels to read: those chosen, or those of the only topic with records.
-
-    chosen: topics with or without a leading `/`
-    Raises Unanswered if several have records and none is chosen.
-    """
-    there = [each for each in reader.channels if each.type in RECORDS]
-    wanted = {topic.strip("/") for topic in chosen}
-    topics = sorted({each.topic for each in there})
-    if len(topics) > 1 and not wanted:
-        named = first_of(topics, 8, gap="|")
-        raise Unanswered(f"several topics hold records; give --topic {named}", source=reader.path)
-    return [each for each in there if not wanted or each.topic.strip("/") in wanted]
-
-
 def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> BufferedReader | None:
-    """Open the messages of a bag as JSON lines; None if the chosen topics have clouds.
+    """Open the messages of a bag as JSON lines: those of the chosen topics, with or without a leading `/`.
 
-    Raises FileProblem when the extra is missing, FormatError for a bag that is broken or has neither.
+    None if the chosen topics have clouds.
+    Raises FileProblem when the extra is missing, Unanswered if several topics have records and none is chosen,
+    FormatError for a bag that is broken or has neither.
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
         reader.refuse_foreign(chosen)
-        if channels := record_channels(reader, chosen):
-            pieces = filter(None, _pieces(reader, channels))  # an empty one would be the end
-            return BufferedReader(Pieces(pieces, opened.pop_all()))
-        wanted = {topic.strip("/") for topic in chosen}
-        clouds = [each.topic.strip("/") for each in reader.channels if each.type == CLOUD]
-        if any(not wanted or topic in wanted for topic in clouds):
+        if channels := reader.on_topics(RECORDS, chosen):
+            _refuse_several(channels, chosen, "records", path)
+            return _opened_lines(reader, channels, opened)
+        if reader.on_topics({CLOUD}, chosen):
             return None
-        held = {f"{each.topic} ({each.type})" for each in reader.channels}
-        known = listing(held, near=next(iter(chosen), "")) or "none"
-        has_frames = any(each.type in TYPES for each in reader.channels)
+        known = listing({f"{each.topic} ({each.type})" for each in reader.channels}, near=next(iter(chosen), ""))
+        has_frames = bool(reader.on_topics(TYPES))
     named = f" on {listing(chosen)}" if chosen else ""
     remedy = f"; its frames: frametool lookup {path} TARGET SOURCE" if has_frames else ""
-    raise FormatError(f"no points, poses or fixes{named}; topics: {known}{remedy}", source=path)
+    raise FormatError(f"no points, poses or fixes{named}; topics: {known or 'none'}{remedy}", source=path)
+
+
+def _refuse_several(channels: Iterable[Channel], chosen: Collection[str], what: str, path: str) -> None:
+    """Raise Unanswered if channels have several topics and none was chosen."""
+    topics = sorted({each.topic for each in channels})
+    if len(topics) > 1 and not chosen:
+        raise Unanswered(f"several topics hold {what}; give --topic {first_of(topics, 8, gap='|')}", source=path)
 
 
 def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:
@@ -244,35 +191,37 @@ def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> t
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
-        wanted = {topic.strip("/") for topic in chosen}
-        there = [each for each in reader.channels if not wanted or each.topic.strip("/") in wanted]
-        found = [each for each in there if each.type in POSES]
-        if len({each.topic for each in found}) != 1 or any(each.type in TYPES for each in there):
+        found = reader.on_topics(POSES, chosen)
+        if len({each.topic for each in found}) != 1 or reader.on_topics(TYPES, chosen):
             return None
-        pieces = filter(None, _pieces(reader, found))
-        return BufferedReader(Pieces(pieces, opened.pop_all())), found[0].topic
+        return _opened_lines(reader, found, opened), found[0].topic
+
+
+def _opened_lines(reader: RecordingReader, channels: Sequence[Channel], opened: ExitStack) -> BufferedReader:
+    pieces = filter(None, _pieces(reader, channels))  # an empty one would be the end
+    return BufferedReader(Pieces(pieces, opened.pop_all()))
 
 
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
     """Yield the messages, or the poses of lists, as lines, many together; an error follows the lines before it."""
-    held: list[bytes] = []
-    number = 1
-    layouts: dict[Any, BinaryLayout | None] = {}
+    layouts, number = Layouts(reader.types), 1
     try:
         for stretch in _stretches(reader.blocks(channels)):
-            for (channel, _), run in groupby(stretch, lambda each: (each.channel, len(each.data))):
-                for text, count in _lines(reader.types, channel, [each.data for each in run], layouts):
-                    held.append(text)
-                    number += count
-            yield b"".join(held)
-            held.clear()
-    except Exception as error:
-        yield b"".join(held)
-        if isinstance(error, FormatError):
-            raise
+            known: dict[int, bytes] = {}
+            for at, layout, values in layouts.groups(stretch):
+                known |= zip(at, layout.lines(values).splitlines(keepends=True) if layout else (), strict=False)
+            lines: list[bytes] = []
+            try:
+                for place, each in enumerate(stretch):
+                    lines.append(known.get(place) or text_of(reader.types, each.channel, each.data))
+            finally:
+                number += len(lines)
+                yield b"".join(lines)
+    except FormatError:
+        raise
+    except Exception as error:  # noqa: BLE001 - of broken bytes the libraries raise anything
         what = f"message {number}: cannot be read ({type(error).__name__})"
         raise FormatError(what, source=reader.path) from None
-    yield b"".join(held)
 
 
 def _stretches(blocks: Iterator[Iterable[Recorded]]) -> Iterator[list[Recorded]]:
@@ -288,70 +237,6 @@ def _stretches(blocks: Iterator[Iterable[Recorded]]) -> Iterator[list[Recorded]]
         yield held
         raise
     yield held
-
-
-def _lines(
-    types: MessageTypes, channel: Channel, messages: list[bytes], layouts: dict[Any, BinaryLayout | None]
-) -> Iterator[tuple[bytes, int]]:
-    """Yield the lines of messages of equal length, and their number: all at once if their layout is equal.
-
-    layouts: those known, by channel and length; None if no two messages have the same layout
-    """
-    key = channel, len(messages[0])
-    known = layouts.get(key)
-    found = known and known.lines(messages)
-    if found is None and (known or key not in layouts):
-        from frametool.recordings.alike import layout_of
-
-        layouts[key] = known = layout_of(types, channel.type, messages[0], _text(types, channel, messages[0]))
-        found = known and known.lines(messages)
-    if found is None:
-        yield from ((_text(types, channel, each), 1) for each in messages)
-    else:
-        yield found, len(messages)
-
-
-def _text(types: MessageTypes, channel: Channel, data: bytes) -> bytes:
-    """Return the lines of one message."""
-    return "".join(map(_line, posed_messages(types.read(channel, data), channel.type))).encode()
-
-
-def _line(message: Any) -> str:
-    """Return a message as a line of JSON; numbers that JSON does not have are written by name."""
-    try:
-        return f"{_encode(message)}\n"
-    except ValueError:
-        return f"{_encode(_named(message))}\n"
-
-
-def _named(value: Any) -> Any:
-    """Return a message, or a part of one, with numbers that are not finite replaced by their names."""
-    if isinstance(value, float):
-        return value if isfinite(value) else str(value)
-    if isinstance(value, str | int):
-        return value
-    inner = _plain(value) if not isinstance(value, list) else value
-    return [*map(_named, inner)] if isinstance(inner, list) else {name: _named(each) for name, each in inner.items()}
-
-
-def _plain(value: Any) -> Any:
-    """Return the fields of a message, or the numbers of an array."""
-    inner = getattr(value, "__dict__", None)
-    if inner is None:
-        return value.tolist()
-    kind: Any = type(value)
-    for name in _marks(kind):
-        inner.pop(name, None)
-    return inner
-
-
-@cache
-def _marks(kind: Any) -> list[str]:
-    """Return the fields of a type that are not data: the library's own, and constants."""
-    return [name for name in kind.__dataclass_fields__ if not name[0].islower()]
-
-
-_encode = JSONEncoder(default=_plain, allow_nan=False, ensure_ascii=False, check_circular=False).encode
 
 
 TYPES = frozenset(("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"))
@@ -386,164 +271,112 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """
     try:
         with opened_recording(file.path, options.tally) as reader:
-            yield from recorded_edges(reader, _channels(reader, options), options)
+            if found := _channels(reader, options):
+                yield from recorded_edges(reader, found, options)
     except FormatError as error:
         options.report(error)
 
 
 def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
-    """Return the channels with transforms, and chosen ones with poses; raises FormatError if there are none."""
-    reader.refuse_foreign(options.topics.chosen)
-    chosen = options.topics.chooses
-    found = [each for each in reader.channels if each.type in TYPES or (each.type in POSES and chosen(each.topic))]
+    """Return the chosen channels with transforms or poses, or all with transforms; FormatError if the bag has none."""
+    chosen = options.topics.chosen
+    reader.refuse_foreign(chosen)
     options.topics.seen |= {each.topic for each in reader.channels}
+    with_frames, posed = reader.on_topics(TYPES), reader.on_topics(POSES, chosen)
     for other in reader.channels:
-        if other not in found and other.topic.rpartition("/")[2] in ("tf", "tf_static"):
+        if other.topic.rpartition("/")[2] in ("tf", "tf_static") and other not in (*with_frames, *posed):
             what = f"{other.topic} holds {other.type} and no transforms; is it damaged?"
             raise FormatError(what, source=reader.path)
-    if not found:
-        poses = sorted({each.topic for each in reader.channels if each.type in POSES})
+    if not with_frames and not (chosen and posed):
         foreign = {f"{each.topic} ({each.encoding})" for each in reader.foreign}
         known = ", ".join(sorted(options.topics.seen | foreign))
+        poses = sorted(each.topic for each in reader.on_topics(POSES))
         hint = f"; --topic {poses[0]} reads its poses" if poses else ""
         what = f"no transforms in the bag; its topics: {known}{hint}" if known else "no messages in the bag"
         raise FormatError(what, source=reader.path)
-    return found
+    return reader.on_topics(TYPES | POSES, chosen) if chosen else with_frames
 
 
 def recorded_edges(
     reader: RecordingReader, channels: Sequence[Channel], options: Options
 ) -> Iterator[Edge | EdgeColumns]:
     """Yield the edges of the messages on some channels; raises FormatError if there are none, or one is broken."""
-    number = 0
-    layouts: dict[Any, list[tuple[BinaryLayout, list[RawTransform]]]] = {}
+    layouts, number = Layouts(reader.types), 0
     for stretch in _stretches(reader.blocks(channels)):
         for is_static, part in groupby(stretch, lambda each: each.channel.is_static):
             messages = [*part]
-            columns = None
-            if len(messages) >= FEW and not is_static:
-                columns = _columns(reader, messages, number, options, layouts)
+            columns = None if is_static else _columns(layouts, messages, number, options)
             if columns is not None:
                 yield columns
-                number += len(messages)
-                continue
-            for each in messages:
-                number += 1
-                for said in _transforms(reader, each, number, options):
-                    if edge := _edge(said, number, each.channel.topic, each.log_ns, reader.path, options):
-                        yield edge
+            for place, each in enumerate(messages if columns is None else (), number + 1):
+                try:
+                    found = _transforms(reader.types, each.channel, each.data, options)
+                except ValueInvalid as error:
+                    what = f"message {place} on {each.channel.topic}: {error}"
+                    raise FormatError(what, source=reader.path) from None
+                for said in found:
+                    yield _edge(said, place, each, reader.path, options)
+            number += len(messages)
     if not number:
         raise FormatError(f"no messages on {', '.join(each.topic for each in channels)}", source=reader.path)
 
 
-def _transforms(reader: RecordingReader, message: Recorded, number: int, options: Options) -> list[RawTransform]:
-    """Return the transforms in a message, or the pose; raises FormatError for bytes that are none."""
-    channel = message.channel
-    try:
-        found = reader.types.read(channel, message.data)
-    except ValueInvalid as error:
-        raise FormatError(f"message {number} on {channel.topic}: {error}", source=reader.path) from None
+def _transforms(types: MessageTypes, channel: Channel, data: bytes, options: Options) -> list[RawTransform]:
+    """Return the transforms in a message, or the pose; raises ValueInvalid for invalid bytes."""
+    found = types.read(channel, data)
     parts = posed_messages(found, channel.type) if channel.type in POSES else found.transforms
     return [RawTransform.of(each, body_of(channel.topic, options.answers)) for each in parts]
 
 
-def _columns(
-    reader: RecordingReader, messages: Sequence[Recorded], number: int, options: Options,
-    layouts: dict[Any, list[tuple[BinaryLayout, list[RawTransform]]]],
-) -> EdgeColumns | None:  # fmt: skip
+def _columns(layouts: Layouts, messages: Sequence[Recorded], number: int, options: Options) -> EdgeColumns | None:
     """Return the edges of many messages at once; None where one of them has to be read by itself.
 
-    number: of the message before them; layouts: those learned, by channel and length, with what a message says
+    number: of the message before them
     """
-    groups: dict[Any, list[int]] = {}
-    for at, each in enumerate(messages):
-        groups.setdefault((each.channel, len(each.data)), []).append(at)
-    rough, rows = len(options.tally.rough), list[Any]()
-    for key, group in groups.items():
-        left, known = np.array(group), layouts.setdefault(key, [])
-        if options.topics.chosen and not options.topics.chooses(key[0].topic):
+    names: list[tuple[str, str]] = []
+    found = []
+    for at, layout, values in layouts.groups(messages):
+        if layout is None:
             return None
-        for tried in range(MOST_LAYOUTS):
-            if not left.size:
-                break
-            if tried == len(known):
-                if (learned := _learned(reader, messages[left[0]], number + 1 + int(left[0]), options)) is None:
-                    break
-                known.append(learned)
-            layout, transforms = known[tried]
-            values, alike = layout.values([messages[at].data for at in left.tolist()])
-            found = _edge_rows(values[alike], left[alike].tolist(), transforms, number, options)
-            if found is None:
-                break
-            rows += found
-            left = left[~alike]
-        if left.size:
-            del options.tally.rough[rough:]
+        channel, bare = messages[at[0]].channel, options.tally.names.bare
+        known = _transforms(layouts.types, channel, layout.sample, options)
+        frames = [(bare(each.parent), bare(each.child)) for each in known if each.parent and each.child]
+        numbers = layout.values([layout.sample])[0]
+        if not known or numbers.shape[1] not in (9 * len(frames), 10 * len(frames)):  # ROS 1 counts its headers
             return None
-    rows.sort(key=itemgetter(0))
-    lines, parents, children, stamps_ns, components = zip(*rows, strict=True) if rows else [()] * 5
-    sent = [messages[line - number - 1] for line in lines]
+        said = [[*each.stamp, *each.numbers] for each in known]
+        if numbers.reshape(len(known), -1)[:, -9:].tolist() != said:
+            return None
+        if not all(options.topics.agrees(channel.topic, child) for _, child in frames):
+            return None
+        lines, places = np.repeat(at, len(known)), np.tile(np.arange(len(known)) + len(names), len(at))
+        found.append(np.column_stack([lines, places, values.reshape(len(lines), -1)[:, -9:]]))
+        names += frames
+    rows = np.concatenate(found)
+    rows = rows[rows[:, 0].argsort(kind="stable")]
+    order, places, seconds, parts = rows[:, :4].astype(np.int64).T
+    if any(stamp_problem(int(pick(seconds)), int(pick(parts)), STAMPS[0]) for pick in (np.min, np.max)):
+        return None
+    lines = (order + number + 1).tolist()
+    components = unit_rows(map(tuple, rows[:, 4:].tolist()), lines, options.tally, options.normalize)
+    if components is None:
+        return None
+    sent = [messages[each] for each in order.tolist()]
     topics, received = [each.channel.topic for each in sent], [each.log_ns for each in sent]
     options.topics.counts.update(Counter(topics) + Counter(options.topics.counts))
-    options.tally.rough[rough:] = sorted(options.tally.rough[rough:])
-    return EdgeColumns(parents, children, stamps_ns, components, lines, topics, received)
+    parents, children = zip(*map(names.__getitem__, places.tolist()), strict=True)
+    return EdgeColumns(
+        parents, children, (seconds * BILLION + parts).tolist(), components, lines, topics, received
+    )
 
 
-def _learned(
-    reader: RecordingReader, message: Recorded, number: int, options: Options
-) -> tuple[BinaryLayout, list[RawTransform]] | None:
-    """Return how a message lies, and its transforms; None where it has to be read by itself."""
-    from frametool.recordings.alike import layout_of
-
-    try:
-        transforms = _transforms(reader, message, number, options)
-    except FormatError:  # raised again in its turn
-        return None
-    channel, bare = message.channel, options.tally.names.bare
-    layout = layout_of(reader.types, channel.type, message.data)
-    if layout is None or not all(
-        each.parent and each.child and options.topics.agrees(channel.topic, bare(each.child)) for each in transforms
-    ):
-        return None
-    numbers, count = layout.values([message.data])[0], len(transforms)
-    if not count or numbers.shape[1] not in (9 * count, 10 * count):  # ROS 1 counts its headers
-        return None
-    said = [(*each.stamp, *each.numbers) for each in transforms]
-    return (layout, transforms) if [*map(tuple, numbers.reshape(count, -1)[:, -9:].tolist())] == said else None
-
-
-def _edge_rows(
-    values: NDArray[np.float64], at: list[int], transforms: list[RawTransform], number: int, options: Options
-) -> list[Any] | None:
-    """Return line, frames, stamp and components of each transform of messages; None where one is refused."""
-    rows, count = values.reshape(len(values) * len(transforms), -1)[:, -9:], len(transforms)
-    stamps = rows[:, :2].astype(np.int64)
-    if not np.isfinite(rows).all():
-        return None
-    if len(rows) and any(stamp_problem(int(a), int(b), STAMPS[0]) for a, b in (stamps.min(0), stamps.max(0))):
-        return None
-    bare = options.tally.names.bare
-    ends = [(bare(each.parent), bare(each.child)) for each in transforms] * len(values)
-    lines = [number + 1 + place for place in at for _ in range(count)]
-    stamps_ns = (stamps[:, 0] * BILLION + stamps[:, 1]).tolist()
-    found = []
-    numbers = map(tuple, rows[:, 2:].tolist())
-    for line, (parent, child), stamp_ns, each in zip(lines, ends, stamps_ns, numbers, strict=True):
-        if (components := unit_components(each, line, options.tally, options.normalize)) is None:
-            return None
-        found.append((line, parent, child, stamp_ns, components))
-    return found
-
-
-def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: str, options: Options) -> Edge | None:
-    """Return the edge in a message on a topic; None if the topic is not read.
+def _edge(said: RawTransform, number: int, message: Recorded, path: str, options: Options) -> Edge:
+    """Return the edge in a message; raises FormatError for an invalid one.
 
     number: of the message among those with transforms
-    Raises FormatError for an invalid one.
     """
-    if not options.topics.takes(topic):
-        return None
-    tally = options.tally
+    tally, topic = options.tally, message.channel.topic
+    options.topics.takes(topic)
     parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
     components = unit_components(said.numbers, number, tally, options.normalize)
     if components is None or not parent or not child:
@@ -556,7 +389,5 @@ def _edge(said: RawTransform, number: int, topic: str, received_ns: int, path: s
         raise FormatError(f"message {number}: {parent!r} -> {child!r}: {misfit}", source=path)
     if clash := options.topics.conflict(topic, child):
         options.report(FormatError(clash, source=path, rule="two-topics"))
-    stamp_ns = None if topic.endswith("tf_static") else said.stamp[0] * BILLION + said.stamp[1]
-    return Edge(parent, child, components, stamp_ns, number, received_ns, topic=topic)
-
-
+    stamp_ns = None if message.channel.is_static else said.stamp[0] * BILLION + said.stamp[1]
+    return Edge(parent, child, components, stamp_ns, number, message.log_ns, topic=topic)

@@ -424,6 +424,11 @@ class RecordingReader:
             names = "" if wanted is None else f" on {', '.join(sorted({each.topic for each in wanted}))}"
             raise FormatError(f"the bag is damaged: {count} of {expected} messages{names} are there", source=self.path)
 
+    def on_topics(self, types: Collection[str], topics: Collection[str] = ()) -> list[Channel]:
+        """Return the channels of some types, on some topics, with or without a leading `/`, or on all."""
+        named = {topic.strip("/") for topic in topics}
+        return [each for each in self.channels if each.type in types and (not named or each.topic.strip("/") in named)]
+
     def refuse_foreign(self, chosen: Iterable[str]) -> None:
         """Raise FormatError for a chosen topic whose messages are not encoded as ROS does."""
         named = {topic.strip("/") for topic in chosen}

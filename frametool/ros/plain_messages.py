@@ -26,7 +26,7 @@ from frametool.geometry import floats, quaternion
 from frametool.grammar.edges import EdgeColumns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
     from frametool.grammar.edges import Diagnostics
@@ -157,7 +157,8 @@ def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool =
         return None
     steps = {gap: gap.count("\n") + layout.lines for gap in found}
     lines = [*accumulate(map(steps.__getitem__, gaps), initial=line + begin.count("\n") + layout.first)]
-    components = _components([parts[at::EACH] for at in range(5, EACH)], lines, tally, normalize=normalize)
+    rows = zip(*(map(float, parts[at::EACH]) for at in range(5, EACH)), strict=True)
+    components = unit_rows(rows, lines, tally, normalize)
     if components is None:
         return None
     stamps_ns = [second * BILLION + part for second, part in zip(seconds, nanoseconds, strict=True)]
@@ -169,14 +170,14 @@ def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool =
     return EdgeColumns(parents, children, stamps_ns, components, lines, topics)
 
 
-def _components(
-    columns: Sequence[Sequence[str]], lines: Sequence[int], tally: Diagnostics, *, normalize: bool
-) -> list[Rigid] | None:
-    """Read tx, ty, tz, x, y, z, w of each row; None, and no warnings, if one of them is refused."""
+def unit_rows(
+    rows: Iterable[Rigid], lines: Sequence[int], tally: Diagnostics, normalize: bool  # noqa: FBT001 - as below
+) -> list[Rigid] | None:  # fmt: skip
+    """Return the components of each row with a unit quaternion; None, and no warnings, if one of them is refused."""
     rough = len(tally.rough)
     found: list[Rigid] = []
     with suppress(ValueError):  # raised by float
-        for row, line in zip(zip(*(map(float, column) for column in columns), strict=True), lines, strict=True):
+        for row, line in zip(rows, lines, strict=True):
             if (components := unit_components(row, line, tally, normalize)) is None:
                 break
             found.append(components)
