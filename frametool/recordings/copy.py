@@ -8,6 +8,8 @@ including covariances; the twist of an Odometry is in its child's frame and is u
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,13 +21,13 @@ from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
 from frametool.recordings.alike import POSE_ARRAY, posed_messages
 from frametool.recordings.made import KINDS, serialised, typestore
+from frametool.recordings.messages import checked_components, numbers_of
 from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
 from frametool.recordings.write import RecordingFile, new_channel
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
-from frametool.ros.plain_messages import unit_components
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
@@ -41,22 +43,14 @@ STATIC = "tf_static"
 MOST_NAMED = 8  # edges
 
 
+@dataclass(slots=True)
 class RecordedEdge:
-    """The data of one frame in a recording: its parents, its topics, its first values, and whether others follow."""
+    """The data of one frame in a recording: its first values, its parents, its topics, and whether others follow."""
 
-    __slots__ = ("is_static", "numbers", "parents", "topics", "varies")
-
-    def __init__(self, numbers: Rigid) -> None:
-        """Begin with the first message that contains it."""
-        self.numbers = numbers
-        self.parents: dict[str, None] = {}
-        self.topics: dict[str, None] = {}
-        self.is_static = self.varies = False
-
-    @property
-    def moves(self) -> bool:
-        """Return True if the frame moves."""
-        return self.varies and not self.is_static
+    numbers: Rigid
+    parents: dict[str, None] = field(default_factory=dict)
+    topics: dict[str, None] = field(default_factory=dict)
+    varies: bool = False
 
 
 class AddedEdge(NamedTuple):
@@ -84,47 +78,35 @@ class RecordedEdges:
 
     def __init__(self, name: str) -> None:
         """Create an empty set; `name` is that of the recording, for messages."""
-        self.name = name
+        self.name, self.names = name, Names()
         self.known: dict[str, RecordedEdge] = {}
-        self.names, self._topics = Names(), Topics()
-        self._conflicts: dict[str, str] = {}  # of frames that come from two robots
-        self._topic_of: dict[str, str] = {}  # frame -> its first topic
 
     def add(self, topic: str, transform: RawTransform) -> None:
         """Add a transform."""
-        parent, child, numbers = self.bare(transform.parent), self.bare(transform.child), transform.numbers
-        edge = self.known.get(child)
-        if edge is None:
-            edge = self.known[child] = RecordedEdge(numbers)
-        if parent not in edge.parents or topic not in edge.topics:
-            edge.parents[parent] = edge.topics[topic] = None
-            edge.is_static |= topic.endswith(STATIC)
-            self._topic_of.setdefault(parent, topic)
-            self._topic_of.setdefault(child, topic)
-            if problem := self._topics.conflict(topic, child):
-                self._conflicts[child] = problem
-        if not edge.varies and numbers != edge.numbers:
-            edge.varies = not is_same(numbers, edge.numbers)
+        edge = self.known.setdefault(self.names.bare(transform.child), RecordedEdge(transform.numbers))
+        edge.parents[self.names.bare(transform.parent)] = edge.topics[topic] = None
+        if not edge.varies and transform.numbers != edge.numbers:
+            edge.varies = not is_same(transform.numbers, edge.numbers)
 
-    def bare(self, name: str) -> str:
-        """Return a frame's name without a leading slash."""
-        return self.names.bare(name) if name else ""
-
-    @property
+    @cached_property
     def frames(self) -> dict[str, str]:
-        """Return all frames, each with its first topic."""
-        return self._topic_of
+        """Return all frames, each with a topic, once all transforms were added."""
+        found: dict[str, str] = {}
+        for child, edge in self.known.items():
+            for frame in (*edge.parents, child):
+                found.setdefault(frame, next(iter(edge.topics)))
+        return found
 
     def topic_for(self, edge: AddedEdge, added: Iterable[AddedEdge]) -> str:
         """Return the topic for an added edge: `tf_static` in the namespace of the frames above it."""
         parents = {each.child: each.parent for each in added}
         line = [*to_root(edge.parent, parents.get), edge.child]
-        topic = next((self._topic_of[frame] for frame in line if frame in self._topic_of), "/tf")
+        topic = next((self.frames[frame] for frame in line if frame in self.frames), "/tf")
         return f"{topic.rpartition('/')[0]}/{STATIC}"
 
     def apart(self, added: Sequence[AddedEdge]) -> list[str]:
         """Return the roots of added edges that are not connected to the recording."""
-        parents, known = {each.child: each.parent for each in added}, self._topic_of.keys()
+        parents, known = {each.child: each.parent for each in added}, self.frames.keys()
         root_of = {edge: to_root(edge.parent, parents.get)[-1] for edge in added}
         held = {root for edge, root in root_of.items() if not known.isdisjoint((edge.parent, edge.child))}
         return sorted({*root_of.values()} - held) if known else []
@@ -138,7 +120,7 @@ class RecordedEdges:
         """
         found = EdgePlan([], [], [])
         for track in tree.tracks():
-            child, parent = (resolve_name(frame, self._topic_of) for frame in (track.child, track.parent))
+            child, parent = (resolve_name(frame, self.frames) for frame in (track.child, track.parent))
             if not track.is_static:
                 raise static_and_moving(child, f" moves in {bare(tree.name)}; --with adds static frames")
             edge, known = AddedEdge(parent, child, track.components), self.known.get(child)
@@ -158,12 +140,12 @@ class RecordedEdges:
 
     def _refuse_other(self, edge: AddedEdge, known: RecordedEdge, tree: str) -> None:
         """Raise BadTopology for a frame with another parent, a moving one, and one that comes from two robots."""
-        here = f"{self.name}, {first_of([*known.topics], MOST_NAMED)}"
-        if edge.child in self._conflicts:
-            raise BadTopology(self._conflicts[edge.child], source=self.name, rule="two-topics")
+        topics, here = Topics(), f"{self.name}, {first_of([*known.topics], MOST_NAMED)}"
+        for problem in filter(None, (topics.conflict(topic, edge.child) for topic in known.topics)):
+            raise BadTopology(problem, source=self.name, rule="two-topics")
         if others := [parent for parent in known.parents if parent != edge.parent]:
             raise two_parents(edge.child, others[0], edge.parent, (here, bare(tree)))
-        if known.moves:
+        if known.varies and not any(topic.endswith(STATIC) for topic in known.topics):
             both = f"it moves in {shown(edge.parent)} ({here}) and is static in it ({bare(tree)})"
             raise static_and_moving(edge.child, f": {both}")
 
@@ -220,13 +202,6 @@ class MessageHeader(NamedTuple):
     frame: str
     stamp_ns: int
 
-    @classmethod
-    def of(cls, header: Any) -> MessageHeader:
-        """Read a header; raises ValueInvalid for an invalid stamp."""
-        if problem := stamp_problem(header.stamp.sec, header.stamp.nanosec, STAMPS[0]):
-            raise problem
-        return cls(header.frame_id, header.stamp.sec * BILLION + header.stamp.nanosec)
-
 
 class MessageMover:
     """Transforms messages to one frame, by static or moving transforms."""
@@ -240,7 +215,7 @@ class MessageMover:
         self.frames, self.into, self.types, self.normalize = frames, frames.resolve_name(into), types, normalize
         self.tally = Diagnostics()  # names with a leading slash, and quaternions that are not unit
         self.header: MessageHeader | None = None  # of the last message, as far as it was read
-        self._last: tuple[MessageHeader, Rigid] | None = None
+        self._pose_of = lru_cache(1)(self._looked_up)
 
     def moved(self, channel: Channel, data: bytes) -> bytes:
         """Return a message of one of MOVED_TYPES in the frame; the same object if it is in this frame already.
@@ -249,10 +224,10 @@ class MessageMover:
         """
         self.header = None
         message = self.types.read(channel, data)
-        self.header = MessageHeader.of(message.header)
-        parts = [*posed_messages(message, channel.type)]
-        movers = [self._pose_of(MessageHeader.of(each.header)) for each in parts]
-        is_listed = channel.type in LISTS and self._name(self.header) != self.into
+        self.header = self._read(message.header)
+        parts = posed_messages(message, channel.type)
+        movers = [self._pose_of(self._read(each.header)) for each in parts]
+        is_listed = channel.type in LISTS and self.header.frame != self.into
         if not is_listed and all(each is None for each in movers):
             return data
         for part, mover in zip(parts, movers, strict=True):
@@ -262,19 +237,19 @@ class MessageMover:
             each.header.frame_id = self.into
         return self.types.write(channel, message)
 
-    def _name(self, header: MessageHeader) -> str:
-        return self.tally.names.bare(header.frame) if header.frame else ""
+    def _read(self, header: Any) -> MessageHeader:
+        """Read a header; raises ValueInvalid for an invalid stamp."""
+        if problem := stamp_problem(header.stamp.sec, header.stamp.nanosec, STAMPS[0]):
+            raise problem
+        return MessageHeader(self.tally.names.bare(header.frame_id), header.stamp.sec * BILLION + header.stamp.nanosec)
 
-    def _pose_of(self, header: MessageHeader) -> Rigid | None:
+    def _looked_up(self, header: MessageHeader) -> Rigid | None:
         """Return the pose that transforms from the frame of a header; None for the target frame itself."""
-        name = self._name(header)
-        if name == self.into:
+        if header.frame == self.into:
             return None
-        if not name:
+        if not header.frame:
             raise ValueInvalid("its header names no frame")
-        if self._last is None or self._last[0] != header:
-            self._last = header, self.frames.lookup_components(self.into, name, header.stamp_ns)
-        return self._last[1]
+        return self.frames.lookup_components(self.into, header.frame, header.stamp_ns)
 
     def _move(self, part: Any, mover: Rigid) -> None:
         """Transform a point, or a pose and its covariance."""
@@ -285,15 +260,10 @@ class MessageMover:
             put(part.point, [each + 0.0 for each in rigid.apply(*mover, *numbers)])
             return
         pose = getattr(part.pose, "pose", part.pose)
-        at, turn = pose.position, pose.orientation
-        turned = turn.x, turn.y, turn.z, turn.w
-        found = unit_components((at.x, at.y, at.z, *turned), 0, self.tally, self.normalize)
-        if found is None:
-            problem = quaternion.complaint(*turned, normalize=self.normalize)
-            raise problem or ValueInvalid("its position is not finite", rule="not-finite")
+        found = checked_components(numbers_of(pose.position, pose.orientation), 0, self.tally, self.normalize)
         tx, ty, tz, x, y, z, w = rigid.compose(*mover, *found)
-        put(at, (tx + 0.0, ty + 0.0, tz + 0.0))
-        put(turn, [each + 0.0 for each in quaternion.unit(x, y, z, w, floats)])
+        put(pose.position, (tx + 0.0, ty + 0.0, tz + 0.0))
+        put(pose.orientation, [each + 0.0 for each in quaternion.unit(x, y, z, w, floats)])
         if pose is not part.pose:
             entries = tuple(part.pose.covariance.tolist())
             if any(entries) and entries[0] != uncertainty.UNKNOWN:
@@ -309,9 +279,9 @@ class RecordCopy:
     """The contents of a recording, and the changes of its copy.
 
     window: the first and the last log time that is copied; static data are always copied
-    change: returns the new messages of a channel
+    change: returns the new messages of a channel; added: the edges that come first, by topic
     counts: of messages by channel; span: the first and the last log time
-    inside, outside: how many are copied in the window and outside of it; first_ns: the first log time that is copied
+    inside: how many are in the window; outside: how many outside of it are copied; first_ns: the first time of these
     undefined: types that the recording does not define, and whether ROS 2 Humble does
     """
 
@@ -319,24 +289,28 @@ class RecordCopy:
         """Store what to copy; nothing is read yet."""
         self.reader, self.window = reader, window
         self.change: dict[Channel, Change] = {}
+        self.added: dict[str, list[AddedEdge]] = {}
         self.counts: Counter[Channel] = Counter()
         self.span: tuple[int, int] | None = None
         self.inside = self.outside = 0
         self.first_ns: int | None = None
         self.undefined: dict[str, bool] = {}
 
-    def look(self, advance: Advance, see: Callable[[Channel, bytes], None]) -> None:
+    def read_all(self, advance: Advance) -> None:
         """Read everything and pass every message to `see`; raises FormatError if the recording is not complete."""
-        for message in self._messages(advance):
-            channel, log_ns, data, *_ = message
+        for channel, log_ns, data, *_ in self._messages(advance):
             self.counts[channel] += 1
             first, last = self.span or (log_ns, log_ns)
             self.span = min(first, log_ns), max(last, log_ns)
-            if self._keeps(message):
+            is_inside = self._is_inside(log_ns)
+            if is_inside or channel.is_static:
                 self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
-                self.inside += self._is_inside(log_ns)
-                self.outside += not self._is_inside(log_ns)
-            see(channel, data)
+                self.outside += not is_inside
+            self.inside += is_inside
+            self.see(channel, data)
+
+    def see(self, channel: Channel, data: bytes) -> None:
+        """Look at a message when everything is read."""
 
     def _messages(self, advance: Advance) -> Iterator[Recorded]:
         """Yield all messages."""
@@ -352,13 +326,8 @@ class RecordCopy:
     def _is_inside(self, log_ns: int) -> bool:
         return self.window is None or self.window[0] <= log_ns <= self.window[1]
 
-    def _keeps(self, message: Recorded) -> bool:
-        return self._is_inside(message.log_ns) or message.channel.is_static
-
-    def pieces(
-        self, fmt: str, folder: str, added: Mapping[str, Sequence[AddedEdge]], stamp_ns: int, advance: Advance
-    ) -> Iterator[bytes]:
-        """Yield the bytes of the copy in a format, starting with edges on some topics; stamp_ns: of these.
+    def pieces(self, fmt: str, folder: str, stamp_ns: int, advance: Advance) -> Iterator[bytes]:
+        """Yield the bytes of the copy in a format, starting with the added edges; stamp_ns: of these.
 
         folder: for temporary files while it is written
         """
@@ -367,7 +336,7 @@ class RecordCopy:
             if each.schema is None and each.type:
                 self._define(each)
         file = RecordingFile(fmt, folder, files[0].compression, head=files[0].head)
-        for topic, edges in added.items():
+        for topic, edges in self.added.items():
             channel = self._latched(topic)
             file.begin([channel])
             frames = [(edge.parent, edge.child) for edge in edges]
@@ -375,12 +344,11 @@ class RecordCopy:
             file.add(Recorded(channel, self.first_ns or 0, data, self.first_ns or 0))
         file.begin(self.reader.all)
         for message in self._messages(advance):
-            if not self._keeps(message):
-                continue
-            change = self.change.get(message.channel)
-            copied = message.data if change is None else change(message.data)
-            if copied is not None:
-                file.add(message if copied is message.data else message._replace(data=copied))
+            if self._is_inside(message.log_ns) or message.channel.is_static:
+                change = self.change.get(message.channel)
+                copied = message.data if change is None else change(message.data)
+                if copied is not None:
+                    file.add(message._replace(data=copied))
         with broken(self.reader.path):
             said = self._others(file)
             yield from file.pieces(said or self.reader.metadata, itself=said is not None)

@@ -259,8 +259,21 @@ class RawTransform(NamedTuple):
             pose = getattr(message.pose, "pose", message.pose)
             body = getattr(message, "child_frame_id", "") or body
             moved, turned = pose.position, pose.orientation
-        numbers = moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
-        return cls(message.header.frame_id, body, numbers, (message.header.stamp.sec, message.header.stamp.nanosec))
+        stamp = message.header.stamp.sec, message.header.stamp.nanosec
+        return cls(message.header.frame_id, body, numbers_of(moved, turned), stamp)
+
+
+def numbers_of(moved: Any, turned: Any) -> Rigid:
+    """Return the components of two parts of a message, a position and a quaternion."""
+    return moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
+
+
+def checked_components(numbers: Rigid, line: int, tally: Diagnostics, normalize: bool) -> Rigid:  # noqa: FBT001 - fast
+    """Return `unit_components`; raises ValueInvalid if there are none."""
+    if (found := unit_components(numbers, line, tally, normalize)) is not None:
+        return found
+    problem = quaternion.complaint(*numbers[3:], normalize=normalize)
+    raise problem or ValueInvalid("its position is not finite", rule="not-finite")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
@@ -378,15 +391,14 @@ def _edge(said: RawTransform, number: int, message: Recorded, path: str, options
     tally, topic = options.tally, message.channel.topic
     options.topics.takes(topic)
     parent, child = tally.names.bare(said.parent), tally.names.bare(said.child)
-    components = unit_components(said.numbers, number, tally, options.normalize)
-    if components is None or not parent or not child:
-        problem = ValueInvalid("its position is not finite", rule="not-finite")
-        problem = quaternion.complaint(*said.numbers[3:], normalize=options.normalize) or problem
-        problem = problem if parent and child else ValueInvalid("an empty frame name")
-        edge = f"{shown(parent)} -> {shown(child)}"
-        raise FormatError(f"message {number}: {edge}: {problem}", source=path, rule=problem.rule)
-    if misfit := stamp_problem(*said.stamp, STAMPS[0]):
-        raise FormatError(f"message {number}: {parent!r} -> {child!r}: {misfit}", source=path)
+    problem = stamp_problem(*said.stamp, STAMPS[0]) if parent and child else ValueInvalid("an empty frame name")
+    try:
+        components = checked_components(said.numbers, number, tally, options.normalize)
+    except ValueInvalid as error:
+        problem = problem or error
+    if problem:
+        what = f"message {number}: {shown(parent)} -> {shown(child)}: {problem}"
+        raise FormatError(what, source=path, rule=problem.rule)
     if clash := options.topics.conflict(topic, child):
         options.report(FormatError(clash, source=path, rule="two-topics"))
     stamp_ns = None if message.channel.is_static else said.stamp[0] * BILLION + said.stamp[1]

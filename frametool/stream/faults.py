@@ -132,6 +132,7 @@ class BadRows:
         self.most = most
         self.tell = tell
         self.counted = counted
+        self.unit = "message" if counted == "message" else "row"
         self.count = 0
         self._has_listed = False  # the list of known names is in the first message only
 
@@ -142,7 +143,7 @@ class BadRows:
             if self.on_error == STOP or fault.final:
                 raise BadRow(fault, self._reason(fault), source=self.source, counted=self.counted)
             if self.count <= self.most:
-                fate = "row skipped" if self.on_error == SKIP or fault.skipped else "no result"
+                fate = f"{self.unit} skipped" if self.on_error == SKIP or fault.skipped else "no result"
                 self.tell(BadRow(fault, self._reason(fault), source=self.source, fate=fate, counted=self.counted))
 
     def place(self, number: int, column: str = "") -> str:
@@ -157,7 +158,7 @@ class BadRows:
             return DONE
         verb = "skipped" if self.on_error == SKIP else "without result"
         more = f", {self.count - self.most} of them not shown" if self.count > self.most else ""
-        message = f"{self.source}: {self.count} of {rows} rows {verb}{more}"
+        message = f"{self.source}: {self.count} of {rows} {self.unit}s {verb}{more}"
         self.tell(RowsSkipped(message, source=self.source, bad=self.count, rows=rows))
         return ROWS_SKIPPED
 

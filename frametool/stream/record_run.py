@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import (
     FormatError,
-    FrametoolError,
     LookupFailed,
     Misused,
     NoDataAt,
@@ -33,16 +31,16 @@ from frametool.recordings.copy import (
 )
 from frametool.recordings.made import SECONDS_ROS2
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
-from frametool.stream.faults import DONE, MOST, ROWS_SKIPPED, SKIP, STOP, RowsSkipped
+from frametool.stream.faults import STOP, Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
-    from frametool.errors import Finding
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import EdgeColumns, Report, Samples
     from frametool.recordings.copy import AddedEdge, Advance, Change
     from frametool.recordings.read import Channel, RecordingReader
+    from frametool.stream.faults import BadRows
 
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
 OTHER_TRANSFORMS = "FrameTransform"  # of Foxglove, and lists of them
@@ -52,37 +50,38 @@ LAST_STAMP = SECONDS_ROS2[1] * BILLION
 class RecordRequest(NamedTuple):
     """What is to be changed in a recording.
 
+    bad: what is done with messages that cannot be moved
     tree: its edges are added; replace: they replace edges with other values
     into: the frame that messages are moved into; topics: of these messages, and of the transforms that are used
     window: the first and the last log time that is copied
-    on_error: STOP or SKIP, at a message that cannot be moved; report: is called with the reason
     normalize: take any non-zero quaternion
     """
 
+    bad: BadRows
     tree: Frames | None = None
     replace: bool = False
     into: str = ""
     topics: tuple[str, ...] = ()
     window: tuple[int, int] | None = None
-    on_error: str = STOP
-    report: Callable[[FrametoolError], None] = lambda _error: None
     normalize: bool = False
 
 
-class RecordRun:
+class RecordRun(RecordCopy):
     """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done."""
 
     def __init__(self, recording: RecordingReader, request: RecordRequest) -> None:
         """Begin with a recording that is not read yet."""
-        self.recording, self.request = recording, request
-        self.copy = RecordCopy(recording, request.window)
+        super().__init__(recording, request.window)
+        self.request, self.path = request, recording.path
         self.edges = RecordedEdges(recording.path)
         self.plan = EdgePlan([], [], [])
-        self.added: dict[str, list[AddedEdge]] = {}  # by the topics they come on
         self.transform_topics = {topic for topic in request.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
+        self.used = recording.on_topics(TYPES, self.transform_topics)  # channels whose transforms are used
+        named = {topic.strip("/") for topic in {*request.topics} - self.transform_topics}
+        self.named = [each for each in recording.all if each.topic.strip("/") in named]  # channels that are moved
         self.mover: MessageMover | None = None
         self.moved: dict[str, int] = {}  # topic -> how many of its messages were looked at
-        self.unmoved = self.skipped = self.rewritten = 0
+        self.unmoved = self.rewritten = 0
 
     def look(self, advance: Advance) -> None:
         """Read the recording once, and check that it can be changed as requested.
@@ -90,11 +89,12 @@ class RecordRun:
         Raises FormatError for a recording that is not whole and a topic that cannot be moved, BadTopology for edges
         that do not fit, LookupFailed for a frame that is not there and a window without messages.
         """
-        request = self.request
-        self.copy.look(advance, self._see)
+        request, types = self.request, self.reader.types
+        self.read_all(advance)
         self._check_topics()
-        if request.window and not self.copy.inside:
-            raise NoDataAt(self._empty(request.window))
+        if request.window and not self.inside:
+            there = f"they are logged from {' to '.join(map(format_stamp, self.span))}" if self.span else "it has none"
+            raise NoDataAt(f"{self.path}: no messages from {' to '.join(map(format_stamp, request.window))}; {there}")
         if request.tree is not None or request.into:
             self._refuse_others()
         if request.tree is not None:
@@ -103,87 +103,66 @@ class RecordRun:
                 self.added.setdefault(self.edges.topic_for(edge, self.plan.added), []).append(edge)
             for root in self.edges.apart(self.plan.added):
                 near = did_you_mean(root, self.edges.frames)
-                warn(f"{self.recording.path}: frame {shown(root)} is in none of its transforms{near}")
+                warn(f"{self.path}: frame {shown(root)} is in none of its transforms{near}")
         if self.plan.replaced:
-            self.copy.change |= {each: self._replacing(each) for each in self._used()}
+            self.change |= {each: self._replacing(each) for each in self.used}
         if request.into:
-            frames, types = self._frames(), self.recording.types
-            self.mover = mover = MessageMover(frames, request.into, types, normalize=request.normalize)
-            self.copy.change |= {each: self._moving(each, mover) for each in self._named()}
+            self.mover = mover = MessageMover(self._frames(), request.into, types, normalize=request.normalize)
+            self.change |= {each: self._moving(each, mover) for each in self.named}
 
-    def _used(self) -> list[Channel]:
-        """Return the channels whose transforms are used."""
-        return [each for each in self.recording.channels if self._is_used(each)]
-
-    def _is_used(self, channel: Channel) -> bool:
-        """Return True if the transforms of a channel are used: those of the topics that are named, or all."""
-        return channel.type in TYPES and (not self.transform_topics or _is_among(channel.topic, self.transform_topics))
-
-    def _named(self) -> list[Channel]:
-        """Return the channels whose messages are to be moved."""
-        named = {*self.request.topics} - self.transform_topics
-        return [each for each in self.recording.all if _is_among(each.topic, named)]
-
-    def _see(self, channel: Channel, data: bytes) -> None:
+    def see(self, channel: Channel, data: bytes) -> None:
         """Collect the edges of a message of transforms."""
-        if self.request.tree is None or not self._is_used(channel):
-            return
-        with _on_topic(channel.topic, self.recording.path):
-            for each in self.recording.types.read(channel, data).transforms:
+        if self.request.tree is not None and channel in self.used:
+            try:
+                found = self.reader.types.read(channel, data).transforms
+            except ValueInvalid as error:
+                raise FormatError(f"a message on {channel.topic}: {error}", source=self.path) from None
+            for each in found:
                 self.edges.add(channel.topic, RawTransform.of(each))
 
     def _check_topics(self) -> None:
         """Raise FormatError for a topic that is not there or cannot be moved, Misused where none is to be moved."""
-        path, into, channels = self.recording.path, self.request.into, self.recording.all
-        known = {channel.topic for channel in channels}
+        known = {channel.topic for channel in self.reader.all}
         for topic in self.request.topics:
-            if not _is_among(topic, known):
-                raise FormatError(f"no topic {topic}{alternatives(topic, known, 'topics')}", source=path)
-        named = self._named()
-        for each in named:
+            if topic.strip("/") not in {each.strip("/") for each in known}:
+                raise FormatError(f"no topic {topic}{alternatives(topic, known, 'topics')}", source=self.path)
+        for each in self.named:
             if each.type not in MOVED_TYPES:
-                raise FormatError(f"{each.topic} holds {each.type or 'no type'}; --into moves {MOVES}", source=path)
-        if into and not named:
-            movable = sorted({each.topic for each in channels if each.type in MOVED_TYPES})
+                what = f"{each.topic} holds {each.type or 'no type'}; --into moves {MOVES}"
+                raise FormatError(what, source=self.path)
+        if self.request.into and not self.named:
+            movable = sorted({each.topic for each in self.reader.all if each.type in MOVED_TYPES})
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
-            extra = f" beside {first_of(sorted(self.transform_topics), MOST_NAMED)}" if self.transform_topics else ""
-            raise Misused(f"--into moves the messages of topics that are named{extra}; {remedy}", source=path)
+            raise Misused(f"--into moves the messages of topics that are named; {remedy}", source=self.path)
 
     def _refuse_others(self) -> None:
         """Raise FormatError for transforms that cannot be read here, as protobuf's, and for topics that are foreign."""
-        path = self.recording.path
-        for each in self.recording.foreign:
+        for each in self.reader.foreign:
             if each.type.replace(".", "/").rpartition("/")[2].startswith(OTHER_TRANSFORMS):
-                raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=path)
+                raise FormatError(f"{each.topic} holds {each.type}: no transforms of recordings", source=self.path)
             if each.encoding == "ros1":
-                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=path)
-        self.recording.refuse_foreign(self.request.topics)
-
-    def _empty(self, window: tuple[int, int]) -> str:
-        """Return the error that no message lies in a window."""
-        span = self.copy.span
-        there = f"they are logged from {' to '.join(map(format_stamp, span))}" if span else "it has none at all"
-        return f"{self.recording.path}: no messages from {' to '.join(map(format_stamp, window))}; {there}"
+                raise FormatError("messages of ROS 1 in MCAP are only copied, not read", source=self.path)
+        self.reader.refuse_foreign(self.request.topics)
 
     def _frames(self) -> Frames:
         """Return all transforms as they are in the copy."""
         more = [*self.plan.added, *self.plan.replaced]
-        used = [each for each in self._used() if self.copy.counts[each]]
+        used = [each for each in self.used if self.counts[each]]
         if not more and not used:
-            raise FormatError("no transforms in it; --with FILE brings some", source=self.recording.path)
-        source = TransformsOfCopy(self.recording, used, self.transform_topics, more)
+            raise FormatError("no transforms in it; --with FILE brings some", source=self.path)
+        source = TransformsOfCopy(self.reader, used, self.transform_topics, more)
         return load_sources([source], Rules(normalize=self.request.normalize))
 
     def _replacing(self, channel: Channel) -> Change:
         """Return a function that puts the new values into messages of transforms."""
-        edges, types = {edge.child: edge for edge in self.plan.replaced}, self.recording.types
+        edges, types = {edge.child: edge for edge in self.plan.replaced}, self.reader.types
         names = [child.encode() for child in edges]
 
         def change(data: bytes) -> bytes:
             if not any(name in data for name in names):
                 return data
             message = types.read(channel, data)
-            if not replaced(message, edges, self.edges.bare):
+            if not replaced(message, edges, self.edges.names.bare):
                 return data
             self.rewritten += 1
             return types.write(channel, message)
@@ -199,23 +178,21 @@ class RecordRun:
                 new = mover.moved(channel, data)
             except (LookupFailed, ValueInvalid) as error:
                 stamp = "" if mover.header is None else f", stamp {format_stamp(mover.header.stamp_ns)}"
-                fate = " (message skipped)" if self.request.on_error == SKIP else ""
-                error.args = (f"{self.recording.path}: message {number} on {channel.topic}{stamp}: {error}{fate}",)
-                if not fate:
+                reason = f"on {channel.topic}{stamp}: {error}"
+                if self.request.bad.on_error == STOP:
+                    error.args = (f"{self.path}: message {number}: {reason}",)
                     raise
-                self.skipped += 1
-                if self.skipped <= MOST:
-                    self.request.report(error)
+                self.request.bad.take([Fault(number, "", reason)])
                 return None
             self.unmoved += new is data
             return new
 
         return change
 
-    def pieces(self, fmt: str, folder: str, advance: Advance) -> Iterator[bytes]:
+    def copied(self, fmt: str, folder: str, advance: Advance) -> Iterator[bytes]:
         """Yield the bytes of the copy in a format; folder: where there is room for it while it is written."""
-        first_ns = self.copy.first_ns or 0
-        yield from self.copy.pieces(fmt, folder, self.added, first_ns if first_ns < LAST_STAMP else 0, advance)
+        first_ns = self.first_ns or 0
+        return self.pieces(fmt, folder, first_ns if first_ns < LAST_STAMP else 0, advance)
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""
@@ -226,31 +203,16 @@ class RecordRun:
         if self.plan.same:
             yield f"there already with the same values: {_listed(self.plan.same)}"
         if self.moved:
-            count, topics = sum(self.moved.values()) - self.skipped, first_of([*self.moved], MOST_NAMED)
+            count, topics = sum(self.moved.values()) - self.request.bad.count, first_of([*self.moved], MOST_NAMED)
             stayed = f", {self.unmoved} of them were in it" if self.unmoved else ""
             yield f"{_count(count)} in {self.request.into} ({topics}){stayed}"
-        if self.copy.outside:
-            yield f"kept outside of --between: {_count(self.copy.outside)} on {STATIC}"
+        if self.outside:
+            yield f"kept outside of --between: {_count(self.outside)} on {STATIC}"
         for is_usual, how in (True, "written as in ROS 2 Humble"), (False, "copied without a definition"):
-            if kinds := sorted(kind for kind, usual in self.copy.undefined.items() if usual is is_usual):
+            if kinds := sorted(kind for kind, usual in self.undefined.items() if usual is is_usual):
                 yield f"types that it does not define are {how}: {first_of(kinds, MOST_NAMED)}"
         if not (self.added or self.rewritten or self.moved or self.request.window):
-            yield f"nothing is changed: {_count(sum(self.copy.counts.values()))} copied"
-
-    def remarks(self) -> Iterator[Finding]:
-        """Yield what was invalid in messages that were moved."""
-        if self.mover is not None:
-            yield from self.mover.tally.findings()
-
-    def finish(self) -> int:
-        """Report how many messages were left out; return the exit status."""
-        if not self.skipped:
-            return DONE
-        total = sum(self.moved.values())
-        more = f", {self.skipped - MOST} of them not shown" if self.skipped > MOST else ""
-        message = f"{self.recording.path}: {self.skipped} of {total} messages skipped{more}"
-        self.request.report(RowsSkipped(message, source=self.recording.path, bad=self.skipped, messages=total))
-        return ROWS_SKIPPED
+            yield f"nothing is changed: {_count(self.counts.total())} copied"
 
 
 class TransformsOfCopy(FrameFile):
@@ -277,22 +239,8 @@ class TransformsOfCopy(FrameFile):
         self.tell()
 
 
-@contextmanager
-def _on_topic(topic: str, path: str) -> Iterator[None]:
-    """Name the topic of a message that cannot be read."""
-    try:
-        yield
-    except ValueInvalid as error:
-        raise FormatError(f"a message on {topic}: {error}", source=path) from None
-
-
-def _is_among(topic: str, topics: set[str]) -> bool:
-    """Return True if a topic is one of some, with or without a slash in front."""
-    return topic.strip("/") in {each.strip("/") for each in topics}
-
-
 def _listed(edges: Sequence[AddedEdge]) -> str:
-    return first_of(list(map(str, edges)), MOST_NAMED)
+    return first_of([*map(str, edges)], MOST_NAMED)
 
 
 def _count(messages: int) -> str:

@@ -207,7 +207,7 @@ WRONG = {
 def test_a_message_that_cannot_be_moved_stops_the_copy_or_is_left_out(bad: str, tmp_path: Path, run: Run) -> None:
     status, reason = WRONG[bad]
     done, path, new = moved(tmp_path, run, "mcap", late("mcap", bad), "--topic", "/pose")
-    line = f"frametool: {path}: message 3 on /pose{reason.replace('PATH', str(path))}"
+    line = f"frametool: {path}: message 3: on /pose{reason.replace('PATH', str(path))}"
     assert (done.status, done.err) == (status, f"{line}\n")
     assert not new.exists()
     done = run("record", str(path), "--into", "map", "--topic", "/pose", "--on-error", "skip", "-o", "new.mcap")
@@ -237,7 +237,7 @@ def test_a_covariance_that_is_none_is_an_error_and_unknown_or_no_ones_stay(tmp_p
     path = write(tmp_path / "other", "mcap", sent)
     done = run("record", str(path), "--into", "map", "--topic", "/pose", "-o", "other.mcap")
     said = "covariance is not symmetric: [0][1] is 1, [1][0] is 6"
-    assert done.err == f"frametool: {path}: message 1 on /pose, stamp 1700000000.000000000: {said}\n"
+    assert done.err == f"frametool: {path}: message 1: on /pose, stamp 1700000000.000000000: {said}\n"
 
 
 def test_recordings_without_transforms_say_so(tmp_path: Path, run: Run) -> None:

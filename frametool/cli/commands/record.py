@@ -18,7 +18,7 @@ from frametool.formats.table import FORMATS, is_recording, writers
 from frametool.frames.stamps import parse_time
 from frametool.grammar.edges import Diagnostics
 from frametool.grammar.readers import is_slashed
-from frametool.stream.faults import ON_ERROR, STOP
+from frametool.stream.faults import ON_ERROR, STOP, BadRows
 from frametool.view.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -90,24 +90,23 @@ def command(inputs: Inputs) -> int:
         warn(f"{copy}: covariances left out")
     if more or into:
         inputs.ask("normalize")
-    request = RecordRequest(
-        edges, replace=inputs.replace, into=_bare(into or ""), topics=topics, window=inputs.between,
-        on_error=inputs.on_error if into else STOP,
-        report=lambda error: say_error(error, in_json=False), normalize=normalize,
-    )  # fmt: skip
+    on_error = inputs.on_error if into else STOP
+    bad = BadRows(path, on_error, tell=lambda error: say_error(error, in_json=False), counted="message")
+    request = RecordRequest(bad, edges, inputs.replace, _bare(into or ""), topics, inputs.between, normalize)
     quiet, force = inputs.quiet, inputs.force
     inputs.refuse_idle()
     with opened_place(copy, place, force=force) as write, opened_recording(path, tally) as opened:
         run = RecordRun(opened, request)
         with ProgressBar(None, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
-            for piece in run.pieces(copy, folder_of(place), progress.advance):
+            for piece in run.copied(copy, folder_of(place), progress.advance):
                 write(piece)
-    for remark in (*tally.findings(), *run.remarks()):
+    moved = run.mover.tally.findings() if run.mover else ()
+    for remark in (*tally.findings(), *moved):
         warn(f"{path}: {remark.message}", rule=remark.rule)
     for sentence in () if quiet else run.summary():
         say(f"{path}: {sentence}")
-    return run.finish()
+    return bad.finish(sum(run.moved.values()))
 
 
 def _refuse_idle(more: Sequence[str], into: str | None, topics: Sequence[str]) -> None:
