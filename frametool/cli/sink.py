@@ -9,11 +9,10 @@ import os
 import re
 import stat
 import sys
-from contextlib import contextmanager, suppress
-from functools import partial
-from itertools import count, groupby
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import groupby
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from click import echo_via_pager
 
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     Write = Callable[[str | bytes | memoryview], None]
 
 _checks: list[Callable[[], None]] = []
-OPEN_FILES = "/proc/self/fd"  # where Linux has the files of a process by their numbers
 BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # what a folder may hold that is replaced
 STYLES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "magenta": 35, "cyan": 36}  # legible on dark and light
 HELP_MARKS = (  # of helps, topics, formats and the cookbook
@@ -36,7 +34,7 @@ HELP_MARKS = (  # of helps, topics, formats and the cookbook
     r"(?m)^  (?P<cyan>[a-z][\w-]*)  +(?=\S)",
     r"(?<![\w-])(?P<cyan>--?[a-zA-Z][\w-]*)",
 )
-LONGEST_NAME = 255  # bytes, on nearly every file system
+LONGEST_BEGIN = 40  # characters of a name that its part begins with: names have 255 bytes
 
 
 @contextmanager
@@ -44,9 +42,9 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
     """Open a place for results and yield what writes to it; each piece of text is out when the call returns.
 
     path: None or `-` is standard output.  A pipe, a device or one of the process's own streams is written to as it
-    is.  Anything else is written to a file without a name in the same folder, which takes the file's place, mode and
-    owner when the block ends without an error (the file itself, if the path is a link), and else is gone; where the
-    system has no such files, to `NAME.PID.part`, which only `kill -9` leaves behind.
+    is.  Anything else is written to `NAME.PID.part` in the same folder, which takes the file's place, mode and owner
+    when the block ends without an error (the file itself, if the path is a link), and else is gone; only `kill -9`
+    leaves it behind.
     Raises FileProblem if the file exists and `force` is not set, or cannot be written; BrokenPipeError if the reader
     of a pipe is gone; what a check finds wrong.
     """
@@ -58,9 +56,8 @@ def writing(path: str | None, *, force: bool = False) -> Iterator[Write]:
         with special:
             yield writer_into(special, path)
     else:
-        with _replacing(path, force=force) as part:
-            yield writer_into(part, path)
-            check()
+        with _filling_file(path, force=force) as write:
+            yield write
 
 
 def in_colour(text: str, marks: Iterable[str]) -> str:
@@ -174,133 +171,98 @@ def problems_of(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def _replacing(path: str, *, force: bool) -> Iterator[BinaryIO]:
-    """Yield a stream into a part file that takes the place of `path` if all goes well."""
-    place = os.path.realpath(path)
-    refuse_existing(path, force=force)
+def _replacing(path: str, refuse: Callable[[], None]) -> Iterator[str]:
+    """Yield the name of a part that takes the place of `path` if all goes well, and else is gone.
+
+    refuse: raises FileProblem where nothing may be replaced; the place is looked at again when the part is complete
+    """
+    refuse()
     clean_up()
-    mode = 0o600 if os.path.exists(place) else 0o666
-    part = ""
-    with problems_of(path):
-        stream = unnamed_in_folder(place, mode)
-        if stream is None:
-            part, stream = created(place, partial(_new_file, mode))
+    place = os.path.realpath(path)
+    folder, name = os.path.split(place)
+    part = os.path.join(folder, f"{name[:LONGEST_BEGIN]}.{os.getpid()}.part")
     try:
-        with stream:
-            yield stream
-            with problems_of(path):
-                part = part or created(place, partial(give_name, stream))[0]
-        refuse_existing(path, force=force)  # it may have come meanwhile
+        yield part
+        refuse()
         with problems_of(path):
             _take_over(part, place)
     except BaseException:
-        with suppress(OSError):
-            os.unlink(part)
+        _remove(part)
         raise
 
 
-def unnamed_in_folder(place: str, mode: int) -> BinaryIO | None:
-    """Open a file without a name in the folder of a place, which is gone with its process; None where none can be."""
-    if not (hasattr(os, "O_TMPFILE") and os.path.isdir(OPEN_FILES)):
-        return None
-    with suppress(OSError):  # not every file system has them
-        return open(os.open(os.path.dirname(place), os.O_TMPFILE | os.O_RDWR, mode), "wb", buffering=0)
-    return None
-
-
-def give_name(stream: BinaryIO, name: str) -> None:
-    """Name a file that has no name; raises FileExistsError for one that is taken."""
-    number = stream.fileno()
-    os.link(f"{OPEN_FILES}/{number}", name, src_dir_fd=number)  # any descriptor makes it follow that link
-
-
-def _new_file(mode: int, path: str) -> BinaryIO:
-    """Open a file that is not there yet."""
-    return open(path, "xb", buffering=0, opener=lambda path, flags: os.open(path, flags, mode))
-
-
-def created(place: str, create: Callable[[str], Any]) -> tuple[str, Any]:
-    """Create a part next to a place that nobody else uses, and return its name, cut where the system's is too long."""
-    folder, name = os.path.split(place)
-    for attempt in count():
-        suffix = f".{os.getpid()}{f'-{attempt}' if attempt else ''}.part"
-        begin = os.fsencode(name)[: LONGEST_NAME - len(suffix)].decode(errors="ignore")
-        part = os.path.join(folder, begin + suffix)
-        with suppress(FileExistsError):
-            return part, create(part)
-    raise AssertionError(place)
-
-
-def _take_over(part: str, place: str) -> None:
-    """Put a part file in its place, with the mode and, where the system lets us, the owner of the file before."""
-    with suppress(FileNotFoundError):
-        before = os.stat(place)
-        with suppress(OSError, AttributeError):  # Windows has no chown
-            os.chown(part, before.st_uid, before.st_gid)
-        os.chmod(part, stat.S_IMODE(before.st_mode))
-    os.replace(part, place)
+@contextmanager
+def _filling_file(path: str, *, force: bool) -> Iterator[Write]:
+    """Yield what writes into a part file that takes the place of `path` if all goes well."""
+    with _replacing(path, lambda: refuse_existing(path, force=force)) as part:
+        with problems_of(path):
+            stream = _new_file(part, 0o600 if os.path.exists(path) else 0o666)
+        with stream:
+            yield writer_into(stream, path)
+            check()
 
 
 @contextmanager
 def filling(path: str, *, force: bool) -> Iterator[Write]:
     """Yield what fills a new folder, each file begun by a piece that has its name; it is there whole or not at all."""
-    place = os.path.realpath(path)
-    _refuse_folder(path, force=force)
-    clean_up()
-    files: dict[str, BinaryIO] = {}
-    part = ""
+    write: Write | None = None
 
     def fill(piece: str | bytes | memoryview) -> None:
-        nonlocal part
-        with problems_of(path):
-            if name := getattr(piece, "name", ""):
-                stream = unnamed_in_folder(place, 0o666)
-                if stream is None:
-                    part = part or created(place, os.mkdir)[0]
-                    stream = open(os.path.join(part, name), "xb", buffering=0)  # noqa: SIM115 - closed below
-                files[name] = stream
-            if piece:  # nothing comes before the first name
-                writer_into(files[next(reversed(files))], path)(piece)
+        nonlocal write
+        if name := getattr(piece, "name", ""):
+            with problems_of(path):
+                file = opened.enter_context(_new_file(os.path.join(part, name)))
+            write = writer_into(file, path)
+        if write is not None and piece:  # nothing comes before the first name
+            write(piece)
 
-    try:
+    with _replacing(path, lambda: _refuse_folder(path, force=force)) as part, ExitStack() as opened:
+        with problems_of(path):
+            os.mkdir(part)
         yield fill
         check()
-        with problems_of(path):
-            part = part or created(place, os.mkdir)[0]
-            for name, stream in files.items():
-                if isinstance(stream.name, int):
-                    give_name(stream, os.path.join(part, name))
-            _refuse_folder(path, force=force)  # it may have come meanwhile
-            before = f"{part}.before" if os.path.isdir(place) else ""
-            if before:
-                os.rename(place, before)
-            os.rename(part, place)
-            _remove(before)
-    except BaseException:
-        _remove(part)
-        raise
-    finally:
-        for stream in files.values():
-            stream.close()
 
 
-def _remove(folder: str) -> None:
-    """Remove a folder, if there is one."""
-    if folder:
+def _new_file(path: str, mode: int = 0o666) -> BinaryIO:
+    """Open a file that is not there yet."""
+    return open(path, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode))
+
+
+def _take_over(part: str, place: str) -> None:
+    """Put a part in its place, a file with the mode and, where the system lets us, the owner of the file before."""
+    if os.path.isdir(part):
+        before = f"{part}.before"
+        with suppress(FileNotFoundError):
+            os.rename(place, before)
+        os.rename(part, place)
+        _remove(before)
+        return
+    with suppress(FileNotFoundError):
+        known = os.stat(place)
+        with suppress(OSError, AttributeError):  # Windows has no chown
+            os.chown(part, known.st_uid, known.st_gid)
+        os.chmod(part, stat.S_IMODE(known.st_mode))
+    os.replace(part, place)
+
+
+def _remove(part: str) -> None:
+    """Remove a file or a folder, if there is one."""
+    if os.path.isdir(part):
         from shutil import rmtree
 
-        rmtree(folder, ignore_errors=True)
+        rmtree(part, ignore_errors=True)
+    with suppress(OSError):
+        os.unlink(part)
 
 
 def _refuse_folder(path: str, *, force: bool) -> None:
     """Raise FileProblem for a folder that may not be replaced: without --force, or of other files than a bag's."""
-    refuse_existing(path, force=force)
     if not os.path.lexists(path):
         return
-    if not os.path.isdir(path):
-        raise FileProblem(f"{printable(path)}: is a file; a folder is to be written there")
     if not force:
         raise FileProblem(f"{printable(path)}: exists; give --force to replace it")
+    if not os.path.isdir(path):
+        raise FileProblem(f"{printable(path)}: is a file; a folder is to be written there")
     others = sorted(name for name in os.listdir(path) if name != BAG_FILE and not name.endswith(BAG_DATA))
     if others:
         raise FileProblem(f"{printable(path)}: holds more than a bag ({shown(others[0])}); it is not replaced")

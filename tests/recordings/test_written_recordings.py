@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -300,20 +298,6 @@ def test_without_the_extra_it_is_named(run: Run, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "rosbags", None)
     done = run("convert", "-i", "w.tum", "--quiet", "-o", "w.mcap", files={"w.tum": as_tum(*rows(2))})
     assert (done.status, done.err) == (5, "frametool: recordings are written with an extra; install it: pip install 'frametool[bag]'\n")
-
-
-@pytest.mark.parametrize("form", [*FORMS, "csv"])
-@pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="files without a name are Linux's")
-def test_what_is_killed_while_it_writes_leaves_nothing(tmp_path: Path, form: str) -> None:
-    row = as_tum([10**9], [[1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]]).encode()
-    command = [sys.executable, "-m", "frametool", "convert", "-f", form, "-o", "out", "--quiet"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, cwd=tmp_path) as process:
-        assert process.stdin is not None
-        process.stdin.write(row * 100_000)
-        process.stdin.flush()
-        time.sleep(0.5)
-        process.send_signal(signal.SIGKILL)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a limit of the size of files is one of POSIX")
