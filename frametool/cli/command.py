@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.sink import checked_by, show
-from frametool.cli.stderr import say
 from frametool.errors import FormatError, ValueInvalid
 
 if TYPE_CHECKING:
@@ -39,7 +38,6 @@ OF_MESSAGES = ("quiet", "verbose")
 class Inputs:
     """The arguments and options of a command, by the names of its parameters; to read one is to ask for it.
 
-    formats_read: the formats of what was read, each with the options that say what it leaves open
     reads_trees: whether files of frames are opened: --in is then about these too
     earth: what the options say of places on the Earth, made when first needed
     """
@@ -48,7 +46,6 @@ class Inputs:
         """Keep the values; idle: the options that were passed, each as it is called."""
         self._values = {**values}
         self._idle = {} if idle is None else idle
-        self.formats_read: tuple[tuple[str, tuple[str, ...]], ...] = ()
         self.reads_trees = False
         self.earth: Earth | None = None
 
@@ -382,15 +379,14 @@ class Command(WithHelp):
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
         if "inv" in args:
             args = _joined(args, ctx, always=self.name in OF_POSES)
-        for name in {*OPTIONAL}.intersection(args):
-            args = _with_value(args, name, *OPTIONAL[name])
+        args = [f"{each}={OPTIONAL[each][0]}" if each in OPTIONAL else each for each in args]
         rest = super().parse_args(ctx, args)
         if not ctx.resilient_parsing:
             _check_together(ctx, ctx.meta[PASSED])
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command on its inputs, then report if --camera-axes was of no use: only a result shows that."""
+        """Run the command on its inputs, each of which must have been asked for when something is written."""
         idle = {each.name: each.opts[-1] for each in ctx.meta[PASSED] if each.name not in OF_MESSAGES}
         passed = ctx.meta[INPUTS] = Inputs(ctx.params, idle)
         try:
@@ -400,7 +396,6 @@ class Command(WithHelp):
             error.message = _without_others(error.message, self)
             raise
         passed.refuse_idle()
-        _say_not_needed(passed)
         return result
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -416,7 +411,7 @@ def _without_others(message: str, command: click.Command) -> str:
     return message if found is None or found[1] in has else message[: found.start()]
 
 
-# options that may be without a value, and their values: the first is what they mean then
+# options that may be without =VALUE, and their values: the first is what they mean then
 OPTIONAL = {"--explain": ("text", "markdown"), "--rows": ("ate", "rpe", "kitti")}
 
 
@@ -435,25 +430,3 @@ def _joined(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
         else:
             joined.append(each)
     return joined[::-1]
-
-
-def _with_value(args: list[str], option: str, *values: str) -> list[str]:
-    """Join an option with the value behind it, or its usual one: click would take any argument there for its value."""
-    joined = []
-    for before, each, behind in zip(["", *args], args, [*args[1:], ""], strict=False):
-        if each == option:
-            joined.append(f"{option}={behind if behind in values else values[0]}")
-        elif before != option or each not in values:
-            joined.append(each)
-    return joined
-
-
-def _say_not_needed(passed: Inputs) -> None:
-    """Report on stderr which options change nothing, where only what was read or is written shows whether they do."""
-    for ask, chosen in (("frames", passed.named_frames), ("camera_axes", passed.camera_axes)):
-        if chosen and not passed.quiet and not any(ask in asks for _, asks in passed.formats_read):
-            read = " and ".join(dict.fromkeys(fmt for fmt, _ in passed.formats_read if fmt))
-            why = f": {read} specifies its {'own frames' if ask == 'frames' else 'camera axes'}" if read else " here"
-            say(f"note: --{ask.replace('_', '-')} has no effect{why}")
-
-

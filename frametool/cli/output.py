@@ -102,12 +102,11 @@ class Output:
         self.style.axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style.in_camera = operation is not None and operation.looks_back
         row = table.FORMATS.get(self.style.format)
-        if stated and self.style.axes and row and row.poses.axes:
-            self._inputs.formats_read = (*self._inputs.formats_read, ("", ("camera_axes",)))
+        if self.style.axes and row and row.poses.axes:
+            self._inputs.ask("camera_axes")
 
     def take_axes_in(self, tree: Frames, source: str) -> None:
         """Keep the axes of a frame of a tree: where none is known to be a camera, --camera-axes is about this one."""
-        self._inputs.ask("camera_axes")
         if source in tree.camera_axes or not tree.camera_axes:
             self.take_axes(tree.camera_axes.get(source, ""))
 

@@ -26,7 +26,6 @@ def recorded(chosen: Inputs, fmt: str, output: str | None) -> RecordingStyle:
     if frames and (len(frames) != len(("WORLD", "BODY")) or not all(frames)):
         raise UsageError(f"--frames takes WORLD,BODY; found {shown(names)}")
     refuse(len({*frames}) < len(frames), f"--frames {names}: no frame is its own parent; give two names")
-    chosen.formats_read = (*chosen.formats_read, *[("", ("frames",))] * bool(chosen.named_frames))
     return RecordingStyle(tuple(chosen.messages), chosen.topic_out or "", frames, folder_of(place))
 
 

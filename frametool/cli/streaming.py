@@ -216,7 +216,7 @@ class Stream:
         if fmt == "kitti" and self.notation and not self.chosen_format():
             fmt = "columns"  # --from says what the numbers are, and nothing of pictures
         if request.poses:
-            self.inputs.ask("camera_axes", *FORMATS[fmt].required_options)
+            self.inputs.ask(*FORMATS[fmt].required_options)
         if output.chosen is None and (output.path or "").endswith(".bin") and not fmt.endswith("-bin"):
             raise click.UsageError(f"-o {output.path} does not name its format; give -f kitti-bin or nuscenes-bin")
         refuse(tables_only and fmt in RECORDS, f"frames are looked up for the rows of a table, not of {fmt}")
@@ -233,8 +233,6 @@ class Stream:
         if fmt in RECORDS and (output.chosen or fmt) != fmt and request.gathered is None:
             return self._run_as_values(stream, fmt, request, output)
         way = self._way(fmt, request, output)
-        asked = tuple(ask for ask in FORMATS[fmt].required_options if way != self._as_text or ask == "camera_axes")
-        self.inputs.formats_read = (*self.inputs.formats_read, (fmt, asked))
         outcomes, about = way(stream, fmt, request, output)
         bad = self.policy(self.name, "row" if holds_arrays(fmt) else "line")
         outcomes = outcomes if request.gathered is None else request.gathered.placing(outcomes, bad.place)

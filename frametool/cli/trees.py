@@ -33,9 +33,10 @@ if TYPE_CHECKING:
 
     Value = TypeVar("Value")
 
-# field of Answers -> the parameters that say it; what moves is asked whether --time-offset counts
-ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name != "time_offset"}
-ANSWERED |= {"frames": ("named_frames",), "order": ("order", "from_rep")}
+# field of Answers -> the parameters that say it; of the others the formats say whether they count, and what moves
+ASKED_OUTSIDE = ("time_offset", "frames", "camera_axes")
+ANSWERED: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in ASKED_OUTSIDE}
+ANSWERED["order"] = "order", "from_rep"
 OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topics", "quiet", "verbose")
 
 
@@ -125,15 +126,14 @@ def _read_once(arguments: Sequence[str], options: str, read: Callable[[], Value]
     passed = inputs()
     passed.reads_trees = True
     named = [each if is_inline(each) else tree_file(each) for each in arguments]
-    before, idle = passed.formats_read, passed.idle()
+    idle = passed.idle()
 
-    def read_all() -> tuple[Value, Any, Any]:
-        return read(), passed.formats_read[len(before) :], idle - passed.idle()
+    def read_all() -> tuple[Value, set[str]]:
+        return read(), idle - passed.idle()
 
     key = tuple(named), f"{options} {[passed.peek(name) for name in OF_FILES]}"
     files = [each for each in named if not is_inline(each) and os.path.exists(each)]
-    value, formats, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
-    passed.formats_read = (*before, *formats)
+    value, asked = cache.read(key, files, sum(map(len, {*named} - {*files})), read_all)
     passed.ask(*asked)
     return value
 
@@ -199,9 +199,8 @@ def opened(
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
-        if file not in lacking and lacking and not chosen.quiet:
-            say(f"note: --frames {','.join(names)} has no effect: {file.name} names its own frames")
-    chosen.formats_read = (*chosen.formats_read, *((file.format, file.required_options) for file in found))
+    left_open = {option for file in found for option in file.required_options}
+    chosen.ask(*["named_frames"] * bool(lacking), *{"camera_axes"} & left_open)
     return found
 
 

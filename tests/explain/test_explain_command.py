@@ -18,7 +18,7 @@ CONVERT = ["convert", "--from", "rpy_deg", "10", "20", "30"]
 POSE = "{xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}"
 
 
-@pytest.mark.parametrize("spelling", [["--explain"], ["--explain=text"], ["--explain", "text"]])
+@pytest.mark.parametrize("spelling", [["--explain"], ["--explain=text"]])
 def test_the_option_may_stand_anywhere_with_and_without_its_form(spelling: list[str], run: Callable[..., Outcome]) -> None:
     outcomes = {run("invert", POSE, *spelling).out, run("invert", *spelling, POSE).out}
     assert len(outcomes) == 1
@@ -29,7 +29,7 @@ def test_the_option_may_stand_anywhere_with_and_without_its_form(spelling: list[
 def test_the_form_follows_the_equals_sign(form: str, begins: str, run: Callable[..., Outcome]) -> None:
     outcome = run("invert", POSE, f"--explain={form}", "-o", "sheet.out")
     assert (outcome.status, outcome.out) == (0, "")
-    assert run("invert", POSE, "--explain", form).out.startswith(begins)
+    assert run("invert", POSE, f"--explain={form}").out.startswith(begins)
     assert run("invert", POSE, f"--explain={form}", "-o", "sheet.out").status == 5
     assert run("invert", POSE, f"--explain={form}", "-o", "sheet.out", "--force").status == 0
 

@@ -192,14 +192,11 @@ def answered(call: Callable[[], object], arguments: Sequence[str]) -> int:
 
 def _usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     """Put a usage error on one line that ends in where help is; what it quotes of the arguments is cut."""
-    from frametool.cli.replaced import replacement
-
     ctx = getattr(error, "ctx", None)
     message = error.format_message().replace("\n", " ").rstrip(".")
     if isinstance(error, click.NoSuchOption):  # each version of click has its own words
         name, near = error.option_name, error.possibilities or ()
         message = f"no such option {shown(name)}{did_you_mean(name, near)}"
-    message = replacement(arguments) or message
     for text in (part for each in arguments for part in (each, *each.split("=", 1)) if len(repr(part)) > SHOWN):
         message = message.replace(repr(text), shown(text)).replace(text, shown(text)[1:-1])
     if message[1:2].islower():

@@ -174,7 +174,6 @@ class CameraTask:
                 camera = camera.changed(axes=self._axes_in(tree))  # those of a file are of its own frame
         if inputs.camera_axes:
             camera = camera.changed(axes=inputs.camera_axes)
-            inputs.formats_read = (*inputs.formats_read, ("", ("camera_axes",)))
         return camera
 
     def _axes_in(self, tree: FrameTree | TransformBuffer | None) -> str:
