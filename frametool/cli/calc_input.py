@@ -17,7 +17,6 @@ import click
 from frametool.calc.api import line_of_value, machine_table, machine_text, plain_result
 from frametool.calc.evaluate import Scope, evaluate_line, read_line
 from frametool.calc.functions import BETWEEN_WORDS, Completer
-from frametool.calc.parser import LONGEST, CalcError
 from frametool.calc.rules import wanted
 from frametool.calc.values import LIST, POINT, POSE, TREE, VECTOR, Term, Type
 from frametool.cli.command import Text, refuse
@@ -27,10 +26,10 @@ from frametool.cli.sink import writing
 from frametool.cli.stderr import say_error, tell
 from frametool.cli.trees import load_tree
 from frametool.documents.source import HEAD, decode, opened
-from frametool.errors import FormatError, FrametoolError, heard_by
+from frametool.errors import FrametoolError, heard_by
 from frametool.formats.table import FORMATS
 from frametool.grammar.result import Result, Style
-from frametool.stream.faults import ROWS_SKIPPED, STOP, RowsSkipped
+from frametool.stream.faults import STOP, Fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -147,7 +146,8 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
     def values() -> Iterator[Term]:
         nonlocal count
         last: Term | None = None
-        for number, text in enumerate(_piped_lines(), 1):
+        for number, data in enumerate(iter(sys.stdin.buffer.readline, b"") if sys.stdin else (), 1):
+            text = decode(data, "stdin").rstrip("\r\n")
             if not text.strip() or text.lstrip().startswith("#"):
                 continue
             count += 1
@@ -158,10 +158,7 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
             except FrametoolError as error:
                 if bad.on_error == STOP:
                     raise
-                bad.count += 1
-                if bad.count <= bad.most:
-                    snippet = getattr(error, "snippet", "")
-                    bad.tell(FormatError(f"{error} (line skipped)", source="stdin", line=number, snippet=snippet))
+                bad.take([Fault.of(number, "", error)])
                 continue
             if line.name:
                 last = term
@@ -171,39 +168,21 @@ def calculate_lines(stream: Stream, output: Output, scope: Scope) -> int:
             yield last
 
     output.pieces(value_texts(values(), output.style))
-    if not bad.count:
-        return 0
-    message = f"stdin: {bad.count} of {count} lines skipped"
-    bad.tell(RowsSkipped(message, source="stdin", bad=bad.count, rows=count))
-    return ROWS_SKIPPED
+    return bad.finish(count)
 
 
-def _piped_lines() -> Iterator[str]:
-    """Yield the lines of standard input; of one that is too long only the size is read."""
-    longest = 4 * LONGEST
-    while sys.stdin is not None and (line := sys.stdin.buffer.readline(longest + 2)):
-        if len(line) > longest and not line.endswith(b"\n"):
-            size = len(line)
-            while not line.endswith(b"\n") and (line := sys.stdin.buffer.readline(1 << 16)):
-                size += len(line)
-            raise CalcError(f"a line of {size} bytes; an expression has at most {LONGEST} characters")
-        yield decode(line, "stdin").rstrip("\r\n")
-
-
-PROMPT = "> "
 LONGEST_HISTORY = 1000  # lines
-ENDS = ("exit", "quit")
 
 
 def talk(scope: Scope, output: Output) -> int:
     """Answer lines until Ctrl-D; errors go on, Ctrl-C forgets the line."""
     refuse(output.path is not None, "-o FILE is for expressions that are given or piped, not for the prompt")
-    prompt = PROMPT if sys.stdout.isatty() else ""
+    prompt = "> " if sys.stdout.isatty() else ""
     with _readline(scope):
         while True:
             try:
                 line = input(prompt)
-                if line.strip() in ENDS:
+                if line.strip() in ("exit", "quit"):
                     return 0
                 if line.strip():
                     _answer(line, scope, output)

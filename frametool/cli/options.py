@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, together
-from frametool.cli.stderr import as_json, say, say_error, tell
+from frametool.cli.stderr import say, say_error
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, heard_by, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
 from frametool.geometry.euler import AXES
 from frametool.geometry.representations import NAMED_AXES, REPRESENTATIONS, WORLDS, notations
+from frametool.stream.faults import RowsSkipped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -328,13 +329,7 @@ def pose_result_options(*what: str) -> Adds:
 # --- times ---------------------------------------------------------------------------------------------------------
 
 LATEST = "latest"
-MOST_TOLD = 10  # times without a result
-
-
-class TimesSkipped(FrametoolError):
-    """Report how many of the times asked for have no result."""
-
-    exit_code = 3
+MOST_REPORTED = 10  # times without a result
 
 
 class Skipped:
@@ -345,15 +340,10 @@ class Skipped:
         self.in_json, self.count, self.found = in_json, 0, 0
         self.errors: list[FrametoolError] = []
 
-    @property
-    def is_full(self) -> bool:
-        """Return whether further errors are only counted."""
-        return len(self.errors) >= MOST_TOLD
-
     def add(self, error: FrametoolError | None, count: int = 1) -> None:
         """Count one time, or several in a row; keep why they are left out if that will be reported."""
         self.count += count
-        if error is not None and not self.is_full:
+        if error is not None and len(self.errors) < MOST_REPORTED:
             self.errors.append(error)
 
     def counted(self, results: Iterator[Result]) -> Iterator[Result]:
@@ -367,9 +357,9 @@ class Skipped:
         if not self.count:
             return 0
         for error in self.errors:
-            tell(as_json(error) if self.in_json else f"frametool: {error} (skipped)")
+            say_error(error, in_json=self.in_json, fate="skipped")
         asked = self.found + self.count
-        total = TimesSkipped(f"{self.count} of {asked} times skipped", skipped=self.count, asked=asked)
+        total = RowsSkipped(f"{self.count} of {asked} times skipped", bad=self.count, rows=asked)
         say_error(total, in_json=self.in_json)
         return total.exit_code
 

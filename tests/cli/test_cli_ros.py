@@ -100,7 +100,7 @@ def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
     assert found.status == 3
     assert len(found.out.splitlines()) == 2
     told = [json.loads(line) for line in found.err.splitlines()]
-    assert [each["error"] for each in told] == ["too_early", "times_skipped"]
+    assert [each["error"] for each in told] == ["too_early", "rows_skipped"]
     assert (told[-1]["skipped"], told[-1]["asked"]) == (2, 4)
 
 

@@ -122,7 +122,7 @@ def test_times_without_data_can_be_skipped(ask: Run) -> None:
     assert (outcome.status, len(outcome.out.splitlines())) == (3, 2)
     told = [json.loads(line) for line in outcome.err.splitlines()]
     assert [each.get("at_ns") for each in told] == [3 * 10**9, 4 * 10**9, None]
-    assert (told[-1]["skipped"], told[-1]["asked"]) == (2, 4)
+    assert (told[-1]["bad"], told[-1]["rows"]) == (2, 4)
 
 
 def test_skipped_times_are_told_in_words_beside_other_forms(ask: Run) -> None:

@@ -5,12 +5,11 @@ NAME = COMMAND keeps the result, as JSON text, instead of printing it; $NAME is 
 
 from __future__ import annotations
 
-import json
-import os
 import re
 import sys
 from functools import partial
 from io import BytesIO, TextIOBase, TextIOWrapper
+from itertools import chain
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import click
@@ -19,23 +18,15 @@ from frametool.cli.command import FILE, Inputs, argument, command_named, option
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.embedded import streams, writer
 from frametool.cli.stderr import TROUBLES, BatchLine, say, say_error, telling_of, wants_json, words_of
-from frametool.documents.source import MOST_CHARACTERS, UTF16, ReadCache, decode, opened
-from frametool.errors import FileProblem, FormatError, FrametoolError, Misused, ValueInvalid, alternatives
-from frametool.grammar.rotation_spelling import ROTATION_KEYS
-from frametool.ros.messages import LISTS
+from frametool.documents.source import ReadCache, opened
+from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
-from frametool.stream.record import POINT_KEYS
-from frametool.stream.row_layout import PARTS
 from frametool.text.shell_words import NAME, goes_on, has_words, split
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
 EXIT_CODES = "Exit codes: 0 done, 3 lines or rows skipped, else that of the line that failed."
-
-
-
-MOST_JOINED = 1000  # lines of one command
 _ASSIGNMENT = re.compile(rf"[ \t]*({NAME})[ \t]*=[ \t]*")
 
 
@@ -45,57 +36,30 @@ class CommandLine(NamedTuple):
     number: of its first line
     name: what its result is kept as; "" if it is printed
     text: the command itself
-    problem: why it cannot be taken
     """
 
     number: int
     name: str
     text: str
-    problem: str
 
 
-def command_lines(stream: BinaryIO, source: str) -> Iterator[CommandLine]:
-    """Yield the commands of a batch, each as soon as its last line is there.
-
-    Raises FormatError for what is no text of lines at all.
-    """
-    lines = _lines(stream, source)
-    for number, begin, wrong in lines:
-        text, problem, joined = begin, wrong, 1
-        while goes_on(_parted(text)[1]) and not problem:  # a backslash joins the next line to this one
-            _, more, problem = next(lines, (0, "", ""))
-            text = text[:-1] + more
-            joined += 1
-            if joined > MOST_JOINED:
-                raise FormatError(f"a command of more than {MOST_JOINED} lines", source=source, line=number)
-        name, text = _parted(text)
-        if name and not has_words(text):
-            problem = problem or f"no command behind {name} ="
-        if problem or has_words(text):
-            yield CommandLine(number, name, text, problem)
+def command_lines(stream: BinaryIO) -> Iterator[CommandLine]:
+    """Yield the commands of a batch, each as soon as its last line is there; a backslash joins the next line to one."""
+    begin, text = 0, ""
+    for number, data in enumerate(chain(iter(stream.readline, b""), [b""]), 1):
+        begin = begin or number
+        text += data.decode("utf-8-sig", "surrogateescape").rstrip("\r\n")
+        found = _ASSIGNMENT.match(text)
+        name, command = (found[1], text[found.end() :]) if found else ("", text)
+        if goes_on(command):
+            text = text[:-1]
+            continue
+        if name or has_words(command):
+            yield CommandLine(begin, name, command)
+        begin, text = 0, ""
 
 
-def _parted(text: str) -> tuple[str, str]:
-    """Return the name before `=`, if there is one, and the command behind it."""
-    found = _ASSIGNMENT.match(text)
-    return ("", text) if found is None else (found[1], text[found.end() :])
-
-
-def _lines(stream: BinaryIO, source: str) -> Iterator[tuple[int, str, str]]:
-    """Yield the number of each line, its text without its end, and what is wrong with its bytes."""
-    for number, data in enumerate(iter(lambda: stream.readline(MOST_CHARACTERS + 1), b""), 1):
-        if number == 1 and data.startswith(UTF16):
-            raise FormatError("UTF-16; lines are read as UTF-8: iconv -f UTF-16 -t UTF-8", source=source)
-        if len(data) > MOST_CHARACTERS:
-            raise FormatError(f"a line of more than {MOST_CHARACTERS} bytes", source=source, line=number)
-        try:
-            yield number, decode(data, source).rstrip("\r\n"), ""
-        except FormatError as error:
-            yield number, "", error.message
-
-
-KEPT = {"frames", *LISTS, *POINT_KEYS, *ROTATION_KEYS, *PARTS, "x", "y", "z"}  # keys of trees, and of records
-READABLE = ("json", "yaml")  # the same numbers; other formats are for printing
+READABLE = (None, "json", "yaml")  # the same numbers; other formats are for printing
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
 
@@ -114,23 +78,12 @@ class KeptResults:
         if name in self._failed:
             raise Misused(f"${name} has no value: line {self._failed[name]}, which sets it, has failed")
         known = alternatives(name, self._texts, "names") if self._texts else "; no line before has kept a result"
-        shells = "variables of the shell are not known here" if name in os.environ else "a dollar sign is $$"
-        raise Misused(f"unknown name ${name}{known}; {shells}")
+        raise Misused(f"unknown name ${name}{known}; a dollar sign is $$")
 
     def keep(self, name: str, text: str) -> None:
-        """Keep a result that was printed as JSON; raise ValueInvalid for what no name can keep."""
-        if len(text) > MOST_CHARACTERS:
-            raise ValueInvalid(f"a result of more than {MOST_CHARACTERS} bytes; {KEPT_ARE}")
-        lines = text.count("\n")
-        if lines != 1:
+        """Keep a result that was printed as JSON; raise ValueInvalid for none or several."""
+        if (lines := text.count("\n")) != 1:
             raise ValueInvalid(f"{name}: the command has {lines or 'no'} result{'s' * (lines != 1)}; {KEPT_ARE}")
-        try:
-            value = json.loads(text)
-        except ValueError:
-            raise ValueInvalid(f"{name}: the result is text; {KEPT_ARE}") from None
-        keys = set(value) if isinstance(value, dict) else set()
-        if not (isinstance(value, float | int) or keys & KEPT):
-            raise ValueInvalid(f"{name}: the result is a report; {KEPT_ARE}")
         self._texts[name] = text.strip()
         self._failed.pop(name, None)
 
@@ -146,15 +99,16 @@ def print_as_json(name: str, context: click.Context) -> None:
     if "json" not in getattr(formats, "choices", ()):
         raise Misused(f"{name}: {context.info_name} has no result that can be kept; {KEPT_ARE}")
     params = context.params
-    if other := ("-o FILE" if params.get("output") else "--explain" if params.get("explain") else ""):
-        raise Misused(f"{name}: a result is kept or written, not both; leave {other} or {name} = out")
-    if params["format_name"] not in (None, *READABLE):
-        raise Misused(f"{name}: -f {params['format_name']} is for printing, and {name} is kept; leave it out")
+    if params.get("output") or params.get("explain") or params["format_name"] not in READABLE:
+        raise Misused(f"{name}: a result is kept, or written by -f, -o or --explain; leave these or {name} = out")
     params["format_name"] = "json"
 
 
 FINISHED = (0, ROWS_SKIPPED)  # a command that skipped rows, as --on-error says, has come to its end
-ENDLESS = ("--realtime", "--live", "teleop", "--duration=inf")
+REFUSED = {
+    "batch": "a batch runs no batch; put the lines of that one here",
+    "frametool": "omit the word `frametool`: a line begins with the command",
+}
 NO_INPUT = "standard input is not for the lines of a batch; name a file, or keep a result by NAME = and give $NAME"
 
 
@@ -182,7 +136,7 @@ class CommandBatch:
         """Run the commands of a stream as they come and return the exit status of all."""
         piped = _Pipe(sys.stdout.buffer, "utf-8", newline="\n") if sys.stdout.isatty() else sys.stdout
         with streams(_NoInput(), piped):  # standard input has the lines of the batch
-            for line in command_lines(stream, self.source):
+            for line in command_lines(stream):
                 self.count += 1
                 status = self._run_line(line)
                 if status in FINISHED:
@@ -204,9 +158,11 @@ class CommandBatch:
         problem: FrametoolError
         with telling_of(BatchLine(self.source, line.number)):
             try:
-                if line.problem:
-                    raise Misused(line.problem)
+                if "\0" in line.text:
+                    raise Misused("not UTF-8 text, but UTF-16 or no text: it holds a NUL byte")
                 words = split(line.text, self.results.value_of)
+                if not words:
+                    raise Misused(f"no command behind {line.name} =")
                 status = self._called(words, line.name)
                 if status in FINISHED:
                     return status
@@ -225,7 +181,8 @@ class CommandBatch:
 
     def _called(self, words: list[str], name: str) -> int:
         """Call a command; with a name keep what it prints."""
-        _refuse(words)
+        if words[0] in REFUSED:
+            raise Misused(REFUSED[words[0]])
         self.context.meta.clear()
         if not name:
             is_own = words[0].startswith("-")  # an option of frametool itself
@@ -236,17 +193,6 @@ class CommandBatch:
         if status in FINISHED:
             self.results.keep(name, held.getvalue().decode())
         return status
-
-
-def _refuse(words: Sequence[str]) -> None:
-    """Raise Misused for a command that has no place in a batch."""
-    if words[0] == "batch":
-        raise Misused("a batch runs no batch; put the lines of that one here")
-    if words[0] == "frametool":
-        raise Misused("omit the word `frametool`: a line begins with the command")
-    endless = next((each for each in words if each in ENDLESS), "")
-    if words[0] == "sim" and (endless or "--duration inf" in " ".join(words)):
-        raise Misused(f"sim {endless or '--duration inf'} keeps the lines behind it waiting; run it alone")
 
 
 class _Pipe(TextIOWrapper):
@@ -290,14 +236,10 @@ def command(inputs: Inputs) -> int:
     comment, and a backslash at its end joins a line with the next. Pipes, > and < are not available.
 
     A line that fails is reported with its number: commands.txt:12: .. The exit code is that of the failed line, or 3 if
-    lines were skipped. Lines cannot read standard input: name files. A line cannot be another batch, nor run in real
-    time or without end, like sim --realtime.
+    lines were skipped. Lines cannot read standard input: name files. A line cannot be another batch.
     """
-    file, skips = inputs.file, inputs.on_failure == SKIP
-    stream = opened(file)
-    if file != "-":
-        with stream:
-            return CommandBatch(file, skips=skips).run(stream)
+    stream = opened(inputs.file)
     if stream.isatty():
         say("reading from the terminal; end with Ctrl-D")
-    return CommandBatch("stdin", skips=skips).run(stream)
+    with stream:
+        return CommandBatch("stdin" if inputs.file == "-" else inputs.file, skips=inputs.on_failure == SKIP).run(stream)

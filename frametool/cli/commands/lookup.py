@@ -125,7 +125,8 @@ def _many(task: PoseTask, lookups: Lookups, target: str, source: str, window: tu
             raise NoDataAt(f"no sample of {target} -> {source} from --start to --stop")
 
     def miss(at_ns: int) -> None:
-        skipped.add(None if skipped.is_full else why_missing(tree, target, source, at_ns))
+        is_full = len(skipped.errors) == options.MOST_REPORTED  # to say why takes longest
+        skipped.add(None if is_full else why_missing(tree, target, source, at_ns))
 
     found = looked_up_many(tree, target, source, asked, miss=miss if skip else None, covariance=lookups.carried)
     task.output.poses_as_they_come(skipped.counted(map(lookups.noted, found)))
