@@ -7,6 +7,7 @@ usage error, and nothing is written.
 from __future__ import annotations
 
 import re
+import sys
 from contextlib import contextmanager
 from functools import reduce
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from frametool.cli.sink import checked_by, show
+from frametool.cli.stderr import say
 from frametool.errors import FormatError, ValueInvalid
 
 if TYPE_CHECKING:
@@ -116,6 +118,17 @@ def refuse(holds: object, message: str) -> None:
     """Raise a usage error where something holds of what was asked for."""
     if holds:
         raise click.UsageError(message)
+
+
+def refuse_two_readers(arguments: Iterable[str]) -> None:
+    """Raise a usage error where two arguments are standard input."""
+    refuse([*arguments].count("-") > 1, "standard input can be read once; only one argument may be -")
+
+
+def say_if_typed(argument: str = "-") -> None:
+    """Say that a terminal is read where an argument is standard input."""
+    if argument == "-" and sys.stdin is not None and sys.stdin.isatty():
+        say("reading from the terminal; end with Ctrl-D")
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, option, refuse, together
+from frametool.cli.command import Inputs, option, refuse, refuse_two_readers, together
 from frametool.cli.command import inputs as running
 from frametool.cli.stderr import say_error
 from frametool.cli.trees import answers
@@ -132,7 +132,7 @@ def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Com
     """Compare estimates with a reference as the options say, with warnings. Also: whether rows were skipped."""
     from frametool.fit.comparison import compare
 
-    refuse([ref, *ests].count("-") > 1, "standard input can be read once; only one trajectory may be -")
+    refuse_two_readers([ref, *ests])
     on_error, formats, chosen = inputs.on_error, formats_of(1 + len(ests)), _settings(inputs)
     reference, ref_name, skipped = trajectory(ref, on_error, formats[0])
     found = []

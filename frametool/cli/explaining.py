@@ -98,7 +98,7 @@ class PoseTask:
         """
         if isinstance(argument, str):
             bare, is_inverse = without_inverse(argument)
-            if self.stream.is_wanted(bare) or self.has_table(bare):
+            if bare == "-" or self.has_table(bare):
                 return self.stream.run(request.of_inverses() if is_inverse else request, self.output)
         self.only_arguments([argument])
         values = values_of([argument], request, self.output)

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, together
+from frametool.cli.command import Inputs, Text, inputs, misuse, option, refuse, say_if_typed, together
 from frametool.cli.stderr import say, say_error
 from frametool.errors import FormatError, FrametoolError, ValueInvalid, did_you_mean, heard_by, shown
 from frametool.formats.table import CAMERA_AXES, DH, DIRECTIONS, FORMATS, ORDERS, readers, writers
@@ -458,6 +457,5 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
             return parse_times(text)
     from frametool.stream.trajectories import read_stamps
 
-    if text == "-" and sys.stdin is not None and sys.stdin.isatty():
-        raise click.UsageError("standard input is a terminal; pipe something in")
+    say_if_typed(text)
     return read_stamps(text, report)

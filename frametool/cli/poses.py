@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from contextlib import contextmanager
-from functools import lru_cache, partial
+from functools import partial
 from io import BufferedReader, BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from frametool.cli.command import misuse, refuse
+from frametool.cli.command import misuse, refuse, refuse_two_readers, say_if_typed
 from frametool.documents.source import Source, decode, read_text
 from frametool.errors import FormatError, Misused, ValueInvalid, heard_by, shown, warn
 from frametool.grammar.pose import Pose, pose_of_numbers
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from frametool.stream.request import Request
 
 INLINE = "argument"
-LONGEST_REMEMBERED = 4096  # characters
 # the grammar's own, or a header; compiled when first needed
 _PLAIN = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)(?:\{\s*["}\w][^,{]*:|[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$))"""
 _COMMAS = r"\s*[-+]?[.\d][-+.\deE]*(?:[ \t]*,[ \t]*[-+]?[.\d][-+.\deE]*)+[ \t\r]*(?:\n|\Z)"
@@ -64,20 +62,12 @@ def rewritten(
     source: Source, notation: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
     """Return a text that was pasted as one of the grammar; None for one that is."""
-    is_short = source.name == INLINE and len(source.text) <= LONGEST_REMEMBERED
-    return (_rewritten_argument if is_short else _rewritten)(source, notation, normalize=normalize, points=points)
-
-
-def _rewritten(source: Source, notation: Notation | None, *, normalize: bool, points: bool) -> Source | None:
     if re.match(_PLAIN, source.text) and "\n" not in source.text.strip():
         return None
     from frametool.ros.pasted_blocks import in_grammar
 
     with inline_misuse():
         return in_grammar(source, notation, normalize=normalize, points=points)
-
-
-_rewritten_argument = lru_cache(8)(_rewritten)  # an argument is looked at before it is read
 
 
 def rejoined(values: Sequence[str]) -> tuple[str, ...]:
@@ -183,8 +173,7 @@ def source_of(argument: str | Source) -> Source:
             from frametool.formats.detect import instead_of_text
 
             raise instead_of_text(error, argument) from None
-    if sys.stdin is not None and sys.stdin.isatty():
-        raise click.UsageError("standard input is a terminal; pipe something in, or give values")
+    say_if_typed()
     return Source("stdin", read_text("-"))
 
 
@@ -317,7 +306,7 @@ class Rows(NamedTuple):
 def rows_among(arguments: Sequence[str], request: Request, has_table: Callable[[str], bool]) -> Rows:
     """Choose them: standard input, a table, what holds several poses, or the last that says more than a pose."""
     bare = [without_inverse(each)[0] for each in arguments]
-    refuse(bare.count("-") > 1, "standard input can be read once; only one argument may be -")
+    refuse_two_readers(bare)
     streams = [at for at, each in enumerate(bare) if each == "-" or has_table(each)]
     if len(streams) > 1:
         files = " and ".join(bare[at] for at in streams)

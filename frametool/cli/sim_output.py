@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from frametool.cli.command import Inputs, option, refuse, together
+from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
 from frametool.cli.options import FULL, PRECISION, file_with, suffix_of
 from frametool.cli.signals import clean_up
 from frametool.cli.sink import is_special, refuse_existing, writing
@@ -226,7 +226,7 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
     """Read commands as they come: by their times, or in real time whenever they arrive."""
     if sys.stdin is None:
         raise FileProblem("standard input is closed")
-    refuse(sys.stdin.isatty(), "standard input is a terminal; pipe commands in, or see frametool sim teleop")
+    say_if_typed()
     if not paced:
         return scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
     mailbox = Mailbox()

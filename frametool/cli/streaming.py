@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 import sys
 from functools import partial
-from io import BufferedReader, FileIO
+from io import BufferedReader
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from frametool.cli import options
-from frametool.cli.command import Inputs, option, refuse, together
+from frametool.cli.command import Inputs, option, refuse, say_if_typed, together
 from frametool.cli.stderr import say, say_error
-from frametool.documents.source import HEAD, Source, has_line, has_record
-from frametool.errors import FileProblem, FormatError
+from frametool.documents.source import HEAD, Source, has_line, has_record, opened
+from frametool.errors import FormatError
 from frametool.formats.table import FORMATS, has_no_text, holds_arrays, is_recording, is_trajectory, readers
 from frametool.stream.faults import MOST, NULL, ON_ERROR, ROWS_SKIPPED, STOP, BadRow, BadRows
 
@@ -65,9 +65,7 @@ class Stream:
         self.inputs = inputs
         path = inputs.peek("input_path")
         self.paths: Sequence[str] = path if isinstance(path, tuple) else () if path is None else (path,)
-        self.path: str | None = self.paths[0] if self.paths else None
-        if self.path == "-":
-            self.path = None
+        self.path: str | None = self.paths[0] if self.paths and self.paths[0] != "-" else None
         self._opened: BufferedReader | None = None
         self.within = ""  # the format of the records in a bag
         notations: Any = inputs.peek("from_rep") or (None,)
@@ -81,7 +79,9 @@ class Stream:
         """Open the input once: of a pipe, what a first reader has taken is gone for a second; raises FileProblem."""
         if self._opened is None:
             self.inputs.ask("input_path")
-            self._opened = self.messages() or _opened(self.path)
+            name = "-" if self.path is None else self.path
+            say_if_typed(name)
+            self._opened = self.messages() or opened(name)
             if not self._opened.seekable():
                 from frametool.text.lines import arrived
 
@@ -147,12 +147,6 @@ class Stream:
         if sys.stdin is None or sys.stdin.isatty() or not sys.stdin.readable():
             return False
         return bool(self.opened().peek(1))
-
-    def is_wanted(self, argument: object) -> bool:
-        """Return True if standard input or -i FILE is to be read in this argument's place."""
-        if self.path is not None and argument not in (None, "-"):
-            raise click.UsageError(f"-i FILE and {argument} are two inputs; give one")
-        return self.path is not None or argument in (None, "-")
 
     def takes_rows(self, path: str) -> bool:
         """Stream a file that an argument names if it is a table; one of records, or none known, is not touched.
@@ -411,21 +405,6 @@ def _signed(begin: bytes, name: str) -> str:
 
     fmt = by_sign(begin, *options.STREAMED, name=name) or ""
     return "" if fmt == "kitti" else fmt
-
-
-def _opened(path: str | None) -> BufferedReader:
-    """Open the input; raises FileProblem."""
-    if path is None:
-        if sys.stdin is None:
-            raise FileProblem("standard input is closed")
-        if sys.stdin.isatty():
-            say("reading from the terminal; end with Ctrl-D")
-        stream = sys.stdin.buffer
-        return stream if isinstance(stream, BufferedReader) else BufferedReader(stream)  # type: ignore[arg-type]
-    try:
-        return BufferedReader(FileIO(path), HEAD)
-    except OSError as error:
-        raise FileProblem(f"{path or repr(path)}: {(error.strerror or str(error)).lower()}") from None
 
 
 def _format_of(path: str) -> str:

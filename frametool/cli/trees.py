@@ -6,13 +6,12 @@ What several lines of a batch read from the same files is read once for as long 
 from __future__ import annotations
 
 import os
-import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from frametool.cli.command import Text, inputs, refuse
+from frametool.cli.command import Text, inputs, refuse, refuse_two_readers, say_if_typed
 from frametool.cli.options import input_formats, tree_on_the_line
 from frametool.cli.poses import is_inline, source_of
 from frametool.cli.stderr import say
@@ -165,8 +164,7 @@ def opened(
     from frametool.formats.load import FrameFile, close_all, opened_together
 
     refuse_two_readers(arguments)
-    if "-" in arguments and sys.stdin is not None and sys.stdin.isatty():
-        raise click.UsageError("standard input is a terminal; pipe something in, or name a file")
+    say_if_typed("-" if "-" in arguments else "")
     chosen = inputs()
     chosen.reads_trees = True
     formats, named = input_formats(streams=streams)[0], [*map(_frame_names, chosen.peek("named_frames"))]
@@ -202,11 +200,6 @@ def opened(
     left_open = {option for file in found for option in file.required_options}
     chosen.ask(*["named_frames"] * bool(lacking), *{"camera_axes"} & left_open)
     return found
-
-
-def refuse_two_readers(arguments: Sequence[str]) -> None:
-    """Raise a usage error where two arguments are standard input."""
-    refuse(list(arguments).count("-") > 1, "standard input can be read once; only one argument may be -")
 
 
 def answers() -> Answers:

@@ -16,7 +16,7 @@ import time
 from bisect import bisect_right
 from contextlib import contextmanager
 from functools import cached_property
-from io import BufferedReader, BytesIO
+from io import BufferedReader, BytesIO, FileIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import LONGEST_NAME, FileProblem, FormatError, cells, shown
@@ -202,7 +202,7 @@ def _instead_of_a_file(name: str) -> str:
     return ""
 
 
-def opened(path: str | PathLike[str]) -> BinaryIO:
+def opened(path: str | PathLike[str]) -> BufferedReader:
     """Open a file, or standard input for `-`, with a buffer that allows peeking.
 
     Raises FileProblem.
@@ -212,11 +212,11 @@ def opened(path: str | PathLike[str]) -> BinaryIO:
         if sys.stdin is None:
             raise FileProblem("standard input is closed")
         stdin = sys.stdin.buffer
-        return stdin if hasattr(stdin, "peek") else BufferedReader(stdin)  # type: ignore[type-var]
+        return stdin if isinstance(stdin, BufferedReader) else BufferedReader(stdin)  # type: ignore[arg-type]
     try:
         for noted in _noted:
             noted[name] = states_of(name)
-        return open(path, "rb", buffering=HEAD)
+        return BufferedReader(FileIO(path), HEAD)
     except OSError as error:
         called = name if 0 < len(name) <= LONGEST_NAME else shown(name)
         raise FileProblem(f"{called}: {(error.strerror or str(error)).lower()}{_instead_of_a_file(name)}") from None

@@ -101,7 +101,7 @@ def test_echo_tells_of_times_without_data_and_goes_on(run: Run) -> None:
     assert len(found.out.splitlines()) == 2
     told = [json.loads(line) for line in found.err.splitlines()]
     assert [each["error"] for each in told] == ["too_early", "rows_skipped"]
-    assert (told[-1]["skipped"], told[-1]["asked"]) == (2, 4)
+    assert (told[-1]["bad"], told[-1]["rows"]) == (2, 4)
 
 
 @pytest.mark.parametrize("times", [("--start", "1800000000"), ("--stop", "0"), ("--start", "1", "--stop", "2")])

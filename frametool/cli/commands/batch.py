@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, say_if_typed
 from frametool.cli.commands import TROUBLE, answered, called, called_in, group
 from frametool.cli.embedded import streams, writer
-from frametool.cli.stderr import TROUBLES, BatchLine, say, say_error, telling_of, wants_json, words_of
+from frametool.cli.stderr import TROUBLES, BatchLine, say_error, telling_of, wants_json, words_of
 from frametool.documents.source import ReadCache, opened
 from frametool.errors import FileProblem, FrametoolError, Misused, ValueInvalid, alternatives
 from frametool.stream.faults import ROWS_SKIPPED, SKIP, STOP, RowsSkipped
@@ -238,8 +238,6 @@ def command(inputs: Inputs) -> int:
     A line that fails is reported with its number: commands.txt:12: .. The exit code is that of the failed line, or 3 if
     lines were skipped. Lines cannot read standard input: name files. A line cannot be another batch.
     """
-    stream = opened(inputs.file)
-    if stream.isatty():
-        say("reading from the terminal; end with Ctrl-D")
-    with stream:
+    say_if_typed(inputs.file)
+    with opened(inputs.file) as stream:
         return CommandBatch("stdin" if inputs.file == "-" else inputs.file, skips=inputs.on_failure == SKIP).run(stream)

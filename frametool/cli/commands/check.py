@@ -7,11 +7,11 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING
 
-from frametool.cli.command import EVERYTHING, FILE, Command, Inputs, argument, command_named, option
+from frametool.cli.command import EVERYTHING, FILE, Command, Inputs, argument, command_named, option, refuse_two_readers
 from frametool.cli.options import file_options
 from frametool.cli.sink import in_colour, writing
 from frametool.cli.stderr import folded, say
-from frametool.cli.trees import opened, refuse_two_readers, state
+from frametool.cli.trees import opened, state
 from frametool.errors import Finding, FormatError, listing, warn
 from frametool.lint.findings import RULES, WRITERS, level
 from frametool.lint.rules import check

@@ -205,8 +205,6 @@ class CameraTask:
         if self.is_stream:
             self.stream.read_clouds_as_rows()
             status = self.stream.run(request, output)
-        elif self.stream.path is not None:
-            raise click.UsageError("-i FILE and arguments are two inputs; give one")
         else:
             status = 0
             if output.style.format == "text":

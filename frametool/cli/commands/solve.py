@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse
+from frametool.cli.command import FILE, Inputs, argument, command_named, option, refuse, refuse_two_readers
 from frametool.cli.comparing import read_span
 from frametool.cli.options import ColumnNames, file_with, reading_options, result_options, suffix_of, whole_pose_options
 from frametool.cli.output import Output
 from frametool.cli.sink import refuse_existing, writing
 from frametool.cli.stderr import tell
-from frametool.cli.trees import refuse_two_readers
 from frametool.errors import ValueInvalid, shown, warn
 
 if TYPE_CHECKING:
