@@ -126,7 +126,7 @@ def refuse_two_readers(arguments: Iterable[str]) -> None:
 
 
 def say_if_typed(argument: str = "-") -> None:
-    """Say that a terminal is read where an argument is standard input."""
+    """Note that a terminal is read where an argument is standard input."""
     if argument == "-" and sys.stdin is not None and sys.stdin.isatty():
         say("reading from the terminal; end with Ctrl-D")
 
