@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from frametool.earth import lla_from_utm as lla_from_utm
     from frametool.earth import utm_from_lla as utm_from_lla
     from frametool.errors import FrametoolError as FrametoolError
+    from frametool.fit.closed_forms import solve_mean as solve_mean
+    from frametool.fit.closed_forms import solve_points as solve_points
+    from frametool.fit.hand_eye import solve_hand_eye as solve_hand_eye
     from frametool.fit.python_api import align as align
     from frametool.fit.python_api import compare as compare
     from frametool.fit.python_api import resample as resample
     from frametool.fit.python_api import solve as solve
-    from frametool.fit.python_api import solve_hand_eye as solve_hand_eye
-    from frametool.fit.python_api import solve_mean as solve_mean
-    from frametool.fit.python_api import solve_points as solve_points
     from frametool.formats.cameras import load_camera as load_camera
     from frametool.formats.load import load as load
     from frametool.formats.robots.urdf import load_robot as load_robot
@@ -89,9 +89,9 @@ _HOMES = {
     "run": "frametool.cli.embedded",
     "simulate": "frametool.sim.simulate",
     "solve": "frametool.fit.python_api",
-    "solve_hand_eye": "frametool.fit.python_api",
-    "solve_mean": "frametool.fit.python_api",
-    "solve_points": "frametool.fit.python_api",
+    "solve_hand_eye": "frametool.fit.hand_eye",
+    "solve_mean": "frametool.fit.closed_forms",
+    "solve_points": "frametool.fit.closed_forms",
     "tutorial": "frametool.sim.scene",
     "utm_from_lla": "frametool.earth",
 }

@@ -33,26 +33,21 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
     from frametool.view.progress import ProgressBar
 
     measurements = _measurements(inputs, files)
-    fixed = _fixed_edges(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else {}
+    fixed = _fixed_edges(inputs, {name for each in measurements for name in each[:2]}) if inputs.fix else []
     with ProgressBar(SHARES, quiet=inputs.quiet, counted="") as bar:
         found = solve_tree(
-            measurements, root=inputs.root, fixed=[(*ends, pose) for ends, (pose, _) in fixed.items()], robust=robust,
+            measurements, root=inputs.root, fixed=fixed, robust=robust,
             progress=lambda share: bar.advance(0, round(SHARES * share) - bar.size),
         )  # fmt: skip
-    for each in found.hints:
-        warn(each)
     if found.sigma_factor > UNSURE:
         warn(f"the given sigmas are {found.sigma_factor:.2g} times too small for what the used rows are off")
     frames = []
     for name in sorted(found.frames, key=lambda name: name != found.root):
-        parent, is_fixed = found.parents.get(name), name in found.fixed  # in the root, or as --fix has it
-        if parent is not None and is_fixed:
-            pose, covariance = fixed[parent, name]
-        else:
-            pose = found.pose(name, parent).components
-            covariance = None if parent is None else _listed(found.marginal(name))
-        seen = found.rows[name], found.frame_checked[name], is_fixed
-        frames.append(SolvedFrame(name, parent, _numbers(pose), covariance, *seen))
+        track = found.tree.track(name)  # in the root, or as --fix has it
+        pose = IDENTITY if track is None else track.components
+        seen = found.rows[name], found.frame_checked[name], name in found.fixed
+        covariance = found.tree.covariances.get(name)
+        frames.append(SolvedFrame(name, found.parents.get(name), _numbers(pose), covariance, *seen))
     unknown = [each.name for each in frames if each.parent and not each.fixed and not each.covariance]
     if unknown:
         warn(f"no covariance of {first_of(unknown, 5)}: neither loops nor sigmas say how sure that is")
@@ -69,8 +64,8 @@ def _report_taken(inputs: Inputs, *texts: str | None) -> None:
         say(text)
 
 
-def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> dict[tuple[str, str], tuple[Any, Components | None]]:
-    """Return the edges of --fix trees, by parent and child: components, covariance."""
+def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> list[tuple[str, str, Any, Components | None]]:
+    """Return the edges of --fix trees."""
     from frametool.formats.load import Rules
 
     tree = load_tree(inputs.fix[0], inputs.fix[1:], Rules(normalize=inputs.normalize))
@@ -79,7 +74,7 @@ def _fixed_edges(inputs: Inputs, measured: Collection[str]) -> dict[tuple[str, s
     if not {*tree.frames} & {*measured}:
         known = alternatives(one := tree.frames[0], measured, "frames")
         raise ValueInvalid(f"{tree.name}: no frame of it is measured: {shown(one)}{known}")
-    return {(each.parent, each.child): (each.components, tree.covariances.get(each.child)) for each in tree.tracks()}
+    return [(each.parent, each.child, each.components, tree.covariances.get(each.child)) for each in tree.tracks()]
 
 
 def _measurements(inputs: Inputs, files: Sequence[str]) -> list[Measurement]:
@@ -148,8 +143,6 @@ def solved_hand_eye(inputs: Inputs, files: Sequence[str], *, robust: bool) -> So
     from frametool.fit.hand_eye import solve_hand_eye
 
     found = solve_hand_eye(samples.gripper, samples.target, eye_to_hand=eye_to_hand, robust=robust, names=called)
-    for each in found.warnings:
-        warn(each)
     count = int(found.used.sum())
     sigmas: list[Any] = [found.covariance_x, found.covariance_z]
     if not samples.placed:
@@ -195,8 +188,6 @@ def solved_points(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solu
         say(each)
     weights, scale = pairs.weights, inputs.scale
     found = solve_points(pairs.target, pairs.source, weights=weights, scale=scale, robust=robust, names=names)
-    for each in found.hints:
-        warn(each)
     frames = _side(target, source, found.transform, found.covariance, int(found.used.sum()))
     labels = [(place, ids[at] if ids else None, target, source) for at, place in enumerate(pairs.places)]
     counted = (found.used | found.left_out).tolist()

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, warn
 from frametool.fit.alignment import STILL, THIN, Fit, centre, principal_axes, umeyama
 from frametool.fit.least_squares import (
-    KEPT,
     LEAST,
     PoseArrays,
+    batch_of,
+    deviations,
     draws,
+    fitted_sigmas,
     inverse,
     length,
-    lengths,
     require_near,
     settled,
     skew,
@@ -26,7 +27,7 @@ from frametool.geometry import validation
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from frametool.fit.least_squares import Mask, Rows
     from frametool.geometry.types import Array, Numbers
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 
 FEWEST_POSES = 3  # with two poses the outlier cannot be identified
 MOST_TRIED = 200  # poses that are tried as the middle of the others
-FARTHEST = 1e150  # metres: squares stay finite
 LEAST_GAP = 1e-9  # between the two largest eigenvalues, relative to their sum
 
 
@@ -62,8 +62,6 @@ def mean_and_spread(poses: Transform, weights: Numbers | None = None) -> tuple[T
     metres, radians = mean.distance(poses)
     counts = mass > 0.0
     whole = validation.total(mass.copy())
-    if not metres[counts].max() < FARTHEST:
-        raise ValueInvalid(f"poses lie {metres[counts].max():.3g} m from their mean; at most {FARTHEST:.0e} m")
     return mean, Spread(
         (validation.total(mass * metres * metres) / whole) ** 0.5,
         float(metres[counts].max()),
@@ -98,49 +96,42 @@ class MeanFit(NamedTuple):
     covariance: Array | None
 
 
-def solve_mean(poses: Transform, *, weights: Numbers | None = None, robust: bool = True) -> MeanFit:
-    """Return the mean of poses (n,), outliers rejected; without outliers exactly that of `mean_and_spread`.
+def solve_mean(
+    poses: Transform | Numbers | Sequence[Transform], *, weights: Numbers | None = None, robust: bool = True
+) -> MeanFit:
+    """Return the mean of poses, transforms or matrices (n, 4, 4); outliers are rejected.
 
     weights: (n,), proportional to 1 / variance; a pose of weight 0 is ignored
-    Raises ValueInvalid if there is no pose, or no mean.
+    Without outliers exactly the mean of `mean_and_spread`.  Raises ValueInvalid if there is no pose, or no mean.
     """
-    if len(poses.shape) != 1:
-        raise ValueInvalid(f"poses: expected shape (n,), got {poses.shape}")
+    poses = batch_of(poses, "poses")
     require_near(poses.xyz, "poses")
     mass = validation.masses(weights, poses.shape)
     counts = mass > 0.0
-    heavy, rows, roots = poses[counts], PoseArrays.of(poses[counts]), np.sqrt(mass[counts])[:, None]
+    used, roots = counts.copy(), np.sqrt(mass)[:, None]
+    if robust and counts.sum() >= FEWEST_POSES:
+        used[counts] = _agreeing(poses[counts], mass[counts])
+    mean, spread = mean_and_spread(poses[used], None if weights is None else mass[used])
+    off = PoseArrays.of(poses).errors(PoseArrays.of(mean))
+    count, kept = int(used.sum()), roots[used] * off[used]
+    s_t, s_r = fitted_sigmas(kept, np.ones(count), 3).tolist()
+    covariance = kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None
+    u = deviations(roots * off, np.array([s_t, s_r]))
+    return MeanFit(mean, spread, used, counts & ~used, u, off, (s_t, s_r), 3 * count - 3, covariance)
 
-    def mean(kept: Array | Mask) -> tuple[Transform, Spread]:
-        chosen = kept > 0.0
-        return mean_and_spread(heavy[chosen], None if weights is None else mass[counts][chosen])
+
+def _agreeing(poses: Transform, mass: Array) -> Mask:
+    """Return the poses that are no outliers."""
+    rows, roots = PoseArrays.of(poses), np.sqrt(mass)[:, None]
 
     def residuals(middle: Transform) -> Array:
         found: Array = roots * rows.errors(PoseArrays.of(middle))
         return found
 
-    robust = robust and len(heavy) >= FEWEST_POSES
-    found = settled(
-        _middle(heavy, roots) if robust else heavy[0], residuals, lambda _, first: heavy.mean(first * mass[counts]),
-        lambda _, kept: mean(kept)[0], unknown=3, robust=robust,
-    )  # fmt: skip
-    used, count = counts.copy(), int(found.kept.sum())
-    used[used] = found.kept
-    off = PoseArrays.of(poses).errors(PoseArrays.of(found.model))
-    s_t, s_r = map(float, found.sigmas)
-    kept = found.residuals[found.kept]
-    return MeanFit(
-        *mean(found.kept), used, counts & ~used, np.sqrt(mass / 6.0) * np.sqrt(lengths(off) ** 2 @ found.sigmas**-2.0),
-        off, (s_t, s_r), 3 * count - 3, kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None,
-    )  # fmt: skip
+    def mean(_: Transform, weights: Array) -> Transform:
+        return poses.mean(weights * mass)
 
-
-def covariance_of(poses: Transform, mean: Transform, weights: Numbers | None = None) -> Array | None:
-    """Return the covariance of one of the poses (n,) whose mean is known, 6x6 as in ROS; None for a single pose."""
-    mass = validation.masses(weights, poses.shape)
-    count = int((mass > 0.0).sum())
-    off = PoseArrays.of(poses).errors(PoseArrays.of(mean)) * np.sqrt(mass)[:, None]
-    return off.T @ off * (count / mass.sum() / (count - 1)) if count > 1 else None
+    return settled(_middle(poses, roots), residuals, mean, mean, unknown=3, robust=True).kept
 
 
 def _middle(poses: Transform, roots: Array) -> Transform:
@@ -192,10 +183,11 @@ def solve_points(
     target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True,
     names: tuple[str, str] = ("A", "B"),
 ) -> PointsFit:  # fmt: skip
-    """Fit matched points (n, 3) by weighted least squares; outliers are rejected.
+    """Estimate the transform from source points to the matching target points, (n, 3) each; outliers are rejected.
 
     weights: (n,), proportional to 1 / variance; a pair of weight 0 is ignored
-    names: of target and source, for messages
+    scale: estimate one too, target = scale R source + t; names: of target and source, for messages
+    Returns .transform (target_from_source), .scale, .covariance, .used and more.
     Raises ValueInvalid if the points are too few, on a line, or mirrored.
     """
     a, b = _points(target, "target"), _points(source, "source")
@@ -225,10 +217,12 @@ def solve_points(
     used[used] = kept
     residuals = _residuals(best, a, b)
     hints = [] if scale else pairs.scale_hints(typical, names, robust=robust)
+    for hint in hints:
+        warn(hint)
     return PointsFit(
         best.transform.canonical(), best.scale, scale_sigma, covariance, used, (mass > 0.0) & ~used, residuals,
         np.sqrt(mass / 3.0) * length(residuals) / sigma, sigma, 3 * int(kept.sum()) - 6 - scale,
-        sqrt((residuals[used] ** 2).sum() / used.sum()), hints + pairs.at(kept).line_hints(sigma, covariance),
+        sqrt((residuals[used] ** 2).sum() / used.sum()), hints,
     )  # fmt: skip
 
 
@@ -295,14 +289,6 @@ class _Pairs(NamedTuple):
         unit = next((unit for unit in UNITS if abs(ratio / unit - 1.0) < ABOUT), ratio)
         return [f"{great} is {unit:.4g} times {small}: {UNITS.get(unit, 'a scale?')}"]
 
-    def line_hints(self, sigma: float, covariance: Array) -> list[str]:
-        """Return a warning if points are nearly on a line: the rotation about it is uncertain."""
-        first, second, _ = principal_axes(self.target)
-        if not second < KEPT * sigma < first:
-            return []
-        turn = degrees(sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
-        return [f"the points lie nearly on a line: the turn about it is uncertain (sigma {turn:.1f} deg)"]
-
     def covariance(self, fit: Fit, sigma: float, *, with_scale: bool) -> tuple[Array, float | None]:
         """Return the inverse Hessian of pose and scale: the pose's part, and the scale's sigma if it is estimated.
 
@@ -341,24 +327,16 @@ def mean_of_rows(gathered: Gathered, values: list[float] | None, *, robust: bool
     from frametool.grammar.pose import Pose
     from frametool.grammar.result import Result, uncertain
 
-    transforms = gathered.transforms
     weights = gathered.weights if values is None else values
-    extras: dict[str, Any] = {"count": len(transforms)}
+    found = solve_mean(gathered.transforms, weights=weights, robust=robust)
+    spread, covariance = found.spread, found.covariance
+    extras: dict[str, Any] = {"count": len(found.used)} | ({"used": int(found.used.sum())} if robust else {})
     left_out: list[str] = []
-    if robust:
-        found = solve_mean(transforms, weights=weights)
-        mean, spread = found.transform, found.spread
-        heavy = None if weights is None else [weights[at] for at in found.used.nonzero()[0].tolist()]
-        covariance = covariance_of(transforms[found.used], mean, heavy)
-        extras["used"] = int(found.used.sum())
-        for row in found.left_out.nonzero()[0].tolist():
-            metres, radians = (hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
-            off = f"{1e3 * metres:.1f} mm {degrees(radians):.2f} deg"
-            left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
-    else:
-        mean, spread = mean_and_spread(transforms, weights)
-        covariance = covariance_of(transforms, mean, weights)
-    pose = Pose.of(mean.components)
+    for row in found.left_out.nonzero()[0].tolist() if robust else ():
+        metres, radians = (hypot(*half) for half in (found.residuals[row, :3], found.residuals[row, 3:]))
+        off = f"{1e3 * metres:.1f} mm {degrees(radians):.2f} deg"
+        left_out.append(f"{gathered.places[row]}: left out, {off} off (u {found.u[row]:.1f})")
+    pose = Pose.of(found.transform.components)
     if gathered.placed:
         extras |= {"distance_rms": spread.distance_rms, "distance_max": spread.distance_max}
     if gathered.turned:

@@ -15,11 +15,11 @@ from frametool.geometry.transform import Transform
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from frametool.geometry.types import Rigid
+    from frametool.geometry.types import Components, Rigid
     from frametool.stream.measurements import Measurement
 
     Pairs = Sequence[tuple[int, int]]
-    Fixed = Sequence[tuple[str, str, Rigid]]
+    Fixed = Sequence[tuple[str, str, Rigid, Components | None]]  # parent, child, pose, covariance
 
 class SpanningTree(NamedTuple):
     """Rows that connect every body to the root by one path.
@@ -112,7 +112,7 @@ class Bodies(NamedTuple):
 
 def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixed) -> Bodies:
     """Group frames into bodies; raises ValueInvalid for an unknown root and contradictory edges."""
-    edges = [*((m.parent, m.child) for m in measurements), *((parent, child) for parent, child, _ in fixed)]
+    edges = [*((m.parent, m.child) for m in measurements), *(each[:2] for each in fixed)]
     frames = tuple(dict.fromkeys(name for edge in edges for name in edge))
     if len(frames) > MOST:
         raise ValueInvalid(f"{len(frames)} frames; solve takes at most {MOST}")
@@ -122,7 +122,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
     elif root not in frames:
         raise ValueInvalid(f"unknown root {shown(root)}{alternatives(root, frames, 'frames')}")
     near: dict[str, list[tuple[str, Transform]]] = {name: [] for name in frames}
-    for parent, child, components in fixed:
+    for parent, child, components, _ in fixed:
         near[parent].append((child, Transform.of(*components)))
         near[child].append((parent, Transform.of(*components).inverse()))
     number: dict[str, int] = {}
@@ -147,7 +147,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fixe
 def _entries(fixed: Fixed) -> dict[str, str]:
     """Return the parent of each frame that keeps one: all fixed edges except those that would close a loop."""
     groups, parents = Groups[str](), dict[str, str]()
-    for parent, child, _ in fixed:
+    for parent, child, *_ in fixed:
         if child not in parents and groups.join(child, parent):
             parents[child] = parent
     return parents

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from frametool.errors import ValueInvalid
+from frametool.errors import ValueInvalid, warn
 from frametool.fit.least_squares import (
     KEPT,
     LEAST,
     PoseArrays,
     align_vectors,
     applied,
+    batch_of,
     deviations,
     draws,
     fitted_sigmas,
@@ -34,16 +35,19 @@ from frametool.fit.least_squares import (
 from frametool.fit.least_squares import log as rotvecs_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
+    from typing import TypeAlias
 
     from frametool.fit.least_squares import Mask, Rows
     from frametool.geometry.transform import Transform
-    from frametool.geometry.types import Array, Indices
+    from frametool.geometry.types import Array, Indices, Numbers
+
+    Batch: TypeAlias = Transform | Numbers | Sequence[Transform]
 
 NAMES = ("base", "gripper", "camera", "target")
 FEWEST = 3  # samples
 FEWEST_ROBUST = 5  # with fewer the outlier cannot be identified
-FEWEST_APART = 4  # with three, rotations alone can fit all positions: metres are weighted as in the closed form
+FEWEST_APART = 4  # with three, rotations alone can fit all positions: the closed form is the result
 FEWEST_CERTAIN = 6  # with fewer the sigmas are rough: with 8 they are within a few per cent on average
 DRAWS, DRAWN = 60, 5
 MOST = 10_000  # pairs that are used, or one of each sample
@@ -86,14 +90,18 @@ class HandEye(NamedTuple):
 
 
 def solve_hand_eye(
-    gripper: Transform, target: Transform, *, eye_to_hand: bool = False, robust: bool = True,
+    gripper: Batch, target: Batch, *, eye_to_hand: bool = False, robust: bool = True,
     names: tuple[str, str, str, str] = NAMES,
 ) -> HandEye:  # fmt: skip
-    """Solve for X and Z by least squares, with the most likely location of the noise; outliers are rejected.
+    """Estimate the pose of a camera on a gripper, and of the target; outliers are rejected.
 
-    gripper: base_from_gripper; target: camera_from_target; as many, (n,)
+    gripper: base_from_gripper; target: camera_from_target; as many, transforms or matrices (n, 4, 4)
+    eye_to_hand: the camera is fixed to the base, the target is on the gripper; names: of the frames, for messages
+    Returns .x (gripper_from_camera, or base_from_camera), .z (base_from_target, or gripper_from_target),
+    .covariance_x, .covariance_z, .noise_at, .used and more: least squares with the most likely location of the noise.
     Raises ValueInvalid if the samples are too few, rotate about one axis only, or fit the inverse setting.
     """
+    gripper, target = batch_of(gripper, "gripper"), batch_of(target, "target")
     if len(gripper) != len(target):
         raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
     if (count := len(gripper)) < FEWEST:
@@ -114,10 +122,9 @@ def solve_hand_eye(
         if (kept := weights > 0.0).sum() < FEWEST:
             raise _unfitting(medians)
         _require_two_axes(_turns(hand.at(kept)), 0.0, holder, names[2])
-        models = (model._replace(cut=cut) for cut in CUTS)
-        if kept.sum() < FEWEST_APART:
-            models = (start._replace(cut=cut, ratio=samples.sigmas(start._replace(cut=cut), weights)) for cut in CUTS)
-        return min((samples.fitted(each, weights, STEPS) for each in models), key=lambda fit: fit.misfit)
+        begin, steps = (model, STEPS) if kept.sum() >= FEWEST_APART else (start, 0)
+        models = (samples.fitted(begin._replace(cut=cut), weights, steps) for cut in CUTS)
+        return min(models, key=lambda fit: fit.misfit)
 
     found = settled(
         start, samples.residuals, lambda model,
@@ -133,6 +140,10 @@ def solve_hand_eye(
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
     covariance = inverse(model.hessian)
+    warnings = _way_warnings(medians, others, count, eye_to_hand=eye_to_hand) + _warnings(turns, count, holder)
+    warnings += _scale_warnings(samples.at(found.kept), model.x)
+    for warning in warnings:
+        warn(warning)
     return HandEye(
         model.x.transform.canonical(),
         model.z.transform.canonical(),
@@ -147,22 +158,16 @@ def solve_hand_eye(
         float(rms[0]),
         float(rms[1]),
         turns.rms,
-        _way_warnings(medians, others, count, eye_to_hand=eye_to_hand)
-        + _warnings(turns, count, holder)
-        + _scale_warnings(samples.at(found.kept), model.x),
+        warnings,
     )
 
 
 class _Model(NamedTuple):
-    """X and Z, the location of the noise, and the results of a fit: sigmas, Hessian (12, 12) and 2 ln s_t + 2 ln s_r.
-
-    ratio: sigmas that the fit may only scale
-    """
+    """X and Z, the location of the noise, and what a fit found: sigmas, Hessian (12, 12) and 2 ln s_t + 2 ln s_r."""
 
     x: PoseArrays
     z: PoseArrays
     cut: str = "target"
-    ratio: Array | None = None
     sigmas: Array = np.ones(2)
     hessian: Array = np.eye(12)
     misfit: float = 0.0
@@ -198,10 +203,6 @@ class _Samples(NamedTuple):
         loop = CUTS[model.cut](*self, model.x, model.z)
         return _errors(loop, model.x)
 
-    def sigmas(self, model: _Model, weights: Array) -> Array:
-        """Return s_t and s_r of the errors of a model."""
-        return fitted_sigmas(self.residuals(model), weights, 6)
-
     def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
         """Minimise ln S_t + ln S_r by Gauss-Newton steps with updated sigmas, damped if a step does not help."""
         extent = max(np.abs(poses.translations).max() for poses in self)
@@ -226,9 +227,6 @@ class _Samples(NamedTuple):
         loop = CUTS[model.cut](*self, model.x, model.z)
         errors = _errors(loop, model.x)
         sigmas = fitted_sigmas(errors, weights, 6)
-        if model.ratio is not None:
-            share = sigmas / model.ratio
-            sigmas = model.ratio * np.sqrt((share**2).mean())
         weighed = (weights[:, None] / np.repeat(sigmas**2, 3)).reshape(-1, 1)
         slopes = _jacobian(loop, model, errors[:, 3:]).reshape(-1, 12)
         gradient = slopes.T @ (weighed * errors.reshape(-1, 1))

@@ -19,7 +19,7 @@ from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from typing import Any, TypeAlias
 
     from numpy.typing import NDArray
@@ -181,6 +181,30 @@ def inverse_left_jacobian(rotvecs: Array) -> Array:
     return np.eye(3) - crossed / 2.0 + factor[..., None, None] * (crossed @ crossed)
 
 
+def batch_of(argument: Any, name: str) -> Transform:
+    """Return transforms (n,), a sequence of single ones, or matrices (n, 4, 4) as transforms.
+
+    Raises ValueInvalid with the shape.
+    """
+    if not isinstance(argument, Transform) and len(argument) and all(isinstance(each, Transform) for each in argument):
+        if many := next((each.shape for each in argument if each.shape), ()):
+            raise ValueInvalid(f"{name}: expected single transforms, got shape {many}")
+        argument = stacked(argument)
+    if not isinstance(argument, Transform):
+        matrices = np.asarray(argument)
+        if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
+            raise ValueInvalid(f"{name}: expected matrices of shape (n, 4, 4), got {matrices.shape}")
+        return Transform.from_matrix(matrices)
+    if len(argument.shape) != 1:
+        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {argument.shape}")
+    return argument
+
+
+def stacked(transforms: Iterable[Transform]) -> Transform:
+    """Return single transforms as one batch."""
+    return Transform.of(*map(np.array, zip(*(each.components for each in transforms), strict=True)))
+
+
 Model = TypeVar("Model")
 
 KEPT = 3.0  # sigmas: a larger residual is an outlier
@@ -189,8 +213,8 @@ MEDIAN_OF_THREE = 1.538  # the median of |r| of three numbers of deviation 1: th
 MEDIAN_OF_SIX = 0.944  # the median of u of six numbers: the root of that of chi2 with 6 degrees, over 6
 LEAST = 1e-9  # metres, radians: the minimum of a sigma
 FARTHEST = 1e100  # metres: sums of squares stay finite
-STEADY = 1e-3  # change of a first weight at convergence
-FIRST_ROUNDS = 30
+STEADY = 1e-4  # change of a first weight at convergence
+FIRST_ROUNDS = 50
 ROUNDS = 20  # of rejecting and readmitting; in the second half nothing more is rejected, so that it terminates
 
 
@@ -214,13 +238,12 @@ def draws(count: int, size: int, among: int) -> Iterator[list[int]]:
 
 
 class Settled(NamedTuple, Generic[Model]):
-    """A fit of the inliers: residuals of all (n, 3 or 6), a sigma for each three of them, and u of all."""
+    """A fit of the inliers: residuals of all (n, 3 or 6), and a sigma for each three of them."""
 
     model: Model
     kept: Mask
     residuals: Array
     sigmas: Array
-    u: Array
 
 
 def settled(
@@ -232,28 +255,51 @@ def settled(
     residuals: (n, 3) or (n, 6) of a model; unknown: the number of unknowns that each three of them share
     rough, fit: return an improved model and the best one, for a weight per row
     """
-    count = len(residuals(model))
-    kept = np.ones(count, bool)
-    if robust:
-        share, weights = np.sqrt(1.0 - unknown / (3.0 * count)), np.zeros(count)
-        for _ in range(FIRST_ROUNDS):
-            before, off = weights, residuals(model)
-            u = deviations(off, np.array([median_sigma(part, share) for part in lengths(off).T]))
-            weights = first_weights(u)
-            if np.abs(weights - before).max() < STEADY:
-                break
-            model = rough(model, weights)
-        kept = u <= KEPT
-    for at in range(ROUNDS):
-        model = fit(model, kept.astype(float))
+    off = residuals(model)
+    kept, share = np.ones(len(off), bool), np.sqrt(1.0 - unknown / (3.0 * len(off)))
+
+    def by_medians(model: Model) -> Array:
+        off = residuals(model)
+        return deviations(off, np.array([median_sigma(part, share) for part in lengths(off).T]))
+
+    def fitted(found: Settled[Model], kept: Mask) -> tuple[Settled[Model], Mask, Array]:
+        model = fit(found.model, kept.astype(float))
         off = residuals(model)
         sigmas = fitted_sigmas(off, kept, unknown)
-        u = deviations(off, sigmas)
-        near = u <= KEPT if at < ROUNDS // 2 else kept | (u <= KEPT)
-        if not robust or (near == kept).all():
+        return Settled(model, kept, off, sigmas), kept, deviations(off, sigmas)
+
+    if robust:
+        model, kept = first_inliers(model, by_medians, rough)
+    return reselected(Settled(model, kept, off, np.ones(1)), kept, fitted, robust=robust)
+
+
+def first_inliers(
+    model: Model, u_of: Callable[[Model], Array], rough: Callable[[Model, Array], Model]
+) -> tuple[Model, Mask]:
+    """Improve a model with weights min(1, 2.5 / u)^2 until these converge; return it and the rows within 3 sigmas."""
+    weights = None
+    for _ in range(FIRST_ROUNDS):
+        before, u = weights, u_of(model)
+        weights = np.minimum(1.0, CERTAIN / np.maximum(u, 1e-12)) ** 2
+        if before is not None and np.abs(weights - before).max() < STEADY:
             break
-        kept = near
-    return Settled(model, kept, off, sigmas, u)
+        model = rough(model, weights)
+    return model, u <= KEPT
+
+
+def reselected(
+    model: Model, kept: Mask, fit: Callable[[Model, Mask], tuple[Model, Mask, Array]], *, robust: bool
+) -> Model:
+    """Fit the rows of a selection, and those within 3 sigmas of that fit again, until they do not change.
+
+    fit: returns a better model of some rows, the rows that it used, and u of all
+    """
+    for at in range(ROUNDS):
+        model, used, u = fit(model, kept)
+        kept = u <= KEPT if at < ROUNDS // 2 else used | (u <= KEPT)
+        if not robust or (kept == used).all():
+            break
+    return model
 
 
 def lengths(residuals: Array) -> Array:
@@ -273,12 +319,6 @@ def fitted_sigmas(residuals: Array, weights: Array | Mask, unknown: int) -> Arra
     dof = max(3.0 * float(weights.sum()) - unknown, 1.0)
     squares = (weights[:, None] * lengths(residuals) ** 2).sum(0)
     return np.array([rms_sigma(each, dof) for each in squares.tolist()])
-
-
-def first_weights(u: Array) -> Array:
-    """Return min(1, 2.5 / u)^2."""
-    weights: Array = np.minimum(1.0, CERTAIN / np.maximum(u, 1e-12)) ** 2
-    return weights
 
 
 def median_sigma(lengths: Array, share: float = 1.0) -> float:

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown
+from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit.graph import bodies_of, bridges, require_connected
-from frametool.fit.least_squares import KEPT, NotSettled, PoseArrays, applied, inverse, length
+from frametool.fit.least_squares import KEPT, NotSettled, PoseArrays, applied, inverse, length, stacked
 from frametool.fit.tree_solver import Fitted, Noise, TreeProblem, TreeRows, jacobians, of_body
+from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups
 from frametool.geometry.conventions import axes_change
 from frametool.geometry.rotation import Rotation
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from frametool.fit.graph import Bodies, Fixed
-    from frametool.frames.lookups import FrameTree
     from frametool.geometry.types import Array
 
 
@@ -115,8 +115,7 @@ def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array)
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
-    poses = PoseArrays.of(Transform.of(*map(np.array, zip(*(each.components for each in tried), strict=True))))
-    errors = pose.at(None).errors(poses)
+    errors = pose.at(None).errors(PoseArrays.of(stacked(tried)))
     u = _sigmas(errors, information)
     best = int(u[:-1].argmin())
     if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
@@ -302,7 +301,7 @@ def solve_tree(
     """Find the tree that fits measurements best.
 
     root: the frame in which the others are expressed; default the first that is never a child
-    fixed: (parent, child, components) of exact edges, whose frames move as one body
+    fixed: (parent, child, components, covariance) of exact edges, whose frames move as one body
     robust: reject outliers; progress: called with the finished share
     Raises ValueInvalid: frames are not connected, an unknown root, undecided.
     """
@@ -319,10 +318,13 @@ def solve_tree(
             problem = TreeProblem(_rows(measurements, bodies), bodies.size)
             found, fits = judged(problem, measurements, problem.fitted(robust=robust, report=report))
             report(1.0)
-            return TreeSolution(measurements, bodies, problem, found, fits)
+            solution = TreeSolution(measurements, bodies, problem, found, fits, fixed)
     except (NotSettled, FloatingPointError):
         far = max(abs(part) for each in measurements for part in each.components[:3])
         raise ValueInvalid(f"translations (up to {far:.3g} m) or sigmas differ too much in size to be solved") from None
+    for hint in solution.hints:
+        warn(hint)
+    return solution
 
 
 def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
@@ -339,15 +341,12 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
             information[row] = inverse(covariance)
     return TreeRows(
         np.array([bodies.number[name] for name in parents]), np.array([bodies.number[name] for name in children]),
-        _poses([bodies.pose[name] for name in parents]), _poses([bodies.pose[name] for name in children]),
-        _poses([m.transform for m in measurements]), np.array([m.covariance is not None for m in measurements]),
+        PoseArrays.of(stacked(bodies.pose[name] for name in parents)),
+        PoseArrays.of(stacked(bodies.pose[name] for name in children)),
+        PoseArrays.of(stacked(m.transform for m in measurements)),
+        np.array([m.covariance is not None for m in measurements]),
         information,
     )  # fmt: skip
-
-
-def _poses(transforms: list[Transform]) -> PoseArrays:
-    parts = zip(*(each.components for each in transforms), strict=True)
-    return PoseArrays.of(Transform.of(*(np.array(part, float) for part in parts)))
 
 
 def _noise_hints(problem: TreeProblem, found: Fitted) -> list[str]:
@@ -369,17 +368,15 @@ class TreeSolution:
     the
         stated sigmas are too small, without changing them
     dof: degrees of freedom of metres and of radians; rms_distance, rms_angle: of the inliers
-    tree: all of that as a tree with covariances, if `frametool.solve` made it
+    tree: all of that as a tree with covariances
     hints: warnings about the sigmas
     rows: the number of used measurements of each frame; frame_checked: whether its pose in the root depends only on
     loops
     """
 
-    tree: FrameTree
-
     def __init__(
         self, measurements: Sequence[Measurement], bodies: Bodies, problem: TreeProblem, found: Fitted,
-        fits: list[str | None],
+        fits: list[str | None], fixed: Fixed,
     ) -> None:  # fmt: skip
         """Compute the results of a fit."""
         self.measurements, self.fits = tuple(measurements), fits
@@ -397,21 +394,28 @@ class TreeSolution:
             math.sqrt((part[self.used] ** 2).sum() / self.used.sum())
             for part in (self.residuals[:, :3], self.residuals[:, 3:])
         )
-        kept = np.flatnonzero(self.used).tolist()
-        tree = problem.tree(kept)
-        alone = bridges(tree, problem.pairs, kept)
+        rows = np.flatnonzero(self.used).tolist()
+        tree = problem.tree(rows)
+        alone = bridges(tree, problem.pairs, rows)
         self.checked = ~np.isin(np.arange(problem.size), list(alone))
         sure = [True] * bodies.size
         for body in tree.order[1:]:
             sure[body] = sure[tree.above[body]] and tree.row[body] not in alone
         self.frame_checked = {name: sure[bodies.number[name]] for name in self.frames}
-        ends = Counter(name for row in kept for name in measurements[row][:2])
+        ends = Counter(name for row in rows for name in measurements[row][:2])
         self.rows = {name: ends[name] for name in self.frames}
         self.parents = self._entries()
         number = np.array([bodies.number[name] for name in self.frames])
-        self._poses = found.bodies.at(number) @ _poses([bodies.pose[name] for name in self.frames])
+        self._poses = found.bodies.at(number) @ PoseArrays.of(stacked(bodies.pose[name] for name in self.frames))
         components = zip(*(part.tolist() for part in self._poses.transform.components), strict=True)
         self.poses = {name: Transform.of(*each) for name, each in zip(self.frames, components, strict=True)}
+        self.tree = FrameTree("the result")
+        kept = {each[:2]: (Transform.of(*each[2]), each[3]) for each in fixed}
+        for name in self.frames:
+            if (parent := self.parents.get(name)) is None:
+                self.tree.add_root(name)
+            else:
+                self.tree.add(parent, name, *(kept.get((parent, name)) or (self.pose(name), self.marginal(name))))
 
     @property
     def count(self) -> int:

@@ -24,14 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import TypeAlias
 
-    from frametool.fit.closed_forms import MeanFit, PointsFit
     from frametool.fit.comparison import Comparison
-    from frametool.fit.hand_eye import HandEye
-    from frametool.geometry.types import Numbers
 
     Given: TypeAlias = Trajectory | str | PathLike[str]
     Measured: TypeAlias = str | PathLike[str] | Iterable[tuple[str, str, Transform] | tuple[str, str, Transform, Any]]
-    Batch: TypeAlias = Transform | Numbers | Sequence[Transform]
 
 BILLION = 1_000_000_000
 
@@ -122,21 +118,11 @@ def solve(
     trees = [each if isinstance(each, FrameTree) else load(each) for each in fix]
     if moving := next((each for each in trees if each.moves), None):
         raise ValueInvalid(f"{moving.name} moves; fixed frames must be static")
-    fixed = [(track, tree.covariances.get(track.child)) for tree in trees for track in tree.tracks()]
-    edges = [(track.parent, track.child, track.components) for track, _ in fixed]
-    found = solve_tree(_measurements(measurements), root=root, fixed=edges, robust=robust)
-    for sentence in found.hints:
-        warn(sentence)
-    kept = {track.child: (Transform.of(*track.components), covariance) for track, covariance in fixed}
-    tree = FrameTree("the result")
-    for name in found.frames:
-        parent = found.parents.get(name)
-        if parent is None:
-            tree.add_root(name)
-        else:
-            tree.add(parent, name, *(kept[name] if name in found.fixed else (found.pose(name), found.marginal(name))))
-    found.tree = tree
-    return found
+    fixed = [
+        (track.parent, track.child, track.components, tree.covariances.get(track.child))
+        for tree in trees for track in tree.tracks()
+    ]  # fmt: skip
+    return solve_tree(_measurements(measurements), root=root, fixed=fixed, robust=robust)
 
 
 def _measurements(argument: Measured) -> list[Measurement]:
@@ -163,67 +149,6 @@ def _measurement(argument: Any, place: str) -> Measurement:
         return Measurement(parent, child, transform.components, taken(argument[3] if len(argument) > 3 else None))
     except ValueInvalid as error:
         raise ValueInvalid(f"{place}: {error}") from None
-
-
-def solve_hand_eye(gripper: Batch, target: Batch, *, eye_to_hand: bool = False, robust: bool = True) -> HandEye:
-    """Estimate the pose of a camera on a gripper, and of the target; outliers are rejected.
-
-    gripper: base_from_gripper; target: camera_from_target; as many, transforms or matrices (n, 4, 4)
-    eye_to_hand: the camera is fixed to the base, the target is on the gripper
-    Returns .x (gripper_from_camera, or base_from_camera), .z (base_from_target, or gripper_from_target),
-    .covariance_x, .covariance_z, .noise_at, .used and more.  Raises ValueInvalid if they are not determined.
-    """
-    from frametool.fit import hand_eye
-
-    pair = _poses(gripper, "gripper"), _poses(target, "target")
-    found = hand_eye.solve_hand_eye(*pair, eye_to_hand=eye_to_hand, robust=robust)
-    for sentence in found.warnings:
-        warn(sentence)
-    return found
-
-
-def solve_points(
-    target: Numbers, source: Numbers, *, weights: Numbers | None = None, scale: bool = False, robust: bool = True
-) -> PointsFit:
-    """Estimate the transform from source points to the matching target points, (n, 3) each; outliers are rejected.
-
-    weights: (n,), proportional to 1 / variance; scale: estimate one too, target = scale R source + t
-    Returns .transform (target_from_source), .scale, .covariance, .used and more.
-    Raises ValueInvalid if the points are too few, on a line, or mirrored.
-    """
-    from frametool.fit import closed_forms
-
-    found = closed_forms.solve_points(target, source, weights=weights, scale=scale, robust=robust)
-    for sentence in found.hints:
-        warn(sentence)
-    return found
-
-
-def solve_mean(poses: Batch, *, weights: Numbers | None = None, robust: bool = True) -> MeanFit:
-    """Return the mean of poses, transforms or matrices (n, 4, 4); outliers are rejected.
-
-    weights: (n,), proportional to 1 / variance
-    Returns .transform, .covariance (of one pose), .used and more.  Raises ValueInvalid if there is no mean.
-    """
-    from frametool.fit import closed_forms
-
-    return closed_forms.solve_mean(_poses(poses, "poses"), weights=weights, robust=robust)
-
-
-def _poses(argument: Any, name: str) -> Transform:
-    """Convert a batch of transforms, a sequence of single ones, or matrices; raises ValueInvalid with the shape."""
-    if not isinstance(argument, Transform) and len(argument) and all(isinstance(each, Transform) for each in argument):
-        if many := next((each.shape for each in argument if each.shape), ()):
-            raise ValueInvalid(f"{name}: expected single transforms, got shape {many}")
-        argument = Transform.of(*map(np.array, zip(*(each.components for each in argument), strict=True)))
-    if not isinstance(argument, Transform):
-        matrices = np.asarray(argument)
-        if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
-            raise ValueInvalid(f"{name}: expected matrices of shape (n, 4, 4), got {matrices.shape}")
-        return Transform.from_matrix(matrices)
-    if len(argument.shape) != 1:
-        raise ValueInvalid(f"{name}: expected transforms of shape (n,), got {argument.shape}")
-    return argument
 
 
 def _name(argument: Given, otherwise: str) -> str:

@@ -14,16 +14,16 @@ import numpy as np
 
 from frametool.fit.graph import SpanningTree, bridges, spanning_tree
 from frametool.fit.least_squares import (
-    KEPT,
     LEAST,
     MEDIAN_OF_SIX,
     PoseArrays,
     applied,
-    first_weights,
+    first_inliers,
     inverse,
     inverse_left_jacobian,
     length,
     median_sigma,
+    reselected,
     rms_sigma,
     skew,
     solve_normal,
@@ -40,8 +40,6 @@ ROWS_AT_ONCE = 20_000  # of trees that are tried together
 STEPS = 100
 MOST_DAMPED = 1e12
 REST = 1e-12  # of the extent, radians, and of a sigma: convergence of steps
-STEADY = 1e-4  # convergence of the first weights
-FIRST_ROUNDS, ROUNDS = 50, 20
 BORROWED = 0.3  # degrees of freedom of metres that radians add, and vice versa, if loops are few
 LEAST_SHARE = 0.04  # of the rows in loops, relative to the unknowns
 
@@ -87,8 +85,8 @@ class Fitted(NamedTuple):
     bodies: PoseArrays
     kept: Any
     noise: Noise
-    estimated: bool
-    few_loops: bool
+    estimated: bool = False
+    few_loops: bool = False
 
 
 def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Array, Array]:
@@ -293,17 +291,6 @@ class TreeProblem:
             noise = noise._replace(place=place, turn=turn)
         return noise.at_least(LOWEST) if looped.sum() <= 2 * unknown else noise
 
-    def weighed_down(self, bodies: PoseArrays, looped: Any) -> tuple[PoseArrays, Noise]:
-        """Return the fit with first weights and the noise from medians, both converged."""
-        noise, weights, damping = self.medians(self.errors(bodies), looped), np.ones(self.size), 0.0
-        for _ in range(FIRST_ROUNDS):
-            before, weights = weights, first_weights(self.u(self.errors(bodies), noise))
-            bodies, _, damping = self.improved(bodies, self.information(noise) * weights[:, None, None], damping)
-            noise = self.medians(self.errors(bodies), looped)
-            if np.abs(weights - before).max() < STEADY:
-                break
-        return bodies, noise
-
     def fitted(self, *, robust: bool, report: Callable[[float], None]) -> Fitted:
         """Select the rows that agree, or all, and fit them by plain least squares."""
         every = range(self.size)
@@ -312,23 +299,28 @@ class TreeProblem:
         kept = np.ones(self.size, bool)
         looped = kept.copy()
         looped[list(bridges(self.tree(every), self.pairs, every))] = False
+
+        def by_medians(bodies: PoseArrays) -> Array:
+            errors = self.errors(bodies)
+            return self.u(errors, self.medians(errors, looped))
+
+        def rough(bodies: PoseArrays, weights: Array) -> PoseArrays:
+            information = self.information(self.medians(self.errors(bodies), looped))
+            return self.improved(bodies, information * weights[:, None, None], 0.0)[0]
+
         if robust and looped.any():
-            bodies, noise = self.weighed_down(bodies, looped)
-            kept = self.u(self.errors(bodies), noise) <= KEPT
+            bodies, kept = first_inliers(bodies, by_medians, rough)
+            noise = self.medians(self.errors(bodies), looped)
         report(0.6)
         return self.selected(bodies, kept, noise, robust=robust)
 
     def selected(self, bodies: PoseArrays, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
         """Fit the used rows and test all of them again, until the set does not change."""
-        for _ in range(ROUNDS):
-            found = self.refitted(bodies, kept, noise)
-            kept, bodies, noise = self.u(self.errors(found.bodies), found.noise) <= KEPT, found.bodies, found.noise
-            if not robust or (kept == found.kept).all():
-                break
-        return found
+        return reselected(Fitted(bodies, kept, noise), kept, self.refitted, robust=robust)
 
-    def refitted(self, bodies: PoseArrays, kept: Any, noise: Noise) -> Fitted:
+    def refitted(self, found: Fitted, kept: Any) -> tuple[Fitted, Any, Array]:
         """Fit the used rows, and the nearest of the others if frames would be disconnected."""
+        bodies, noise = found.bodies, found.noise
         u = self.u(self.errors(bodies), noise)
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
         reached = np.isin(np.arange(self.size), tree.row)
@@ -338,7 +330,7 @@ class TreeProblem:
         estimate = bool((kept & ~alone & ~self.rows.stated).any()) and kept.sum() > self.unknown
         few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
         bodies, noise = self.settled(bodies, kept, noise, estimate=estimate, few_loops=few_loops)
-        return Fitted(bodies, kept, noise, estimate, few_loops)
+        return Fitted(bodies, kept, noise, estimate, few_loops), kept, self.u(self.errors(bodies), noise)
 
 
 def _halves(errors: Array) -> tuple[Array, Array]:

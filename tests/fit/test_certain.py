@@ -18,6 +18,8 @@ from frametool.frames.trajectory import Trajectory
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
+pytestmark = pytest.mark.filterwarnings("ignore::frametool.errors.FrametoolWarning")  # what looks odd is in the result too
+
 TIME = np.arange(0.0, 20.0, 0.02)
 MOUNT = Transform(Rotation.from_rpy(np.radians([0.0, 0.0, 120.0])), (0.3, -0.2, 0.1))
 

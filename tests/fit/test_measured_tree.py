@@ -45,7 +45,7 @@ def golden(case: dict[str, Any]) -> TreeSolution:
     for number, entry in enumerate(case["measurements"], 1):
         pose, written = pose_of(entry)
         rows.append(Measurement(entry["parent"], entry["child"], pose.components, covariance_of(entry), f"m.yaml:{number}", None, written))
-    fixed = [(entry["parent"], entry["name"], pose_of(entry)[0].components) for entry in case["fix"]]
+    fixed = [(entry["parent"], entry["name"], pose_of(entry)[0].components, None) for entry in case["fix"]]
     return solve_tree(rows, root=case["root"], fixed=fixed)
 
 
@@ -346,7 +346,7 @@ def test_noise_that_adds_up_around_a_loop_is_not_undecided() -> None:
 def test_fixed_frames_move_as_one_body_and_keep_their_entries() -> None:
     truth = world(7, 20, 4, sigmas=True)
     mount = Transform(Rotation.from_rpy((0.1, 0.2, 0.3)), (0.3, 0.2, 0.1))
-    fixed = [("f2", "g", mount.components), ("g", "h", mount.components)]
+    fixed = [("f2", "g", mount.components, None), ("g", "h", mount.components, None)]
     row = Measurement("f0", "h", (truth.true("f0", "f2") @ mount @ mount).components, COVARIANCE)
     found = solve_tree([*truth.measurements, row], fixed=fixed)
     assert found.fixed == {"g", "h"}
@@ -359,7 +359,7 @@ def test_fixed_frames_move_as_one_body_and_keep_their_entries() -> None:
 
 def test_a_fixed_root_hangs_where_it_is_fixed() -> None:
     truth = world(4, 8, 4)
-    found = solve_tree(truth.measurements, root="f0", fixed=[("base", "f0", truth.poses[1].components)])
+    found = solve_tree(truth.measurements, root="f0", fixed=[("base", "f0", truth.poses[1].components, None)])
     assert found.root == "f0"
     assert found.parents == {"f0": "base", "f1": "f0", "f2": "f0", "f3": "f0"}
     assert found.pose("base").is_close(truth.poses[1].inverse())
@@ -368,7 +368,7 @@ def test_a_fixed_root_hangs_where_it_is_fixed() -> None:
 def test_a_row_within_a_body_is_tested_and_moves_nothing() -> None:
     truth = world(7, 20, 4, sigmas=True)
     mount = Transform(Rotation.from_rpy((0.1, 0.2, 0.3)), (0.3, 0.2, 0.1))
-    fixed = [("f2", "g", mount.components)]
+    fixed = [("f2", "g", mount.components, None)]
     rows = [*truth.measurements, Measurement("g", "f2", mount.components, COVARIANCE)]
     found = solve_tree(rows, fixed=fixed)
     assert left_out(found) == {20: "inverted"}
@@ -377,7 +377,7 @@ def test_a_row_within_a_body_is_tested_and_moves_nothing() -> None:
 
 def test_all_in_one_body_leaves_nothing_to_find() -> None:
     mount = (0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 1.0)
-    found = solve_tree([Measurement("a", "b", mount)], fixed=[("a", "b", mount)])
+    found = solve_tree([Measurement("a", "b", mount)], fixed=[("a", "b", mount, None)])
     assert found.pose("b").components[:3] == (0.3, 0.2, 0.1)
     assert not np.any(found.marginal("b"))
 
@@ -394,13 +394,13 @@ HALF = tuple(np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]).ravel().tolist())
     [
         ([], {}, "no measurements"),
         ([ONE, FAR], {}, "no measurement connects a, b | c, d"),
-        ([ONE], {"fixed": [("c", "d", FAR.components)]}, "no measurement connects a, b | c, d"),
+        ([ONE], {"fixed": [("c", "d", FAR.components, None)]}, "no measurement connects a, b | c, d"),
         ([ONE], {"root": "aa"}, "unknown root 'aa'; did you mean 'a'? frames: a, b"),
         ([ONE._replace(child="a", place="m.yaml:3")], {}, "m.yaml:3: 'a' is measured from itself"),
         ([ONE._replace(covariance=HALF)], {}, "measurement 1: the covariance is exact in some direction; exact: --fix"),
         (
             [ONE],
-            {"fixed": [("a", "b", ONE.components), ("a", "b", (0.003, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))]},
+            {"fixed": [("a", "b", ONE.components, None), ("a", "b", (0.003, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), None)]},
             "'b' is fixed in 'a' in two ways, 3.0 mm 0.0 deg apart; fix one of them",
         ),
     ],

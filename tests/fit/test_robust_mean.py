@@ -103,7 +103,7 @@ def test_the_covariance_is_that_of_a_pose_and_sigma_its_root() -> None:
 def test_no_poses_and_no_mean() -> None:
     with pytest.raises(ValueInvalid, match=r"^mean of no rotations; give at least one$"):
         solve_mean(Transform.random(1)[:0])
-    with pytest.raises(ValueInvalid, match=r"^poses: expected shape \(n,\), got \(\)$"):
+    with pytest.raises(ValueInvalid, match=r"^poses: expected transforms of shape \(n,\), got \(\)$"):
         solve_mean(TRUTH)
     apart = Transform(Rotation.from_rotvec(np.pi * np.eye(4, 3)), np.zeros((4, 3)))
     with pytest.raises(ValueInvalid, match="none is their mean"):
