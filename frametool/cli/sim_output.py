@@ -148,10 +148,10 @@ class SimOutput:
         pictures: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
         if self.plot:
             from frametool.view.pictures import write_picture
-            from frametool.view.run_plot import Drawing, last_commands, run_picture
+            from frametool.view.run_plot import Drawing, run_picture
 
             run, suffix = Drawing(scene), suffix_of(self.plot)
-            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix, last_commands(run))
+            pictures[self.plot] = run.watch, lambda: write_picture(run_picture(run), suffix)
         if self.view:
             from frametool.view.exports import RunPage
 

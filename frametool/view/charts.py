@@ -69,8 +69,8 @@ class Chart:
         across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
         return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
 
-    def drawn(self, lines: Sequence[ChartLine] = (), rows: Sequence[str] | None = None) -> Iterator[Shape]:
-        """Draw axes, lines and the legend; rows: labels that replace the numbers along y."""
+    def drawn(self, lines: Sequence[ChartLine] = ()) -> Iterator[Shape]:
+        """Draw axes, lines and the legend."""
         left, top, width, height = self.area
         right, bottom = left + width, top + height
         yield PictureWords(left, top - 14.0, self.names[1], "soft")
@@ -80,23 +80,26 @@ class Chart:
             across = self.place(tick, 0.0)[0]
             yield PictureLine([(across, top), (across, bottom)], "faint")
             yield PictureWords(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0)
-        for at, tick in enumerate(self.ticks[1] if rows is None else range(len(rows))):
+        for tick in self.ticks[1]:
             down = self.place(0.0, tick)[1]
             yield PictureLine([(left, down), (right, down)], "faint" if tick else "zero")
-            yield PictureWords(left - 7.0, down, f"{tick:g}" if rows is None else rows[at], "soft", "end", 11.0)
+            yield PictureWords(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0)
         for line in lines:
             points = [self.place(*point) for point in line.points]
             if points:
                 yield PictureLine(points, line.colour, line.width, dashes=line.dashes, title=line.name)
             yield from (PictureDot(x, y, 3.0, line.colour) for x, y in points if line.dots)
-        yield from legend([line for line in lines if line.name], right, top - 14.0)
+        yield from legend(lines, left + text_width(self.names[1]), right, top - 14.0)
 
 
-def legend(lines: Sequence[ChartLine], right: float, y: float) -> Iterator[Shape]:
-    """Draw a right-aligned legend on one line, each name after a sample of its line."""
-    for line in reversed(lines):
+def legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:
+    """Draw a right-aligned legend on one line, each name after a sample of its line; dashed lines only if it is long."""
+    named = [line for line in lines if line.name]
+    if sum(text_width(line.name) + 33.0 for line in named) > right - left:
+        named = [line for line in named if line.dashes]
+    for line in reversed(named):
         yield PictureWords(right, y, line.name, "ink", "end", 11.0)
-        right -= text_width(line.name, 12.0) + 5.0
+        right -= text_width(line.name) + 5.0
         yield PictureLine([(right - 16.0, y), (right, y)], line.colour, max(line.width, 2.0), dashes=line.dashes)
         right -= 28.0
 

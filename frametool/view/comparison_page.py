@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime
 from html import escape
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,6 @@ from frametool.view.pictures import (
     write_html,
     write_svg,
 )
-from frametool.view.scene import text_width
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -149,34 +148,24 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
     start = PictureDot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
-    return _figure(chart.area.height, [*chart.drawn(_named(lines, chart.names[1])), *shapes, start])
+    return _figure(chart.area.height, [*chart.drawn(lines), *shapes, start])
 
 
 def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
     """Draw a path coloured by error, with the colour scale."""
     errors, low = curve.found.ate.m, chart.area.top + chart.area.height + 25.0
     worst = float(errors.max())
-    levels = np.minimum((errors[curve.chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1)
+    levels = np.minimum((errors[curve.chosen] / (worst or 1.0) * LEVELS).astype(int), LEVELS - 1).tolist()
+    shades = [shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
     shapes: list[Shape] = [
         PictureWords(LEFT + LEVELS * 7.0 + 8.0, low + 4.5, f"error 0 .. {worst:.3g} m", "soft", size=11.0)
     ]
-    for level in range(LEVELS):
-        colour = shade_of(level / (LEVELS - 1), ERROR_STOPS)
-        points: list[tuple[float, float]] = []
-        for at in np.flatnonzero(levels[:-1] == level).tolist():
-            if points[-1:] != [placed[at]]:
-                points += [(np.nan, np.nan), placed[at]]
-            points.append(placed[at + 1])
-        shapes += [PictureLine(points[1:], colour, 2.0)] * bool(points)
-        shapes.append(PictureBox(LEFT + level * 7.0, low, 7.5, 9.0, colour))
-    return shapes
-
-
-def _named(lines: list[ChartLine], title: str) -> list[ChartLine]:
-    """Drop the names of estimates from a legend too long for one line; their table shows the colours."""
-    if sum(text_width(line.name, 12.0) + 33.0 for line in lines if line.name) < WIDE - text_width(title, 12.0):
-        return lines
-    return [line._replace(name=line.name * (line.name == REFERENCE)) for line in lines]
+    begin = 0
+    for level, run in groupby(levels[:-1]):
+        end = begin + len([*run])
+        shapes.append(PictureLine(placed[begin : end + 1], shades[level], 2.0))
+        begin = end
+    return shapes + [PictureBox(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(shades)]
 
 
 def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[ChartLine]]]:
@@ -197,7 +186,7 @@ def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[Ch
         low, high = min(0.0, *(each[2].min() for each in drawn)), max(each[2].max() for each in drawn)
         area = Area(LEFT, TOP + at * (HIGH + TOP + BOTTOM - 14.0), WIDE, HIGH)
         ends = (float(low), float(high))
-        charts.append((Chart(area, (0.0, end), ends, (along * (at == len(kinds) - 1), name)), _named(lines, name)))
+        charts.append((Chart(area, (0.0, end), ends, (along * (at == len(kinds) - 1), name)), lines))
     return charts
 
 
@@ -218,7 +207,8 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
         return _figure(HIGH, [*chart.drawn([ChartLine("", curves[0].colour, steps)])])
     names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
     chart = Chart(Area(LEFT, TOP, WIDE, ROW * len(curves)), ends, (0.0, 1.0), names)
-    shapes = [*chart.drawn(rows=[])]
+    chart.ticks[1] = []
+    shapes = [*chart.drawn()]
     for at, (each, values) in enumerate(zip(curves, errors, strict=True)):
         y, colour = TOP + (at + 0.66) * ROW, each.colour
         least, first, middle, third, most, worst = (

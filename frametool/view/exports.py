@@ -14,10 +14,8 @@ from __future__ import annotations
 import json
 import math
 import struct
-import sys
-from array import array
 from base64 import b64encode
-from itertools import chain, islice
+from itertools import chain
 from json import dumps
 from operator import mul
 from typing import TYPE_CHECKING, Any
@@ -32,7 +30,7 @@ from frametool.view.pictures import SIZE, page_file, write_html
 from frametool.view.scene import EYES, FrameScene, Projection, can_be_drawn
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from frametool.formats.robots.model import Mimic
     from frametool.formats.robots.solids import Solid
@@ -45,7 +43,7 @@ THICK = 0.02  # half the width of a bar, where its length is 1
 COLOURS = ((217, 45, 32, 255), (18, 135, 61, 255), (26, 95, 208, 255))
 SIDES = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6))  # of a box, outwards
 Z_UP = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
-FLOAT, USHORT, UBYTE = 5126, 5123, 5121
+COMPONENTS = {"f": 5126, "H": 5123, "B": 5121}
 VERTICES, INDICES = 34962, 34963
 MESH = {"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}]}
 MATERIAL = {"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": {"metallicFactor": 0}}
@@ -60,21 +58,15 @@ class BinaryPart:
         self.views: list[dict[str, int]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add(self, data: bytes, kind: str, component: int, count: int, *, target: int = 0, **more: Any) -> int:
-        """Append numbers and return the index of their accessor."""
-        self.data += bytes(-len(self.data) % 4)
+    def add(self, letter: str, rows: Sequence[Sequence[float]], *, target: int | None = None, **more: Any) -> int:
+        """Append rows of numbers, each of a type of the module struct; return the index of their accessor."""
+        data = _packed(letter, chain.from_iterable(rows))
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
-        self.views.append(view | ({"target": target} if target else {}))
-        self.accessors.append(
-            {"bufferView": len(self.views) - 1, "componentType": component, "count": count, "type": kind} | more
-        )
-        self.data += data
+        self.views.append(view if target is None else view | {"target": target})
+        kind = {"count": len(rows), "type": ("SCALAR", "", "VEC3", "VEC4")[len(rows[0]) - 1]}
+        self.accessors.append({"bufferView": len(self.views) - 1, "componentType": COMPONENTS[letter], **kind, **more})
+        self.data += data + bytes(-len(data) % 4)
         return len(self.accessors) - 1
-
-    def floats(self, rows: Sequence[Sequence[float]], kind: str, **more: Any) -> int:
-        """Append rows of float32."""
-        numbers = [number for row in rows for number in row]
-        return self.add(struct.pack(f"<{len(numbers)}f", *numbers), kind, FLOAT, len(rows), **more)
 
 
 def write_glb(scene: FrameScene) -> bytes:
@@ -89,7 +81,6 @@ def write_glb(scene: FrameScene) -> bytes:
     }  # fmt: skip
     if animation := _animation(scene, index, part):
         document["animations"] = [animation]
-    part.data += bytes(-len(part.data) % 4)
     document |= {"accessors": part.accessors, "bufferViews": part.views, "buffers": [{"byteLength": len(part.data)}]}
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
@@ -100,7 +91,7 @@ def write_glb(scene: FrameScene) -> bytes:
 def _add_axes(part: BinaryPart) -> None:
     """Add three bars of length 1 along x, y, z: positions, colours, triangles."""
     places: list[list[float]] = []
-    faces: list[int] = []
+    corners: list[tuple[int]] = []
     for axis in range(3):
         first = len(places)
         for corner in range(8):
@@ -108,11 +99,10 @@ def _add_axes(part: BinaryPart) -> None:
             place[axis] = 1.0 if corner >> axis & 1 else -THICK
             places.append(place)
         for a, b, c, d in SIDES:
-            faces += [first + corner for corner in (a, b, c, a, c, d)]
-    part.floats(places, "VEC3", target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
-    colours = b"".join(bytes(colour) * 8 for colour in COLOURS)
-    part.add(colours, "VEC4", UBYTE, len(places), target=VERTICES, normalized=True)
-    part.add(struct.pack(f"<{len(faces)}H", *faces), "SCALAR", USHORT, len(faces), target=INDICES)
+            corners += [(first + corner,) for corner in (a, b, c, a, c, d)]
+    part.add("f", places, target=VERTICES, min=[single(-THICK)] * 3, max=[1.0] * 3)
+    part.add("B", [colour for colour in COLOURS for _ in range(8)], target=VERTICES, normalized=True)
+    part.add("H", corners, target=INDICES)
 
 
 def _nodes(scene: FrameScene, poses: dict[str, Rigid], axis: float) -> tuple[list[dict[str, Any]], dict[str, int]]:
@@ -140,10 +130,10 @@ def _animation(scene: FrameScene, index: dict[str, int], part: BinaryPart) -> di
         if not drawn or not all(can_be_drawn(sample[:3]) for _, _, sample in track.walk()):
             continue
         seconds, places, rotations = _keys(track, first_ns)
-        times = part.floats([*zip(seconds, strict=True)], "SCALAR", min=[seconds[0]], max=[seconds[-1]])
-        for path, rows, kind in (("translation", places, "VEC3"), ("rotation", rotations, "VEC4")):
+        times = part.add("f", [*zip(seconds, strict=True)], min=[seconds[0]], max=[seconds[-1]])
+        for path, rows in (("translation", places), ("rotation", rotations)):
             channels.append({"sampler": len(samplers), "target": {"node": index[name], "path": path}})
-            samplers.append({"input": times, "output": part.floats(rows, kind), "interpolation": "LINEAR"})
+            samplers.append({"input": times, "output": part.add("f", rows), "interpolation": "LINEAR"})
     return {"name": "samples", "channels": channels, "samplers": samplers} if channels else None
 
 
@@ -167,8 +157,6 @@ def _keys(track: MovingTrack, first_ns: int) -> tuple[list[float], list[Sequence
 
 SCRIPTS = ("begin", "kernels", "frames", "state", "camera", "picture", "labels", "panel", "hands")
 EXTRAS = ("joints", "solids")  # where the page has some
-EACH = 8  # bytes of a number
-BLOCK = 1 << 13  # samples
 PACKED = 48_000  # bytes of numbers, from where on they are compressed
 NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -184,7 +172,8 @@ def write_page(
     other, other_title: another tree in the same frame, drawn over this one, and its name.
     sliders: add one for each joint of a robot.  solids: of robots; a mesh is drawn as a box.
     """
-    head = _head(scene) | {"title": title, "file": file or title, "made": f"frametool {__version__}"}
+    head, blob = _data(scene)
+    head |= {"title": title, "file": file or title, "made": f"frametool {__version__}"}
     head["show"] = _shown(scene, eye)
     joints = joint_sliders(scene) if sliders else {}
     if joints.get("joints"):
@@ -195,9 +184,8 @@ def write_page(
         here = {name: number for number, name in enumerate(scene.names)}
         poses = {here[name]: pose for name, pose in other.poses().items() if name in here}
         head["overlay"] = {"title": other_title, "poses": poses}
-    blob = b"".join(_blob(scene))
-    if head["packed"]:
-        blob = compress(blob)
+    if len(blob) > PACKED:
+        blob, head["packed"] = compress(blob), True
     scripts = " ".join(f"{name}.js" for name in (*SCRIPTS, *(each for each in EXTRAS if each in head), "main"))
     held = {"head-data": dumps(head, separators=(",", ":")), "blob": dumps(b64encode(blob).decode())}
     return write_html(title, page_file("page.html"), style="page.css", script=scripts, data=held)
@@ -214,37 +202,26 @@ def _shown(scene: FrameScene, eye: tuple[float, float] | None) -> dict[str, Any]
     return shown | ({"view": eye} if eye else {})
 
 
-def _head(scene: FrameScene) -> dict[str, Any]:
-    """Return names, parents and the offset of each track in the blob."""
+def _data(scene: FrameScene) -> tuple[dict[str, Any], bytes]:
+    """Return names and parents, and the static poses, followed by the stamps and poses of each track, as bytes."""
     index = {name: number for number, name in enumerate(scene.names)}
-    static = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
-    parents = [-1 if track is None else index[track.parent] for track in static]
+    static = [None if name in scene.tracks else scene.tree.track(name) for name in scene.names]
+    blob = bytearray(_packed("d", chain.from_iterable(track.components if track else NO_POSE for track in static)))
     tracks: list[dict[str, Any]] = []
-    at = EACH * len(NO_POSE) * len(parents)
-    for name, moving in scene.tracks.items():
-        parents_then = [index[parent] for _, parent, _ in moving.walk()] if moving.varies else index[moving.parent]
-        tracks.append({"frame": index[name], "count": moving.count, "at": at, "parents": parents_then})
-        at += EACH * (1 + len(NO_POSE)) * moving.count
+    for name, track in scene.tracks.items():
+        stamps, above, poses = zip(*track.walk(), strict=True)
+        parents = [index[parent] for parent in above] if track.varies else index[track.parent]
+        tracks.append({"frame": index[name], "count": len(stamps), "at": len(blob), "parents": parents})
+        blob += _packed("q", stamps) + _packed("d", chain.from_iterable(poses))
     first, last = map(str, scene.span_ns)
-    head = {"names": scene.names, "parents": parents, "tracks": tracks, "first": first, "last": last}
-    return head | {"packed": at > PACKED}
+    parents_of = [-1 if track is None else index[track.parent] for track in static]
+    return {"names": scene.names, "parents": parents_of, "tracks": tracks, "first": first, "last": last}, bytes(blob)
 
 
-def _blob(scene: FrameScene) -> Iterator[bytes]:
-    """Yield the static poses, then the stamps and samples of each track."""
-    static = (None if name in scene.tracks else scene.tree.track(name) for name in scene.names)
-    yield _little(array("d", chain.from_iterable(track.components if track else NO_POSE for track in static)))
-    for moving in scene.tracks.values():
-        yield _little(array("q", (stamp for stamp, _, _ in moving.walk())))
-        samples = moving.walk()
-        while some := array("d", chain.from_iterable(each for _, _, each in islice(samples, BLOCK))):
-            yield _little(some)
-
-
-def _little(numbers: array[Any]) -> bytes:
-    if sys.byteorder == "big":
-        numbers.byteswap()
-    return numbers.tobytes()
+def _packed(letter: str, numbers: Iterable[float]) -> bytes:
+    """Return numbers of a type of the module struct as bytes, little-endian."""
+    found = [*numbers]
+    return struct.pack(f"<{len(found)}{letter}", *found)
 
 
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
@@ -281,20 +258,20 @@ MESH_PART = 0.35  # of the usual distance between frames is the least edge of a 
 def _drawn_solids(scene: FrameScene, solids: Sequence[Solid]) -> dict[str, Any]:
     """Return the solids of known frames; a mesh becomes a box around the child frames of its frame."""
     index = {name: number for number, name in enumerate(scene.names)}
-    places: dict[str, list[Sequence[float]]] = {name: [NO_POSE] for name in scene.names}
+    ends = {name: [NO_POSE[:3]] for name in scene.names}  # of the links that begin at a frame
     for track in scene.tree.tracks():
-        places[track.parent].append(track.components)
-    lengths = sorted(filter(None, (math.dist(NO_POSE[:3], each[:3]) for held in places.values() for each in held)))
+        ends[track.parent].append(track.components[:3])
+    lengths = sorted(filter(None, (math.hypot(*end) for held in ends.values() for end in held)))
     least = MESH_PART * (lengths[len(lengths) // 2] if lengths else 1.0)
     found = []
     for each in solids:
         drawn = each
-        if each.kind == "mesh" and each.frame in index:
-            ends = [(min(column), max(column)) for column in zip(*(at[:3] for at in places[each.frame]), strict=True)]
-            x, y, z = ((low + high) / 2.0 for low, high in ends)
-            size = tuple(max(high - low, least) for low, high in ends)
-            drawn = each._replace(kind="box", size=size, pose=(x, y, z, *NO_POSE[3:]))
         if each.frame in index:
+            if each.kind == "mesh":
+                low, high = ([of(column) for column in zip(*ends[each.frame], strict=True)] for of in (min, max))
+                x, y, z = ((a + b) / 2.0 for a, b in zip(low, high, strict=True))
+                size = tuple(max(b - a, least) for a, b in zip(low, high, strict=True))
+                drawn = each._replace(kind="box", size=size, pose=(x, y, z, *NO_POSE[3:]))
             found.append(drawn._asdict() | {"frame": index[each.frame]})
     return {"solids": found, "meshes": sum(each.kind == "mesh" for each in solids)}
 

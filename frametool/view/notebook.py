@@ -16,7 +16,7 @@ def html_of(value: Any) -> str | None:
         from frametool.view.scene import FrameScene
 
         # a picture of its own, for the style of an SVG element would count in the whole notebook
-        svg = b64encode(write_svg(still_picture(FrameScene(value), title=value.name).picture).encode()).decode()
+        svg = b64encode(write_svg(still_picture(FrameScene(value), title=value.name)).encode()).decode()
         return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
     if hasattr(value, "as_dict"):
         from frametool.view.fit_text import write_comparison

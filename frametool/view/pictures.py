@@ -131,6 +131,7 @@ class Picture(NamedTuple):
     title: str = ""
     corner: tuple[float, float] = (0.0, 0.0)
     decimals: int = 1
+    notes: Sequence[str] = ()
 
 
 FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="12" dominant-baseline="central" role="img"'
@@ -208,13 +209,13 @@ def _digest(text: str) -> str:
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
-def write_picture(picture: Picture, suffix: str, more: str = "") -> str | bytes:
-    """Return a picture as .png, .svg or .html; more: HTML below the picture."""
+def write_picture(picture: Picture, suffix: str) -> str | bytes:
+    """Return a picture as .png, .svg or .html."""
     if suffix == ".png":
         return write_png(picture)
     if suffix == ".svg":
         return write_svg(picture)
-    return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n{more}</main>\n")
+    return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n</main>\n")
 
 
 def _element(shape: Shape, decimals: int) -> str:
@@ -358,18 +359,10 @@ CORNER = 46.0  # pixels from the corner to the little axes
 AXES = ("x", "y", "z")
 
 
-class StillPicture(NamedTuple):
-    """The picture, the number of names without room, and the number of frames crowded in one small spot."""
-
-    picture: Picture
-    hidden: int
-    crowded: int
-
-
 def still_picture(
     scene: FrameScene, eye: tuple[float, float] = SLANTED, title: str = "", other: FrameScene | None = None,
-) -> StillPicture:  # fmt: skip
-    """Draw a scene from a direction: azimuth and elevation in radians.
+) -> Picture:  # fmt: skip
+    """Draw a scene from a direction, azimuth and elevation in radians; its notes say what it does not show.
 
     other: another tree in the same frame; its frames with the same names are drawn faintly.
     """
@@ -394,7 +387,10 @@ def still_picture(
     for label in labels.placed:
         shapes += _label(label)
     shapes += [*_corner(flat), *_scale(flat, step)]
-    return StillPicture(Picture(WIDTH, HEIGHT, shapes, title), labels.hidden, flat.crowded())
+    crowded, hidden = flat.crowded(), labels.hidden
+    notes = [f"{crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part"] * bool(crowded)
+    notes += [f"{hidden} names found no place"] * bool(hidden)
+    return Picture(WIDTH, HEIGHT, shapes, title, notes=notes)
 
 
 def _frame(flat: Projection, name: str) -> Iterator[Shape]:

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
-from xml.sax.saxutils import escape
 
-from frametool.errors import printable
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
 from frametool.view.charts import Area, Chart, ChartLine
 from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from frametool.sim.scene import Scene
     from frametool.sim.simulate import SimulationStep
@@ -22,13 +20,11 @@ if TYPE_CHECKING:
     from frametool.view.pictures import Shape
 
     Point = tuple[float, float]
-    Curve = tuple[str, str, Sequence[float], Sequence[float]]
 
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names
 COLOURS = ("#f4d35e", "#ee964b", "#7bdff2", "#b2f7ef", "#f7a1c4", "#c3f584", "#d0bdf4", "#ffffff")
 
-SHORT = 0.05  # metres, two pixels
-FLAT = 1e-6  # metres; small, because the points left out before are not looked at again
+SHORT = 0.02  # metres: a pixel
 
 
 class Stroke(NamedTuple):
@@ -94,25 +90,8 @@ class Drawing:
             stroke = self._current[name] = Stroke(name, pen, begin)
             if not pen.off:
                 self.strokes.append(stroke)
-        _extend(stroke.points, (x, y))
-
-
-def _extend(points: list[Point], place: Point) -> None:
-    """Extend a line; a point on a straight segment is dropped."""
-    if len(points) > 1 and _is_straight(points[-2], points[-1], place):
-        points[-1] = place
-    elif not points or points[-1] != place:
-        points.append(place)
-
-
-def _is_straight(begin: Point, middle: Point, end: Point) -> bool:
-    """Return True if the middle lies between both ends, invisibly near to the line through them."""
-    ahead_x, ahead_y = middle[0] - begin[0], middle[1] - begin[1]
-    on_x, on_y = end[0] - middle[0], end[1] - middle[1]
-    if ahead_x * on_x + ahead_y * on_y <= 0.0:
-        return False
-    length = math.hypot(ahead_x + on_x, ahead_y + on_y)
-    return length < SHORT or abs(ahead_x * on_y - ahead_y * on_x) < FLAT * length
+        if not stroke.points or math.dist(stroke.points[-1], (x, y)) > SHORT:
+            stroke.points.append((x, y))
 
 
 WINDOW = 500.0  # pixels, as turtlesim's
@@ -147,18 +126,6 @@ def run_picture(drawing: Drawing) -> Picture:
         names = ("time (s)" * (title == PANELS[-1]), title)
         shapes += Chart(area, (0.0, end), (min(known), max(known)), names).drawn(curves)
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
-
-
-def last_commands(drawing: Drawing) -> str:
-    """Return an HTML table of each follower's last values."""
-    rows = "".join(
-        f"<tr><th>{escape(printable(name))}</th><td>{curve.times[-1]:g}</td><td>{curve.distance[-1]:.4f}</td>"
-        f"<td>{curve.linear[-1]:.4f}</td><td>{curve.angular[-1]:.4f}</td></tr>\n"
-        for name, curve in drawing.curves.items()
-        if curve.times
-    )
-    head = "".join(f"<th>{title}</th>" for title in ("follower", "t (s)", *PANELS))
-    return f"<table>\n<tr>{head}</tr>\n{rows}</table>\n" if rows else ""
 
 
 def _place(x: float, y: float) -> tuple[float, float]:

@@ -149,11 +149,9 @@ def _content(
     from frametool.view.pictures import still_picture, write_picture
 
     still = still_picture(scene, eye, title, before)
-    if still.crowded:
-        say(f"note: {still.crowded} of {len(scene.names)} frames lie in a small spot; --below FRAME shows a part")
-    if still.hidden:
-        say(f"note: {still.hidden} names found no place")
-    return write_picture(still.picture, f".{fmt}")
+    for note in still.notes:
+        say(f"note: {note}")
+    return write_picture(still, f".{fmt}")
 
 
 def _solids(tree: str) -> list[Solid]:
