@@ -98,7 +98,7 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
     rates, gaps, delays = (
         [entry[key] for entry in entries if entry[key] is not None] for key in ("rate_hz", "gap_s", "delay_max_s")
     )
-    return {
+    return dict.fromkeys(entries[0]) | {
         "kind": "chain",
         "parent": target,
         "child": source,
@@ -107,10 +107,7 @@ def chain_entry(target: str, source: str, logs: Sequence[EdgeLog]) -> dict[str, 
         "first_ns": first,
         "last_ns": last,
         "gap_s": max(gaps, default=None),
-        "gap_until_ns": None,
-        "delay_mean_s": None,
         "delay_max_s": max(delays, default=None),
-        **dict.fromkeys(("length_m", "duration_s", "speed_mean", "speed_max", "gaps")),
         "jumps": sum(entry["jumps"] for entry in entries),
         "backward": sum(entry["backward"] for entry in entries),
         "parents": " <- ".join(frames_on(target, source, logs)),

@@ -18,7 +18,7 @@ from frametool.geometry.transform import NEAR_BY
 from frametool.text.numbers import parse_length, read_number_or_angle
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
     from frametool.frames.lookups import Frames
     from frametool.frames.track import MovingTrack
@@ -132,23 +132,16 @@ class Difference(NamedTuple):
     @property
     def sentence(self) -> str:
         """Return it as one line."""
-        name, note = shown(self.frame), f": {self.note}" if self.note else ""
-        parents = (self.parent_a, self.parent_b)
-        at_a, at_b = ("a root" if parent is None else f"under {shown(parent)}" for parent in parents)
-        seen = f"seen from {shown(self.seen_from)} it moved {self.seen}" if self.seen else ""
-        match self.kind:
-            case "only-in-a":
-                return f"{name}, {at_a}, is only in A{note}"
-            case "only-in-b":
-                return f"{name}, {at_b}, is only in B{note}"
-            case "parent":
-                return "; ".join(filter(None, (f"{name} is {at_a} in A, {at_b} in B", seen, self.note)))
-            case "moved" | "same":
-                own = f"{name} moved {self.own or 'nowhere'} in {shown(self.parent_a)}" if self.parent_a else name
-                return "; ".join(filter(None, (own, seen, self.note)))
-            case "samples":
-                return f"{name} moves otherwise{f' by up to {self.own}' if self.own else ''}{note}"
-        return f"{name}{note}"
+        name = shown(self.frame)
+        at_a, at_b = ("a root" if each is None else f"under {shown(each)}" for each in (self.parent_a, self.parent_b))
+        moved = f" moved {self.own or 'nowhere'} in {shown(self.parent_a)}" if self.parent_a else ""
+        text = {
+            "only-in-a": f", {at_a}, is only in A", "only-in-b": f", {at_b}, is only in B",
+            "parent": f" is {at_a} in A, {at_b} in B", "camera": " has other intrinsics", "moved": moved, SAME: moved,
+            "samples": f" moves otherwise{f' by up to {self.own}' if self.own else ''}",
+        }.get(self.kind, "")  # fmt: skip
+        seen = f"; seen from {shown(self.seen_from)} it moved {self.seen}" if self.seen and text else ""
+        return f"{name}{text}{seen}{f': {self.note}' if self.note else ''}"
 
 
 def entry(each: Difference) -> dict[str, Any]:
@@ -261,36 +254,10 @@ class _Pair:
     def only(self) -> Iterator[Difference]:
         """Yield the frames that are only in one tree."""
         in_a, in_b = frozenset(self.a.tree.frames), frozenset(self.b.tree.frames)
-        gone = [frame for frame in self.a.tree.frames if frame not in in_b]
-        new = [frame for frame in self.b.tree.frames if frame not in in_a]
-        renamed = self._renamed(gone, new)
-        notes = {frame: f"renamed to {shown(after)}? it has the same pose" for frame, after in renamed.items()}
-        for frame in gone:
-            yield Difference("only-in-a", frame, self.a.parent(frame), None, note=notes.get(frame, ""))
-        notes = {after: f"renamed from {shown(frame)}? it has the same pose" for frame, after in renamed.items()}
-        for frame in new:
-            yield Difference("only-in-b", frame, None, self.b.parent(frame), note=notes.get(frame, ""))
-
-    def _renamed(self, gone: Sequence[str], new: Sequence[str]) -> dict[str, str]:
-        """Find the frames of A that have another name in B: the only pair with the same pose in one parent."""
-        by_parent: dict[str, tuple[list[str], list[str]]] = {}
-        for side, frames, at in ((self.a, gone, 0), (self.b, new, 1)):
-            for frame in frames:
-                if parent := side.parent(frame):
-                    by_parent.setdefault(parent, ([], []))[at].append(frame)
-        found: dict[str, str] = {}
-        for old, fresh in by_parent.values():
-            if len(old) * len(fresh) > MOST_PAIRS:
-                continue
-            pairs = [
-                (frame, each)
-                for frame in old
-                for each in fresh
-                if self.tolerance.covers(_apart(self.a.edges[frame][1], self.b.edges[each][1]))
-            ]
-            froms, tos = ([pair[at] for pair in pairs] for at in (0, 1))
-            found.update(pair for pair in pairs if froms.count(pair[0]) == tos.count(pair[1]) == 1)
-        return found
+        for frame in (each for each in self.a.tree.frames if each not in in_b):
+            yield Difference("only-in-a", frame, self.a.parent(frame), None)
+        for frame in (each for each in self.b.tree.frames if each not in in_a):
+            yield Difference("only-in-b", frame, None, self.b.parent(frame))
 
     def about(self, frame: str) -> Iterator[Difference]:
         """Yield the differences of a common frame; `same` if there are none."""
@@ -355,9 +322,6 @@ class _Pair:
         if at_ns is None or self.tolerance.covers(farthest):
             return None
         return found._replace(own=farthest, note=f"farthest at {format_stamp(at_ns)}")
-
-
-MOST_PAIRS = 10_000  # of frames below one parent that are compared
 
 
 def _apart(a: Rigid, b: Rigid) -> Apart:

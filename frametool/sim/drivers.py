@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid, shown
@@ -16,7 +17,7 @@ from frametool.geometry.transform import Transform
 from frametool.sim.turtle import PI, SIZE, TICK_NS, TurtlePose, Twist, wrapped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Generator, Iterable, Iterator
 
     MakeLeader = Callable[[], "Leader"]
     TimedTwist = tuple[int, Twist]
@@ -241,31 +242,30 @@ def figure_eight(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001
     return Twist(CIRCLING.linear_x, -CIRCLING.angular_z if turns % 2 else CIRCLING.angular_z)
 
 
-class Square:
-    """turtlesim's draw_square: 2 m sides at 1 m/s, quarter turns at 0.4 rad/s, a full stop after each.
+def square() -> Generator[Twist, TurtlePose, None]:
+    """Drive 2 m sides at 1 m/s, quarter turns at 0.4 rad/s, and a full stop after each, as turtlesim's draw_square.
 
     Source: turtlesim's tutorials/draw_square.cpp.
     """
+    stop = Twist(0.0, 0.0)
+    pose = yield stop
+    goal = _ahead(pose)
+    for goes in cycle((True, False)):
+        while not (
+            max(abs(pose.x - goal.x), abs(pose.y - goal.y)) < 0.1 and abs(wrapped(pose.theta - goal.theta)) < 0.01
+        ):
+            pose = yield Twist(1.0, 0.0) if goes else Twist(0.0, 0.4)
+        pose = yield stop
+        while pose.linear_velocity >= STILL or abs(pose.angular_velocity) >= STILL:
+            pose = yield stop
+        goal = pose._replace(theta=wrapped(pose.theta + PI / 2.0)) if goes else _ahead(pose)
+        pose = yield stop
 
-    def __init__(self) -> None:
-        """Create the driver at the start of the first side."""
-        self._moves = True
-        self._stopping = True
-        self._goal: TurtlePose | None = None
 
-    def drive(self, now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG002
-        """Drive or rotate until the goal is reached, then stop, then take the next goal."""
-        if self._goal is None:
-            self._goal, self._stopping = _ahead(pose), False
-        elif self._stopping and pose.linear_velocity < STILL and abs(pose.angular_velocity) < STILL:
-            self._moves, self._stopping = not self._moves, False
-            self._goal = _ahead(pose) if self._moves else pose._replace(theta=wrapped(pose.theta + PI / 2.0))
-            return Twist(0.0, 0.0)
-        near = abs(pose.x - self._goal.x) < 0.1 and abs(pose.y - self._goal.y) < 0.1
-        if self._stopping or (near and abs(wrapped(pose.theta - self._goal.theta)) < 0.01):
-            self._stopping = True
-            return Twist(0.0, 0.0)
-        return Twist(1.0, 0.0) if self._moves else Twist(0.0, 0.4)
+def _square_driver() -> Callable[[int, TurtlePose], Twist]:
+    drive = square()
+    next(drive)
+    return lambda _, pose: drive.send(pose)
 
 
 MARGIN = 1.0  # metres to the walls
@@ -298,7 +298,7 @@ def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
 LEADERS: dict[str, Callable[[int], Leader]] = {
     "still": lambda _: Script(()),
     "circle": lambda _: Periodic(BILLION // 2, lambda *_: CIRCLING),
-    "square": lambda _: Periodic(TICK_NS, Square().drive),
+    "square": lambda _: Periodic(TICK_NS, _square_driver()),
     "figure8": lambda _: Periodic(TICK_NS, figure_eight),
     "random": lambda seed: Periodic(BILLION // 10, wanderer(seed)),
 }

@@ -13,10 +13,13 @@ from __future__ import annotations
 import re
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
+from frametool.documents.chunks import Piece, counted_from
+from frametool.documents.chunks import lines as pieces_of_lines
 from frametool.documents.document import format_error, parse_documents
-from frametool.documents.source import Source, decode, error_at
+from frametool.documents.source import Source, error_at
 from frametool.errors import FormatError, ValueInvalid, alternatives, shown
 from frametool.formats.detect import detect
 from frametool.formats.rows.csv import split_line
@@ -39,7 +42,6 @@ if TYPE_CHECKING:
     NumberedLines = Iterator[tuple[int, str]]
     Value = TypeVar("Value")
 
-LONGEST_INTEGER = 30  # digits
 FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
@@ -96,14 +98,8 @@ def _time(text: str) -> int:
     return stamp_ns
 
 
-def _boolean(text: str) -> bool:
-    if text not in FLAGS:
-        raise ValueInvalid(f"expected true or false, found {shown(text)}")
-    return text == "true"
-
-
 def _integer(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) <= LONGEST_INTEGER):
+    if not re.fullmatch(r"[0-9]{1,30}", text):
         raise ValueInvalid(f"expected a whole number, found {shown(text)}")
     return int(text)
 
@@ -123,7 +119,7 @@ read_time = text_reader(_time, "a time in seconds")
 read_duration = text_reader(
     lambda text: None if text in ("inf", ".inf") else _time(text), "a duration in seconds, or inf"
 )
-read_boolean = text_reader(_boolean, "true or false")
+read_boolean = one_of(FLAGS)
 read_flag = text_reader(lambda text: parse_number(FLAGS.get(text, text)), "true or false")
 read_integer = text_reader(_integer, "a whole number")
 
@@ -161,40 +157,6 @@ EXPECTED = f"a command is {COMMAND}"
 _WORD = re.compile(r"[A-Za-z_]+\s*").fullmatch
 
 
-class CommandText(NamedTuple):
-    """A piece of the input that is read at once, and the number of its first line: a document, a word, a row of CSV.
-
-    columns: the names of the cells of a row of CSV, "" for ignored ones
-    """
-
-    source: Source
-    line: int
-    columns: Sequence[str] | None = None
-
-    def values(self) -> list[tuple[Path, Any]]:
-        """Return its values, each with its path; a row of CSV is a mapping."""
-        text = self.source.text
-        if self.columns is not None:
-            cells = split_line(text)
-            if len(cells) != len(self.columns):
-                raise Misfit(f"expected {len(self.columns)} cells, found {len(cells)}")
-            return [((), {name: cell.text for name, cell in zip(self.columns, cells, strict=True) if name})]
-        if _WORD(text):
-            return [((0,), text.strip())]
-        return [((document.index,), document.value) for document in parse_documents(text, self.source.name)]
-
-    def error(self, message: str, path: Path = (), *, key: bool = False) -> FormatError:
-        """Return the error for a place in it: a path in a document, or the name or number of a column."""
-        if self.columns is None:
-            error = format_error(self.source, path, message, key=key)
-        else:
-            first = path[0] if path else 0
-            index = first if isinstance(first, int) else self.columns.index(first)
-            error = error_at(self.source, split_line(self.source.text)[index].column - 1, message)
-        error.line += self.line - 1
-        return error
-
-
 def read_script(source: Source) -> list[TimedTwist]:
     """Read a whole leader file: nanoseconds and commands in order; at least one.
 
@@ -209,17 +171,42 @@ def read_script(source: Source) -> list[TimedTwist]:
 def read_commands(lines: Iterable[str], name: str, *, period_ns: int = BILLION) -> Iterator[TimedTwist]:
     """Read commands from lines as they arrive, one document in memory at a time; otherwise as `read_script`."""
     last_ns: int | None = None
-    for piece in _pieces(lines, name):
-        try:
-            for path, value in piece.values():
-                for t_ns, twist in timed_commands(value, path, last_ns, period_ns):
-                    yield t_ns, twist
-                    last_ns = t_ns
-        except Misfit as misfit:
-            raise piece.error(str(misfit), misfit.path, key=misfit.key) from None
-        except FormatError as error:
-            error.line += piece.line - 1
-            raise
+    columns: Sequence[str] | None = None
+    for piece, is_row in _pieces(lines):
+        source = Source(name, piece.text)
+        with counted_from(piece.line):
+            try:
+                if is_row and columns is None:
+                    columns = _columns(source.text)
+                    continue
+                for path, value in _values(source, columns):
+                    for t_ns, twist in timed_commands(value, path, last_ns, period_ns):
+                        yield t_ns, twist
+                        last_ns = t_ns
+            except Misfit as misfit:
+                raise _placed(misfit, source, is_row, columns or ()) from None
+
+
+def _values(source: Source, columns: Sequence[str] | None) -> Iterator[tuple[Path, Any]]:
+    """Yield the values of a piece of the input, each with its path; a row of CSV is a mapping."""
+    if columns is not None:
+        cells = split_line(source.text)
+        if len(cells) != len(columns):
+            raise Misfit(f"expected {len(columns)} cells, found {len(cells)}")
+        yield (), {name: cell.text for name, cell in zip(columns, cells, strict=True) if name}
+    elif _WORD(source.text):
+        yield (0,), source.text.strip()
+    else:
+        yield from (((document.index,), document.value) for document in parse_documents(source.text, source.name))
+
+
+def _placed(misfit: Misfit, source: Source, is_row: bool, columns: Sequence[str]) -> FormatError:  # noqa: FBT001
+    """Return an error with its place: of a path in a document, or of the name or number of a column in a row."""
+    if not is_row:
+        return format_error(source, misfit.path, str(misfit), key=misfit.key)
+    first = misfit.path[0] if misfit.path else 0
+    cell = split_line(source.text)[first if isinstance(first, int) else columns.index(first)]
+    return error_at(source, cell.column - 1, str(misfit))
 
 
 def timed_commands(
@@ -240,30 +227,30 @@ def timed_commands(
         yield stamp_ns, twist
 
 
-def _pieces(lines: Iterable[str], name: str) -> Iterator[CommandText]:
-    """Split lines into pieces that can be read one by one; the first line with data distinguishes CSV from the rest."""
+def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
+    """Split lines into pieces that can be read one by one, and yield whether each is a row of CSV, header included.
+
+    The first line with data distinguishes CSV from documents and words.
+    """
     numbered = enumerate((_without_noise(line.rstrip("\r\n")) for line in lines), 1)
     for number, text in numbered:
-        if not _says_something(text):
-            continue
-        if detect(text.encode(), "rows", "records", otherwise="yaml")[0] == "csv":
-            yield from _rows(numbered, name, _columns(CommandText(Source(name, text), number, ())))
-        else:
-            yield from _documents(chain(((number, text),), numbered), name)
-
-
-def _rows(numbered: NumberedLines, name: str, columns: Sequence[str]) -> Iterator[CommandText]:
-    """Yield the rows of CSV; a quoted cell may contain a line end."""
-    for number, text in numbered:
-        lines, quotes = [text], text.count('"')
-        while quotes % 2 and (more := next(numbered, None)):
-            lines.append(more[1])
-            quotes += more[1].count('"')
         if _says_something(text):
-            yield CommandText(Source(name, "\n".join(lines)), number, columns)
+            is_table = detect(text.encode(), "rows", "records", otherwise="yaml")[0] == "csv"
+            pieces = (_rows if is_table else _documents)(chain(((number, text),), numbered))
+            yield from ((piece, is_table) for piece in pieces)
 
 
-def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
+def _rows(numbered: NumberedLines) -> Iterator[Piece]:
+    """Yield the rows of CSV; a quoted cell may contain a line end."""
+    for number, line in numbered:
+        text = line
+        while text.count('"') % 2 and (more := next(numbered, None)):
+            text = f"{text}\n{more[1]}"
+        if _says_something(text):
+            yield Piece(text, number)
+
+
+def _documents(numbered: NumberedLines) -> Iterator[Piece]:
     """Yield documents, each when the line that ends it has arrived, and single-line documents at once."""
     pending: list[str] = []
     number = 0
@@ -271,14 +258,14 @@ def _documents(numbered: NumberedLines, name: str) -> Iterator[CommandText]:
         alone = _WORD(text) is not None or (text.startswith("{") and text.rstrip().endswith("}"))
         if alone or text.startswith(("---", "...")):
             if any(map(str.strip, pending)):
-                yield CommandText(Source(name, "\n".join(pending)), number - len(pending))
+                yield Piece("\n".join(pending), number - len(pending))
             pending.clear()
             if alone:
-                yield CommandText(Source(name, text), number)
+                yield Piece(text, number)
         elif pending or _says_something(text):
             pending.append(text)
     if pending:
-        yield CommandText(Source(name, "\n".join(pending)), number - len(pending) + 1)
+        yield Piece("\n".join(pending), number - len(pending) + 1)
 
 
 def _says_something(line: str) -> bool:
@@ -291,23 +278,23 @@ def _without_noise(text: str) -> str:
     return text if NOISE(text) is None else "---" if text.endswith("---") else ""
 
 
-def _columns(header: CommandText) -> list[str]:
+def _columns(header: str) -> list[str]:
     """Return the columns of CSV by their content; "" for ignored ones."""
-    names = [cell.text for cell in split_line(header.source.text)]
+    names = [cell.text for cell in split_line(header)]
     columns = [COLUMNS.get(name, "") for name in names]
     if missing := [name for name in NEEDED if name not in columns]:
-        raise header.error(f"no column {', '.join(missing)}; columns: {', '.join(names)}")
+        raise Misfit(f"no column {', '.join(missing)}; columns: {', '.join(names)}")
     for index, (name, column) in enumerate(zip(names, columns, strict=True)):
         if column and columns.index(column) < index:
-            raise header.error(f"two columns for {column}", (index,))
+            raise Misfit(f"two columns for {column}", (index,))
         if not column and name not in RECORDED:
-            raise header.error(f"unknown column {shown(name)}{alternatives(name, COLUMNS, 'columns')}", (index,))
+            raise Misfit(f"unknown column {shown(name)}{alternatives(name, COLUMNS, 'columns')}", (index,))
     return columns
 
 
 def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]:
     """Read one command, or a list of them: nanoseconds or None, the command, and the place of its time."""
-    if type(value) is list and not (value and all(type(item) is str for item in value)):
+    if type(value) is list:
         for index, item in enumerate(value):
             yield from _entries(item, (*path, index))
     else:
@@ -316,13 +303,7 @@ def _entries(value: Any, path: Path) -> Iterator[tuple[int | None, Twist, Path]]
 
 
 def _entry(value: Any) -> tuple[int | None, Twist]:
-    """Read {t, linear, angular, linear_y}, a Twist message, [t, linear, angular], or the name of an arrow key."""
-    if type(value) is list:
-        if len(value) != len(NEEDED):
-            raise Misfit(f"expected [{', '.join(NEEDED)}], found {len(value)} items")
-        readers = (read_stamp, read_number, read_number)
-        t, linear, angular = (within((index,), read, value[index]) for index, read in enumerate(readers))
-        return t, Twist(linear, angular)
+    """Read {t, linear, angular, linear_y}, a Twist message, or the name of an arrow key."""
     if type(value) is str and _WORD(value):
         if value.lower() not in KEYS:
             raise Misfit(f"unknown key {shown(value)}{alternatives(value, KEYS, 'keys')}")
@@ -347,23 +328,10 @@ def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
 
 
 def lines_as_they_come(stream: Any, name: str) -> Iterator[str]:
-    """Yield the lines of a stream as they arrive; raises FormatError for bytes that are not text."""
-    for number, data in enumerate(_lines(stream.raw)):
-        try:
-            yield decode(data, name)
-        except FormatError as error:
-            error.line += number
-            raise
+    """Yield the lines of a stream as they arrive; raises FormatError for bytes that are not text.
 
-
-def _lines(stream: Any) -> Iterator[bytes]:
-    """Read lines past the buffer of standard input: Python aborts when it ends while a thread waits inside that."""
-    begun: list[bytes] = []
-    while block := stream.read(1 << 16):
-        *whole, rest = block.split(b"\n")
-        for end in whole:
-            yield b"".join((*begun, end, b"\n"))
-            begun = []
-        begun.append(rest)
-    if any(begun):
-        yield b"".join(begun)
+    They are read past the buffer of standard input: Python aborts when it ends while a thread waits inside that.
+    """
+    unbuffered: Any = SimpleNamespace(read1=stream.raw.read)
+    for piece in pieces_of_lines(unbuffered, name):
+        yield from piece.text.splitlines()

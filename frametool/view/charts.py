@@ -93,7 +93,7 @@ class Chart:
 
 
 def legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:
-    """Draw a right-aligned legend on one line, each name after a sample of its line; dashed lines only if it is long."""
+    """Draw a right-aligned legend on one line, each name after its line; of a long one only dashed lines."""
     named = [line for line in lines if line.name]
     if sum(text_width(line.name) + 33.0 for line in named) > right - left:
         named = [line for line in named if line.dashes]

@@ -14,6 +14,7 @@ from frametool.frames.edge_log import motion
 from frametool.frames.stamps import format_stamp
 from frametool.geometry.transform import Transform
 from frametool.grammar.result import edge_label
+from frametool.lint.tree_diff import SAME
 from frametool.view.pose_text import WIDTH, in_width, largest_sigmas
 
 if TYPE_CHECKING:
@@ -60,12 +61,12 @@ def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> list[str]:
 
 def folded(text: str, indent: str = "  ") -> Iterator[str]:
     """Wrap a text by display width, with a hanging indent."""
-    line = indent[:-1]
+    line = indent
     for word in (short(word, WIDTH - len(indent) - 2) for word in text.split(" ")):
         if cells(line) + cells(word) >= WIDTH and line.strip():
             yield line
-            line = f"{indent} "
-        line += f" {word}"
+            line = f"{indent}  "
+        line += f" {word}" if line.strip("│ ") else word
     yield line
 
 
@@ -178,39 +179,17 @@ def _chain(entry: dict[str, Any]) -> str:
     return in_width(f"{entry['parents']}:", sentence)
 
 
-def write_diff(found: Iterable[Difference]) -> str:
-    """Return the differences grouped under headings."""
-    kinds: dict[str, list[Difference]] = {}
-    for each in found:
-        kinds.setdefault(each.kind, []).append(each)
-    moved = [*kinds.pop("moved", ()), *kinds.pop("same", ())]
-    parts = [f"{_HEADINGS[kind]}:\n{''.join(map(_said, alike))}" for kind, alike in kinds.items()]
-    starts = dict.fromkeys(each.seen_from for each in moved)
-    parts += (_table(start, [each for each in moved if each.seen_from == start]) for start in starts)
-    return "\n".join(parts)
-
-
-_HEADINGS = {"only-in-a": "only in A", "only-in-b": "only in B", "parent": "other parent", "motion": "stands or moves",
-             "no-data": "no data", "samples": "other samples", "camera": "other intrinsics"}  # fmt: skip
 LONGEST = 22  # characters of a heading over two columns
 
 
-def _said(each: Difference) -> str:
-    """Return the description of one frame's difference."""
-    text = short(each.frame, WIDTH - 4)
-    if each.kind in ("only-in-a", "only-in-b"):
-        parent = each.parent_a if each.kind == "only-in-a" else each.parent_b
-        text += f" in {short(parent, WIDTH - 8)}" if parent is not None else ", a root"
-    elif each.kind == "parent":
-        in_a, in_b = ("none" if name is None else short(name, WIDTH // 2) for name in (each.parent_a, each.parent_b))
-        text += f": {in_a} in A, {in_b} in B"
-    elif each.own:
-        text += f" by up to {each.own}"
-    text += f": {each.note}" if each.note else ""
-    lines = list(folded(text))
-    if each.kind == "parent" and each.seen:
-        lines.append(f"    moved {each.seen}, seen from {short(str(each.seen_from), WIDTH // 2 - 10)}")
-    return "".join(f"{line}\n" for line in lines)
+def write_diff(found: Iterable[Difference]) -> str:
+    """Return a sentence for each difference but motion, and tables of what has moved."""
+    every = [*found]
+    moved = [each for each in every if each.kind in ("moved", SAME)]
+    parts = ["".join(f"{line}\n" for each in every if each not in moved for line in folded(each.sentence, ""))]
+    starts = dict.fromkeys(each.seen_from for each in moved)
+    parts += (_table(start, [each for each in moved if each.seen_from == start]) for start in starts)
+    return "\n".join(filter(None, parts))
 
 
 def _table(start: str | None, found: Sequence[Difference]) -> str:

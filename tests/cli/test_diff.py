@@ -37,11 +37,11 @@ def test_the_same_tree_is_silent_and_0(run: Run) -> None:
     assert run("diff", "a.yaml", "a.yaml", files=FILES) == (0, "", "")
 
 
-def test_different_trees_are_1_and_told_in_parts(run: Run) -> None:
+def test_different_trees_are_1_and_told_in_sentences_and_a_table(run: Run) -> None:
     found = run("diff", "a.yaml", "b.yaml", files=FILES)
     assert (found.status, found.err) == (1, "")
     assert found.out == (
-        "only in A:\n  old in base\n\nonly in B:\n  new in base\n\n"
+        "'old', under 'base', is only in A\n'new', under 'base', is only in B\n\n"
         "moved             in its parent          seen from base\n"
         "                             mm     deg              mm     deg\n"
         "  camera in mast          2.000  0.0000           2.000  0.0000\n"
@@ -121,7 +121,7 @@ OWN = """frames: {base: {cam0: {xyz: [0, 0, 1], camera: {
 def test_intrinsics_that_differ_are_told_old_and_new(run: Run, text: str, old: str, new: str, told: str) -> None:
     files = {"a.yaml": text, "b.yaml": text.replace(old, new)}
     done = run("diff", "a.yaml", "b.yaml", files=files)
-    assert done == ((1, f"other intrinsics:\n  cam0: {told}\n", "") if told else (0, "", ""))
+    assert done == ((1, f"'cam0' has other intrinsics: {told}\n", "") if told else (0, "", ""))
     lines = run("diff", "a.yaml", "b.yaml", "-f", "json", files=files).out.splitlines()
     assert [json.loads(line)["note"] for line in lines] == [told] * bool(told)
 

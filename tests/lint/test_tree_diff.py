@@ -92,18 +92,6 @@ def test_frames_of_one_tree_only_are_told_with_their_parents() -> None:
     assert told["old"].note == told["new"].note == ""
 
 
-def test_a_frame_under_a_new_name_with_the_same_pose_is_asked_about() -> None:
-    same, pose = ("a", "b", turned(1)), turned(30, "x", (1, 0, 0))
-    told = found(tree_of(same, ("a", "camera", pose)), tree_of(same, ("a", "camera_link", pose)))
-    assert told["camera"].note == "renamed to 'camera_link'? it has the same pose"
-    assert told["camera_link"].note == "renamed from 'camera'? it has the same pose"
-
-
-def test_two_frames_that_could_be_the_same_one_renamed_are_not_guessed_at() -> None:
-    told = found(tree_of(("a", "x", turned(1))), tree_of(("a", "y", turned(1)), ("a", "z", turned(1))))
-    assert {each.note for each in told.values()} == {""}
-
-
 def test_one_robot_built_in_two_ways_is_compared_from_its_root() -> None:
     base_mast, mast_camera = turned(10, "z", (0, 0, 1)), turned(-20, "y", (0.1, 0, 0.2))
     a = tree_of(("base", "mast", base_mast), ("mast", "camera", mast_camera))
