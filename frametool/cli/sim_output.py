@@ -231,4 +231,4 @@ def _from_stdin(*, paced: bool) -> MakeLeader:
         return scripted(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin"))
     mailbox = Mailbox()
     mailbox.fill_from(read_commands(lines_as_they_come(sys.stdin.buffer, "stdin"), "stdin", period_ns=0))
-    return lambda: mailbox
+    return mailbox

@@ -1,15 +1,16 @@
 """Drivers of turtles: leaders, which move independently, and the follower's control law with its targets.
 
-A leader is called at `due_ns` with the pose of its turtle, returns a command or None, and sets the next `due_ns` (None:
-no more). The law maps the position of the target, relative to the turtle, to a velocity command.
+A leader yields the time at which it is to be resumed, in nanoseconds, and then its command, if there is one; `look`
+returns the pose of its turtle. The law maps the position of the target, relative to the turtle, to a velocity command.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections import deque
-from itertools import cycle
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from itertools import count, cycle
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import ValueInvalid, shown
 from frametool.frames.stamps import BILLION
@@ -19,8 +20,12 @@ from frametool.sim.turtle import PI, SIZE, TICK_NS, TurtlePose, Twist, wrapped
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
 
-    MakeLeader = Callable[[], "Leader"]
     TimedTwist = tuple[int, Twist]
+    Look = Callable[[], TurtlePose]
+    Leader = Iterator[int | Twist | "Heading"]
+    MakeLeader = Callable[[Look], Leader]
+    Drive = Generator[Twist, TurtlePose, None]
+    Driver = Callable[[], Drive]
 
 # law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
 LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}
@@ -74,9 +79,9 @@ class FollowController:
             gains = f"gain_linear {self.gain_linear:g}, gain_angular {self.gain_angular:g}"
             raise ValueInvalid(f"{gains} give no finite velocity at {distance:g} m") from None
 
-    def due_ns(self, count: int) -> int:
+    def due_ns(self, number: int) -> int:
         """Return the time of the n-th control step, from 0; rounded once, so that no rate drifts."""
-        return round(count * BILLION / self.rate)
+        return round(number * BILLION / self.rate)
 
 
 def _checked(name: str, value: float, least: float = -math.inf, most: float = math.inf) -> float:
@@ -133,43 +138,7 @@ class Heading(NamedTuple):
 
 
 # the keys around F of the ROS 2 teleop
-HEADINGS = {key: Heading(math.radians(45.0 * count)) for count, key in enumerate("gtredcvb")} | {"f": Heading(None)}
-
-
-class Leader(Protocol):
-    """A driver of a turtle that does not follow another."""
-
-    due_ns: int | None
-
-    def command(self, pose: TurtlePose) -> Twist | Heading | None:
-        """Return the command that is due, if any, and set the time of the next one."""
-
-
-class Script:
-    """Commands at their times (nanoseconds), read one ahead; between them turtlesim keeps the last for a second."""
-
-    def __init__(self, commands: Iterable[TimedTwist]) -> None:
-        """Store the commands in the order of their times.
-
-        Raises:
-            ValueInvalid: now or later, when a time is before the previous one.
-        """
-        self._commands = iter(commands)
-        self._next: Twist | None = None
-        self.due_ns: int | None = 0
-        self._advance()
-
-    def command(self, pose: TurtlePose) -> Twist | None:  # noqa: ARG002 - a script does not look
-        """Return the command that is due."""
-        twist = self._next
-        self._advance()
-        return twist
-
-    def _advance(self) -> None:
-        due_ns, self._next = next(self._commands, (None, None))
-        if due_ns is not None and self.due_ns is not None and due_ns < self.due_ns:
-            raise ValueInvalid(f"a command at {due_ns} ns comes after one at {self.due_ns} ns; sort them by time")
-        self.due_ns = due_ns
+HEADINGS = {key: Heading(math.radians(45.0 * number)) for number, key in enumerate("gtredcvb")} | {"f": Heading(None)}
 
 
 class Mailbox:
@@ -180,7 +149,6 @@ class Mailbox:
 
     def __init__(self) -> None:
         """Create an empty one."""
-        self.due_ns: int | None = 0
         self._posted: deque[tuple[int, Twist | Heading]] = deque()
         self._failure: BaseException | None = None
 
@@ -205,44 +173,72 @@ class Mailbox:
         except Exception as error:  # noqa: BLE001 - raised again where it is seen
             self._failure = error
 
-    def command(self, pose: TurtlePose) -> Twist | Heading | None:  # noqa: ARG002 - whoever posts does the looking
-        """Return the newest command whose time has come.
+    def __call__(self, look: Look) -> Leader:  # noqa: ARG002 - whoever posts does the looking
+        """Yield the newest command whose time has come, at each tick.
 
         Raises EndOfRun when it was closed.
         """
-        now_ns = self.due_ns or 0
-        self.due_ns = now_ns + TICK_NS
-        newest = None
-        while self._posted and self._posted[0][0] <= now_ns:
-            newest = self._posted.popleft()[1]
-        if newest is None and self._failure is not None:
-            raise self._failure
-        return newest
+        for now_ns in count(0, TICK_NS):
+            yield now_ns
+            newest = None
+            while self._posted and self._posted[0][0] <= now_ns:
+                newest = self._posted.popleft()[1]
+            if newest is not None:
+                yield newest
+            elif self._failure is not None:
+                raise self._failure
 
 
-class Periodic:
-    """A leader that is called at a fixed period: drive(nanoseconds, pose) returns the command."""
+def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
+    """Return a leader of (nanoseconds, Twist) pairs, read one ahead; lists can be run again.
 
-    def __init__(self, period_ns: int, drive: Callable[[int, TurtlePose], Twist]) -> None:
-        """Store the driver; the first command is due at time 0."""
-        self.due_ns: int | None = 0
-        self._period_ns = period_ns
-        self._drive = drive
+    Between them turtlesim keeps the last one for a second.
+    Raises ValueInvalid, when it runs, for a time that is before the previous one.
+    """
 
-    def command(self, pose: TurtlePose) -> Twist:
-        """Return the current command."""
-        now_ns = self.due_ns or 0
-        self.due_ns = now_ns + self._period_ns
-        return self._drive(now_ns, pose)
+    def leader(_: Look) -> Leader:
+        last_ns = 0
+        for due_ns, twist in commands:
+            if due_ns < last_ns:
+                raise ValueInvalid(f"a command at {due_ns} ns comes after one at {last_ns} ns; sort them by time")
+            yield due_ns
+            yield twist
+            last_ns = due_ns
 
-
-def figure_eight(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001
-    """Drive circles to the left and to the right in turn."""
-    turns = int(now_ns / BILLION * CIRCLING.angular_z / (2.0 * math.pi))
-    return Twist(CIRCLING.linear_x, -CIRCLING.angular_z if turns % 2 else CIRCLING.angular_z)
+    return leader
 
 
-def square() -> Generator[Twist, TurtlePose, None]:
+def periodic(period_ns: int, drive: Driver) -> MakeLeader:
+    """Return a leader with a command at a fixed period, the first at time 0.
+
+    drive: a generator of commands that is sent the current pose for each
+    """
+
+    def leader(look: Look) -> Leader:
+        driver = drive()
+        next(driver)
+        for now_ns in count(0, period_ns):
+            yield now_ns
+            yield driver.send(look())
+
+    return leader
+
+
+def circle() -> Drive:
+    """Drive circles to the left."""
+    while True:
+        yield CIRCLING
+
+
+def figure_eight() -> Drive:
+    """Drive circles to the left and to the right in turn, a command each tick."""
+    yield CIRCLING
+    for now_ns in count(0, TICK_NS):
+        turns = int(now_ns / BILLION * CIRCLING.angular_z / (2.0 * math.pi))
+        yield Twist(CIRCLING.linear_x, -CIRCLING.angular_z if turns % 2 else CIRCLING.angular_z)
+
+
+def square() -> Drive:
     """Drive 2 m sides at 1 m/s, quarter turns at 0.4 rad/s, and a full stop after each, as turtlesim's draw_square.
 
     Source: turtlesim's tutorials/draw_square.cpp.
@@ -262,61 +258,42 @@ def square() -> Generator[Twist, TurtlePose, None]:
         pose = yield stop
 
 
-def _square_driver() -> Callable[[int, TurtlePose], Twist]:
-    drive = square()
-    next(drive)
-    return lambda _, pose: drive.send(pose)
-
-
 MARGIN = 1.0  # metres to the walls
 
 
-def wanderer(seed: int = 0) -> Callable[[int, TurtlePose], Twist]:
-    """Return a driver to random positions, one after another, at up to 2 m/s; reproducible for each seed."""
+def wanderer(seed: int = 0) -> Drive:
+    """Drive to random positions, one after another, at up to 2 m/s; reproducible for each seed."""
     from random import Random
 
     random = Random(seed)  # noqa: S311 - no secret
     law = FollowController(gain_linear=1.0, max_linear=2.0)
-
-    def draw() -> tuple[float, float]:
-        return random.uniform(MARGIN, SIZE - MARGIN), random.uniform(MARGIN, SIZE - MARGIN)
-
-    goal = draw()
-
-    def drive(now_ns: int, pose: TurtlePose) -> Twist:  # noqa: ARG001 - has no clock
-        nonlocal goal
-        if math.dist(goal, pose[:2]) < 0.5:
-            goal = draw()
-        x, y = goal[0] - pose.x, goal[1] - pose.y
-        cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
-        return law.command(cosine * x + sine * y, cosine * y - sine * x)
-
-    return drive
+    pose = yield CIRCLING
+    while True:
+        goal = tuple(random.uniform(MARGIN, SIZE - MARGIN) for _ in "xy")
+        while math.dist(goal, pose[:2]) >= 0.5:
+            x, y = goal[0] - pose.x, goal[1] - pose.y
+            cosine, sine = math.cos(pose.theta), math.sin(pose.theta)
+            pose = yield law.command(cosine * x + sine * y, cosine * y - sine * x)
 
 
 # name -> a function from a seed to the leader
-LEADERS: dict[str, Callable[[int], Leader]] = {
-    "still": lambda _: Script(()),
-    "circle": lambda _: Periodic(BILLION // 2, lambda *_: CIRCLING),
-    "square": lambda _: Periodic(TICK_NS, _square_driver()),
-    "figure8": lambda _: Periodic(TICK_NS, figure_eight),
-    "random": lambda seed: Periodic(BILLION // 10, wanderer(seed)),
+LEADERS: dict[str, Callable[[int], MakeLeader]] = {
+    "still": lambda _: scripted(()),
+    "circle": lambda _: periodic(BILLION // 2, circle),
+    "square": lambda _: periodic(TICK_NS, square),
+    "figure8": lambda _: periodic(TICK_NS, figure_eight),
+    "random": lambda seed: periodic(BILLION // 10, lambda: wanderer(seed)),
 }
 
 
 def built_in(name: str, seed: int = 0) -> MakeLeader:
-    """Return a function that creates a built-in leader for each run.
+    """Return a built-in leader.
 
     Raises ValueInvalid for a name that is not in LEADERS.
     """
     if name not in LEADERS:
         raise ValueInvalid(f"no leader {shown(name)}; leaders: {', '.join(LEADERS)}")
-    return lambda: LEADERS[name](seed)
-
-
-def scripted(commands: Iterable[TimedTwist]) -> MakeLeader:
-    """Return a function that creates a leader from (nanoseconds, Twist) pairs; lists can be run again."""
-    return lambda: Script(commands)
+    return LEADERS[name](seed)
 
 
 def _ahead(pose: TurtlePose) -> TurtlePose:
@@ -328,13 +305,9 @@ def _ahead(pose: TurtlePose) -> TurtlePose:
 ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 
 
-def keys_in(data: bytes) -> Iterator[bytes]:
+def keys_in(data: bytes) -> list[bytes]:
     """Split the input of a terminal into keys: escape sequences of arrows, and single letters."""
-    at = 0
-    while at < len(data):
-        width = 3 if data[at : at + 2] in (b"\x1b[", b"\x1bO") else 1
-        yield data[at : at + width]
-        at += width
+    return re.findall(rb"(?s)\x1b[\[O].|.", data)
 
 
 def meaning_of(key: bytes, *, headings: bool) -> Twist | Heading | None:

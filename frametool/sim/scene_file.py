@@ -117,7 +117,8 @@ class _SceneReader:
         self.names.update(dict.fromkeys(filter(None, spawned)))
         self.nameless = "" in spawned or any(call.service == "reset" for call in calls)
         turtles = within(("turtles",), self._turtles, scene["turtles"])
-        return Scene(turtles, calls, _field(scene, "duration", "20"), variant, _field(scene, "holonomic", "false") == "true")
+        holonomic = _field(scene, "holonomic", "false") == "true"
+        return Scene(turtles, calls, _field(scene, "duration", "20"), variant, holonomic)
 
     def _turtles(self, value: Any) -> list[SceneTurtle]:
         """Read the turtles: a mapping by name, or a list of entries with a name."""

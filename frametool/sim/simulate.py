@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frametool.geometry.transform import Transform
-    from frametool.sim.drivers import Leader
+    from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Scene, ServiceCall
     from frametool.sim.turtle import Pen, Twist, WallHit
 
@@ -175,7 +175,7 @@ def _processes(simulation: Simulation, scene: Scene) -> Iterator[tuple[int, Proc
                 raise ValueInvalid(f"{turtle.name} cannot follow itself")
             yield CONTROLLERS, _controller(simulation, turtle.name, turtle.driver)
         elif turtle.driver is not None:
-            yield LEADERS, _leader(simulation, turtle.name, turtle.driver())
+            yield LEADERS, _leader(simulation, turtle.name, turtle.driver)
 
 
 def _ticks(simulation: Simulation) -> Process:
@@ -199,22 +199,26 @@ def _service_call(simulation: Simulation, call: ServiceCall) -> Process:
     simulation.calls.append(call)
 
 
-def _leader(simulation: Simulation, name: str, leader: Leader) -> Process:
+def _leader(simulation: Simulation, name: str, make: MakeLeader) -> Process:
     """Send a leader's commands to its turtle; without the turtle they are dropped."""
-    pose = TurtlePose(0.0, 0.0, 0.0, 0.0, 0.0)
-    while leader.due_ns is not None:
-        yield leader.due_ns
-        turtle = simulation.world.turtles.get(name)
-        pose = pose if turtle is None else turtle.pose
-        command = leader.command(pose)
-        if turtle is None or command is None:
+    pose, turtle = TurtlePose(0.0, 0.0, 0.0, 0.0, 0.0), None
+
+    def look() -> TurtlePose:
+        return pose
+
+    for each in make(look):
+        if isinstance(each, int):
+            yield each
+            turtle = simulation.world.turtles.get(name)
+            pose = pose if turtle is None else turtle.pose
+        elif turtle is None:
             continue
-        if isinstance(command, Heading):
-            turtle.rotate_absolute(command.theta)
+        elif isinstance(each, Heading):
+            turtle.rotate_absolute(each.theta)
         else:
-            turtle.command(command)
+            turtle.command(each)
             step = simulation.step
-            step.led.append(IssuedCommand(step.t_ns, name, command, None, None, turtle.state))
+            step.led.append(IssuedCommand(step.t_ns, name, each, None, None, turtle.state))
 
 
 def _controller(simulation: Simulation, name: str, follow: Follow) -> Process:

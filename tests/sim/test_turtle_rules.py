@@ -7,7 +7,7 @@ import math
 import pytest
 
 from frametool.errors import ValueInvalid
-from frametool.sim.drivers import LAWS, LEADERS, FollowController, Heading, Mailbox, Script, built_in, scripted
+from frametool.sim.drivers import LAWS, LEADERS, FollowController, Heading, Mailbox, scripted
 from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall, tutorial
 from frametool.sim.simulate import RunSummary, Simulation, SimulationStep, simulate
 from frametool.sim.turtle import (
@@ -324,9 +324,9 @@ def test_draw_square_has_sides_of_two_metres() -> None:
 
 
 def test_a_script_out_of_order_is_refused() -> None:
-    script = Script([(TIMEOUT_NS, Twist(1.0, 0.0)), (0, Twist(0.0, 0.0))])
+    leader = scripted([(TIMEOUT_NS, Twist(1.0, 0.0)), (0, Twist(0.0, 0.0))])
     with pytest.raises(ValueInvalid, match="sort them by time"):
-        script.command(Turtle().pose)
+        commands(tutorial(leader=leader, duration=5.0))
 
 
 def test_a_mailbox_gives_the_newest_command_that_is_due_and_turns_to_headings() -> None:
@@ -334,13 +334,13 @@ def test_a_mailbox_gives_the_newest_command_that_is_due_and_turns_to_headings() 
     mailbox.post(Twist(1.0, 0.0))
     mailbox.post(Heading(1.0))
     mailbox.post(Twist(2.0, 0.0), SECOND)
-    scene = tutorial(leader=lambda: mailbox, followers=0, duration=0.5)
+    scene = tutorial(leader=mailbox, followers=0, duration=0.5)
     assert last_of(scene)[1].poses["turtle1"].angular_velocity == 1.0
 
 
 def test_closing_a_mailbox_ends_the_run() -> None:
     mailbox = Mailbox()
-    steps = simulate(tutorial(leader=lambda: mailbox, duration=None))
+    steps = simulate(tutorial(leader=mailbox, duration=None))
     next(steps)
     mailbox.close()
     assert len(list(steps)) < 10
@@ -354,7 +354,7 @@ def test_a_mailbox_tells_what_went_wrong_while_it_was_filled() -> None:
     mailbox = Mailbox()
     mailbox.fill_from(broken())  # type: ignore[arg-type]
     with pytest.raises(ValueInvalid, match="torn"):
-        for _ in simulate(tutorial(leader=lambda: mailbox, duration=None)):
+        for _ in simulate(tutorial(leader=mailbox, duration=None)):
             pass
 
 
@@ -380,4 +380,3 @@ def test_unknown_leaders_targets_and_worlds_are_named() -> None:
 def test_a_scripted_leader_may_be_run_again() -> None:
     scene = tutorial(leader=scripted([(0, Twist(1.0, 1.0))]), duration=1.0)
     assert commands(scene) == commands(scene)
-    assert built_in("still")().due_ns is None

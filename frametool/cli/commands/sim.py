@@ -170,7 +170,7 @@ def teleop(inputs: Inputs) -> None:
     """
     refuse(sys.stdin is None or not sys.stdin.isatty(), f"standard input is no terminal; {INSTEAD}")
     mailbox = Mailbox()
-    output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, lambda: mailbox)
+    output, scene = SimOutput(inputs.but(live=True), leaders=True), scene_of(inputs, mailbox)
     with keyboard(mailbox, headings=scene.variant == "ros2"):
         output.run(scene)
 
