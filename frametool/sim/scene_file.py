@@ -24,7 +24,7 @@ from frametool.sim.scene import Follow, Scene, SceneTurtle, ServiceCall
 from frametool.sim.turtle import CENTRE, SERVICES, VARIANTS, complete
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
     from frametool.sim.drivers import MakeLeader
     from frametool.sim.scene import Place
@@ -33,7 +33,6 @@ SCENE_KEYS = ("turtles", "events", "duration", "turtlesim", "holonomic", "seed")
 CONTROLLER_KEYS = ("rate", "gain_linear", "gain_angular", "max_linear", "max_angular")
 FOLLOW_KEYS = ("follow", "law", *CONTROLLER_KEYS, "target", "delay")
 TURTLE_KEYS = ("spawn", "leader", *FOLLOW_KEYS)
-PLACE_KEYS = ("x", "y", "theta")
 
 
 def _name(value: Any) -> str:
@@ -43,11 +42,7 @@ def _name(value: Any) -> str:
 
 
 def _place(value: Any) -> Place:
-    """Read [x, y], [x, y, theta] or {x, y, theta}: metres, radians."""
-    if type(value) is dict:
-        place = known_keys(value, PLACE_KEYS, "a place")
-        x, y, theta = (_field(place, key, "0") for key in PLACE_KEYS)
-        return x, y, theta
+    """Read [x, y] or [x, y, theta]: metres, radians."""
     if type(value) is not list or len(value) not in (2, 3):
         raise Misfit(f"expected [x, y, theta], found {kind(value)}")
     x, y = (within((index,), readers.read_number, value[index]) for index in (0, 1))
@@ -90,110 +85,73 @@ def read_scene(source: Source, *, seed: int | None = None) -> Scene:
     if len(documents) != 1:
         raise format_error(source, (0,), f"expected one scene, found {len(documents)} documents")
     try:
-        return _SceneReader(source, seed).scene(documents[0].value)
+        return _scene(documents[0].value, source, seed)
     except Misfit as misfit:
         raise misfit.placed(source, documents[0].index) from None
 
 
-class _SceneReader:
-    """The state while one scene is read: its source, its seed, the names in it."""
-
-    def __init__(self, source: Source, seed: int | None) -> None:
-        self.source = source
-        self.seed = seed
-        self.names: dict[str, None] = {}  # of all turtles, including later ones
-        self.nameless = False  # whether there are turtles that the world will name
-
-    def scene(self, value: Any) -> Scene:
-        """Read a scene."""
-        scene = known_keys(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}")
-        if "turtles" not in scene:
-            raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
-        own = _field(scene, "seed", "0")
-        self.seed = own if self.seed is None else self.seed
-        variant = _field(scene, "turtlesim", "ros1")
-        calls = within(("events",), self._calls, scene.get("events") or [])
-        spawned = [str(call.arguments.get("name", "")) for call in calls if call.service == "spawn"]
-        self.names.update(dict.fromkeys(filter(None, spawned)))
-        self.nameless = "" in spawned or any(call.service == "reset" for call in calls)
-        turtles = within(("turtles",), self._turtles, scene["turtles"])
-        holonomic = _field(scene, "holonomic", "false") == "true"
-        return Scene(turtles, calls, _field(scene, "duration", "20"), variant, holonomic)
-
-    def _turtles(self, value: Any) -> list[SceneTurtle]:
-        """Read the turtles: a mapping by name, or a list of entries with a name."""
-        entries = list(_entries(value))
-        self.names.update(dict.fromkeys(name for _, name, _ in entries))
-        return [within((step,), self._turtle, name, entry) for step, name, entry in entries]
-
-    def _turtle(self, name: str, value: Any) -> SceneTurtle:
-        entry = known_keys(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}")
-        if name == "world" or not name:
-            raise Misfit(f"a turtle cannot be called {shown(name)}", key=True)
-        spawn = _field(entry, "spawn", [repr(CENTRE), repr(CENTRE), "0"])
-        if "follow" in entry and "leader" in entry:
-            raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
-        if "follow" in entry:
-            within(("follow",), self._check_leader, name, entry["follow"])
-            return SceneTurtle(name, spawn, _follow(entry))
-        if stray := [key for key in entry if key in FOLLOW_KEYS]:
-            raise Misfit(f"{stray[0]} says how to follow; add follow: NAME", (stray[0],), key=True)
-        leader = within(("leader",), self._leader, entry["leader"]) if "leader" in entry else None
-        return SceneTurtle(name, spawn, leader)
-
-    def _check_leader(self, name: str, value: Any) -> None:
-        """Refuse a turtle that follows itself, or one that never exists."""
-        leader = _name(value)
-        if leader == name:
-            raise Misfit(f"{name} cannot follow itself")
-        if leader not in self.names and not (self.nameless and leader.startswith("turtle")):
-            raise Misfit(f"no turtle {shown(leader)} to follow{alternatives(leader, self.names, 'turtles')}")
-
-    def _leader(self, value: Any) -> MakeLeader:
-        """Read a leader: a built-in name, a file relative to the scene, or the commands themselves."""
-        if type(value) is list:
-            return scripted(list(readers.timed_commands(value)))
-        if type(value) is not str:
-            raise Misfit(f"expected a leader's name, a file or a list of commands, found {kind(value)}")
-        if value in LEADERS:
-            return built_in(value, self.seed or 0)
-        path = os.path.join(os.path.dirname(self.source.name), value)
-        if not os.path.exists(path):
-            raise Misfit(f"no file {path} and no leader {shown(value)}{alternatives(value, LEADERS, 'leaders')}")
-        return scripted(readers.read_script(Source(path, read_text(path))))
-
-    def _calls(self, value: Any) -> list[ServiceCall]:
-        if type(value) is not list:
-            raise Misfit(f"expected a list of {{t: .., SERVICE: {{..}}}}, found {kind(value)}")
-        calls = [within((index,), _call, entry) for index, entry in enumerate(value)]
-        return [call._replace(place=f"{self.source.name}, event {number}") for number, call in enumerate(calls, 1)]
+def _scene(value: Any, source: Source, seed: int | None) -> Scene:
+    scene = known_keys(value, SCENE_KEYS, "a scene {turtles: .., events: .., duration: ..}")
+    if "turtles" not in scene:
+        raise Misfit(f"no turtles; expected {', '.join(SCENE_KEYS)}")
+    own = _field(scene, "seed", "0")
+    variant, holonomic = _field(scene, "turtlesim", "ros1"), _field(scene, "holonomic", "false") == "true"
+    calls = within(("events",), _calls, scene.get("events") or [], source)
+    entries = within(("turtles",), as_mapping, scene["turtles"], "the turtles by name")
+    turtles = [
+        within(("turtles", name), _turtle, name, entry or {}, source, own if seed is None else seed)
+        for name, entry in entries.items()
+    ]
+    return Scene(turtles, calls, _field(scene, "duration", "20"), variant, holonomic)
 
 
-def _entries(value: Any) -> Iterator[tuple[str | int, str, Any]]:
-    """Yield the turtles of a mapping or a list: key or index, name, the rest of its entry."""
-    if type(value) is not list:
-        turtles = as_mapping(value, "the turtles by name, or a list of {name: .., spawn: .., ..}")
-        yield from ((name, name, entry or {}) for name, entry in turtles.items())
-        return
-    seen = set()
-    for index, entry in enumerate(value):
-        if "name" not in within((index,), as_mapping, entry, "a turtle {name: .., spawn: .., ..}"):
-            raise Misfit("missing name; a turtle is {name: .., spawn: [x, y, theta], ..}", (index,))
-        name = within((index, "name"), _name, entry["name"])
-        if name in seen:
-            raise Misfit(f"A turtle named [{name}] already exists", (index, "name"))
-        seen.add(name)
-        yield index, name, {key: each for key, each in entry.items() if key != "name"}
+def _turtle(name: str, value: Any, source: Source, seed: int) -> SceneTurtle:
+    entry = known_keys(value, TURTLE_KEYS, "a turtle {spawn: [x, y, theta], leader: .. or follow: ..}")
+    if name in ("", "world"):
+        raise Misfit(f"a turtle cannot be called {shown(name)}", key=True)
+    spawn = _field(entry, "spawn", [repr(CENTRE), repr(CENTRE), "0"])
+    if "follow" in entry and "leader" in entry:
+        raise Misfit("a turtle has a leader script or follows another, not both", ("leader",), key=True)
+    if "follow" in entry:
+        return SceneTurtle(name, spawn, _follow(name, entry))
+    if stray := [key for key in entry if key in FOLLOW_KEYS]:
+        raise Misfit(f"{stray[0]} says how to follow; add follow: NAME", (stray[0],), key=True)
+    leader = within(("leader",), _leader, entry["leader"], source, seed) if "leader" in entry else None
+    return SceneTurtle(name, spawn, leader)
 
 
-def _follow(entry: Mapping[str, Any]) -> Follow:
+def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
+    """Read a leader: a built-in name, a file relative to the scene, or the commands themselves."""
+    if type(value) is list:
+        return scripted(list(readers.timed_commands(value)))
+    if type(value) is not str:
+        raise Misfit(f"expected a leader's name, a file or a list of commands, found {kind(value)}")
+    if value in LEADERS:
+        return built_in(value, seed)
+    path = os.path.join(os.path.dirname(source.name), value)
+    if not os.path.exists(path):
+        raise Misfit(f"no file {path} and no leader {shown(value)}{alternatives(value, LEADERS, 'leaders')}")
+    return scripted(readers.read_script(Source(path, read_text(path))))
+
+
+def _follow(name: str, entry: Mapping[str, Any]) -> Follow:
     """Read the follower settings of a turtle."""
+    leader = _field(entry, "follow")
+    if leader == name:
+        raise Misfit(f"{name} cannot follow itself", ("follow",))
     law = _field(entry, "law", "ros1")
     numbers = {key: _field(entry, key) for key in CONTROLLER_KEYS if key in entry}
     for key, number in numbers.items():
         within((key,), guarded, FollowController, law, **{key: number})
     target, delay_ns = _field(entry, "target", "leader"), _field(entry, "delay", "0")
-    return Follow(_field(entry, "follow"), FollowController(law, **numbers), target, delay_ns)
+    return Follow(leader, FollowController(law, **numbers), target, delay_ns)
+
+
+def _calls(value: Any, source: Source) -> list[ServiceCall]:
+    if type(value) is not list:
+        raise Misfit(f"expected a list of {{t: .., SERVICE: {{..}}}}, found {kind(value)}")
+    calls = [within((index,), _call, entry) for index, entry in enumerate(value)]
+    return [call._replace(place=f"{source.name}, event {number}") for number, call in enumerate(calls, 1)]
 
 
 def _call(value: Any) -> ServiceCall:

@@ -2,7 +2,7 @@
 
     linear: {x: ..}, angular: {..}                                  YAML: messages as `ros2 topic echo` prints them
     {"t": 0.1, "turtle": "turtle2", "linear": {"x": ..}, "angular": {"z": ..}}             JSON: one object per line
-    t,turtle,linear_x,angular_z,distance,leader_x,leader_y,leader_theta,x,y,theta          CSV; of transforms, ROS 2's
+    t,turtle,linear_x,angular_z,distance,leader_x,leader_y,leader_theta,x,y,theta          CSV
 
 Metres, radians, seconds; quaternions x, y, z, w; a transform is the pose of the child in its parent.
 """
@@ -43,13 +43,11 @@ class Emission(NamedTuple):
     cells: by column name, for text and CSV.
     message: the ROS message, for YAML and JSON.
     labels: time and turtle, if the message does not have them.
-    ros2_row: CSV as `ros2 topic echo --csv` prints it, without a header.
     """
 
     cells: Record
     message: Record
     labels: Record
-    ros2_row: Sequence[Any] = ()
 
 
 class StepWriter:
@@ -78,7 +76,7 @@ class StepWriter:
         columns = list(emission.cells)
         if self._style.format == "text":
             return _aligned([SHORT.get(name, name) for name in columns], map(_step_width, columns))
-        return row(columns, self._style) if self._style.format == "csv" and not emission.ros2_row else ""
+        return row(columns, self._style) if self._style.format == "csv" else ""
 
     def _record(self, emission: Emission) -> str:
         labels, style = emission.labels, self._style
@@ -89,7 +87,7 @@ class StepWriter:
             case "json":
                 return f"{dump(labels | emission.message, style.number)}\n"
             case "csv":
-                return row(emission.ros2_row or emission.cells.values(), style)
+                return row(emission.cells.values(), style)
         t, *others = emission.cells.values()
         cells = [f"{t:.3f}", *(_text_cell(cell, style) for cell in others)]
         return _aligned(cells, map(_step_width, emission.cells))
@@ -149,7 +147,7 @@ def _transforms(step: SimulationStep) -> Iterator[Emission]:
             },
         }
         cells |= dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), numbers, strict=True))
-        yield Emission(cells, message, {}, (seconds, nanoseconds, parent, child, *numbers))
+        yield Emission(cells, message, {})
 
 
 _EMISSIONS: dict[str, Callable[[SimulationStep], Iterator[Emission]]] = {

@@ -170,15 +170,3 @@ def comparisons(turtles: int) -> int:
 
 def test_twice_as_many_spawns_need_hardly_more_than_twice_the_comparisons() -> None:
     assert comparisons(4000) < 2.5 * comparisons(2000)
-
-
-def test_a_scene_of_many_turtles_looks_each_name_up_and_not_through_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    counts = []
-    monkeypatch.setattr("frametool.sim.scene_file._name", CountedName)
-    for turtles in (1000, 2000):
-        follow = [{"name": f"t{number + 1}", "follow": f"t{number}"} for number in range(turtles)]
-        text = json.dumps({"turtles": [{"name": "t0"}, *follow]})
-        CountedName.compared = 0
-        assert len(read_scene(Source("many.json", text)).turtles) == turtles + 1
-        counts.append(CountedName.compared)
-    assert counts[1] < 2.5 * counts[0]

@@ -102,7 +102,7 @@ holonomic: true
 turtles:
   turtle1: {leader: [{t: 0, linear: 1, angular: 0}]}
   b: {spawn: [1, 2, 90deg], follow: turtle1, law: ros2, rate: 5, max_linear: 1, target: carrot, delay: 0.5}
-  c: {spawn: {x: 3, y: 4}}
+  c: {spawn: [3, 4]}
 events:
   - {t: 1, kill: c}
   - {t: 1.5, spawn: {x: 1, y: 1, theta: pi, name: d}}
@@ -131,9 +131,9 @@ def test_a_scene_is_run() -> None:
     assert steps[-1].clears == 1
 
 
-def test_a_list_of_turtles_and_a_leader_file_beside_the_scene_are_read(tmp_path: Path) -> None:
+def test_a_leader_file_beside_the_scene_is_read(tmp_path: Path) -> None:
     (tmp_path / "way.csv").write_text("t,linear,angular\n0,1,0\n")
-    text = '{"turtles": [{"name": "a", "leader": "way.csv"}, {"name": "b", "follow": "a"}], "duration": "inf"}'
+    text = '{"turtles": {"a": {"leader": "way.csv"}, "b": {"follow": "a"}}, "duration": "inf"}'
     scene = read_scene(Source(str(tmp_path / "scene.json"), text))
     steps = simulate(scene)
     assert scene.duration_ns is None
@@ -151,7 +151,6 @@ def test_a_list_of_turtles_and_a_leader_file_beside_the_scene_are_read(tmp_path:
         ("turtles:\n  a: {leader: squar}\n", "s.yaml:2:15: no file squar and no leader 'squar'; did you mean 'square'?"),
         ("turtles:\n  a: {folow: b}\n", "s.yaml:2:7: unknown key 'folow'; did you mean 'follow'?"),
         ("turtles:\n  a: {follow: a}\n", "s.yaml:2:15: a cannot follow itself"),
-        ("turtles:\n  a: {follow: b}\n", "s.yaml:2:15: no turtle 'b' to follow; turtles: a"),
         ("turtles:\n  a: {follow: a, leader: still}\n", "s.yaml:2:18: a turtle has a leader script or follows"),
         ("turtles:\n  a: {law: ros1}\n", "s.yaml:2:7: law says how to follow; add follow: NAME"),
         ("turtles:\n  a:\n  b: {follow: a, law: ros3}\n", "s.yaml:3:23: unknown 'ros3'; did you mean"),
@@ -159,8 +158,6 @@ def test_a_list_of_turtles_and_a_leader_file_beside_the_scene_are_read(tmp_path:
         ("turtles:\n  a: {spawn: [1, x]}\n", "s.yaml:2:18: 'x' is not a number"),
         ("turtles:\n  a: {spawn: 3}\n", "s.yaml:2:14: expected [x, y, theta], found '3'"),
         ("turtles:\n  a:\n  a:\n", "s.yaml:3:3: key 'a' appears twice"),
-        ("turtles:\n- {name: a}\n- {name: a}\n", "s.yaml:3:10: A turtle named [a] already exists"),
-        ("turtles:\n- {spawn: [1, 1]}\n", "s.yaml:2:3: missing name"),
         ("turtles:\n  world:\n", "s.yaml:2:3: a turtle cannot be called 'world'"),
         ("turtles: {a: }\nevents:\n- {t: 1, fly: }\n", "s.yaml:3:10: unknown key 'fly'"),
         ("turtles: {a: }\nevents:\n- {t: 1}\n", "s.yaml:3:3: an event has t and one of spawn"),
