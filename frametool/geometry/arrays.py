@@ -173,22 +173,23 @@ def rows(
 ) -> Array:
     """Apply a kernel to components; return rows (..., *inner), in `out` if the caller passes it.
 
-    If `out` overlaps components that are still to be read, the result is computed in a new array first.
+    If `out` is not contiguous or overlaps components, the result is computed in a new array first.
     """
     shape = (*batch_shape(parts), *inner)
-    if out is not None:
-        require_fitting(out, shape)
-        columns = flat_columns(out, len(inner))
-        touched = tuple(part for part in parts if shares_memory(out, (part,)))
-        if columns is not None and (not touched or in_step(out, len(inner), touched)):
-            walk(kernel, parts, columns, *args)
-            return out
-    fresh = np.empty(shape)
-    walk(kernel, parts, fresh.reshape(-1, int(np.prod(inner))).T, *args)
-    if out is None:
-        return fresh
-    out[...] = fresh
+    direct = out is not None and _is_free(out, shape, parts)
+    made = out if out is not None and direct else np.empty(shape)
+    walk(kernel, parts, np.asarray(made).reshape(-1, int(np.prod(inner))).T, *args)
+    if out is None or direct:
+        return made
+    out[...] = made
     return out
+
+
+def _is_free(out: Array, shape: tuple[int, ...], parts: Components) -> bool:
+    """Return True if an output array can be filled row by row while components are read."""
+    require_fitting(out, shape)
+    overlaps = any(np.shares_memory(out, part) for part in parts if not isinstance(part, float))
+    return out.flags.c_contiguous and not overlaps
 
 
 def batch_shape(parts: Components) -> tuple[int, ...]:
@@ -234,11 +235,6 @@ def all_finite(results: Components) -> bool:
     return math.isfinite(np.asarray(results[0]).sum() + np.asarray(results[-1]).sum())
 
 
-def finite_throughout(parts: Components) -> bool:
-    """Return True if all components are finite."""
-    return all(np.isfinite(np.min(part)) and np.isfinite(np.max(part)) for _, block in cut(parts, 0) for part in block)
-
-
 def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
     """Cut flat components into blocks of contiguous float64 for a kernel that fills this many targets."""
     shape = batch_shape(parts)
@@ -279,27 +275,3 @@ def require_fitting(out: object, shape: tuple[int, ...]) -> None:
     else:
         return
     raise ValueInvalid(f"out: expected a writable float64 array of shape {shape}, got {found}")
-
-
-def flat_columns(out: Array, axes: int) -> Sequence[Array] | None:
-    """Return flat views of each component of rows that fill the last axes; None if the strides allow no such view."""
-    out, shape = out.view(np.ndarray), out.shape[out.ndim - axes :]  # a component of a np.matrix would have two axes
-    if out.flags.c_contiguous:
-        return list(out.reshape(-1, int(np.prod(shape))).T)
-    columns = [out[(..., *place)].reshape(-1) for place in np.ndindex(*shape)]
-    return columns if np.may_share_memory(columns[0], out) else None
-
-
-def shares_memory(out: Array, parts: Components) -> bool:
-    """Return True if writing to `out` changes components that are arrays."""
-    return any(not isinstance(part, float) and np.shares_memory(out, part) for part in parts)
-
-
-def in_step(out: Array, axes: int, parts: Components) -> bool:
-    """Return True if the components are those of `out` itself, in order: each row is read before it is written."""
-    own = [out[(..., *place)] for place in np.ndindex(*out.shape[out.ndim - axes :])]
-    return len(own) == len(parts) and all(_place(part) == _place(mine) for part, mine in zip(parts, own, strict=True))
-
-
-def _place(part: Array) -> tuple[object, ...]:
-    return part.dtype, part.__array_interface__["data"][0], part.shape, part.strides

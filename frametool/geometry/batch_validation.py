@@ -51,18 +51,14 @@ def read_rotations(
     return Rotations(tuple(quaternions), reasons, np.flatnonzero((off > SILENT) & (off < np.inf)), worst)
 
 
-def require_rotations(
-    notation: Notation, inputs: Components, name: str, *, normalize: bool = False, into: Array | None = None
-) -> Components:
+def require_rotations(notation: Notation, inputs: Components, name: str, *, normalize: bool = False) -> Components:
     """Return the quaternions of columns of any shape; warn once about all rows that were normalised.
-
-    into: output array (4, ...) of the shape of the columns, contiguous
 
     Raises:
         ValueInvalid: rows are not rotations; names the first one and how many there are.
     """
     shape = arrays.batch_shape(inputs)
-    made = np.empty((4, *shape)) if into is None else into
+    made = np.empty((4, *shape))
     off, _ = _convert(notation, inputs, made.reshape(4, -1), degrees=False, normalize=normalize)
     if off is not None:
         _refuse_or_warn(notation, inputs, name, off.reshape(shape), normalize=normalize)

@@ -20,34 +20,12 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Numbers, Quaternion
 
-_new_batched = object.__new__
-OTHER_NAMES = {  # attributes of SciPy and others, and their names here; for a Transform also through its rotation
-    "from_quat": "from_quaternion", "as_quat": "as_quaternion", "from_dcm": "from_matrix", "as_dcm": "as_matrix",
-    "inv": "inverse", "magnitude": "angle", "translation": "xyz", "from_translation": "from_parts",
-}  # fmt: skip
+NEAR = 1e-9  # rad: the default of `is_close`, three digits above the rounding of long chains
+_new = object.__new__
+_notation = cache(notation)
 
 
-def no_attribute(owner: type, name: str) -> AttributeError:
-    """Return the error for a missing attribute, with the name that it has here."""
-    own = OTHER_NAMES.get(name, name)
-    if own not in dir(owner):
-        through = f"from_parts({own[5:]}=..)" if own.startswith("from_") else f"rotation.{own}"
-        own = through if own in dir(Rotation) else name
-    message = f"{owner.__name__} has no attribute {name!r}" + f"; it has {own}" * (own != name)
-    return AttributeError(message, name=name, obj=owner)
-
-
-class OtherNames(type):
-    """Errors for missing attributes of the class that suggest the name used here."""
-
-    if not TYPE_CHECKING:  # a checker finds what is missing by itself
-
-        def __getattr__(cls, name: str) -> Any:
-            """Raise AttributeError."""
-            raise no_attribute(cls, name)
-
-
-class Batched(metaclass=OtherNames):
+class Batched:
     """One item, or an array of them of any shape; immutable."""
 
     __slots__ = ("_components",)
@@ -57,15 +35,9 @@ class Batched(metaclass=OtherNames):
     @classmethod
     def _of_columns(cls, components: Components) -> Self:
         """Create from trusted components, all floats or all arrays of one shape."""
-        made = _new_batched(cls)
+        made = _new(cls)
         made._components = components  # noqa: SLF001 - its own class
         return made
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Raise AttributeError, with the name that the attribute has here."""
-            raise no_attribute(type(self), name)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -87,12 +59,6 @@ class Batched(metaclass=OtherNames):
     def __iter__(self) -> Iterator[Self]:
         """Iterate over the first axis."""
         return (self[index] for index in range(len(self)))
-
-
-NEAR = 1e-9  # rad: the default of `is_close`, three digits above the rounding of long chains
-
-_new = object.__new__
-_notation = cache(notation)
 
 
 class Rotation(Batched):
@@ -221,16 +187,14 @@ class Rotation(Batched):
         return cls._of_columns(made)
 
     @classmethod
-    def from_columns(
-        cls, spec: str, inputs: Components, name: str, *, normalize: bool = False, into: Array | None = None
-    ) -> Rotation:
-        """Check and convert the columns of a notation; errors call them `name`, `into` receives the result of many."""
+    def from_columns(cls, spec: str, inputs: Components, name: str, *, normalize: bool = False) -> Rotation:
+        """Check and convert the columns of a notation; errors call them `name`."""
         rep = _notation(spec)
         if validation.single(inputs):
             return cls.of(*rep.checked_quaternion(inputs, floats, normalize=normalize))
         from frametool.geometry.batch_validation import require_rotations
 
-        return cls._of_columns(require_rotations(rep, inputs, name, normalize=normalize, into=into))
+        return cls._of_columns(require_rotations(rep, inputs, name, normalize=normalize))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""

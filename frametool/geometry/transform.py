@@ -13,7 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from frametool.geometry.types import Array, Components, Numbers, Rigid
+    from frametool.geometry.types import Array, Numbers, Rigid
 
 NEAR_BY = 1e-9  # metres: the default of `is_close` for translations
 _new = object.__new__
@@ -38,8 +38,7 @@ class Transform(Batched):
             advice = "Transform(rotation, xyz) takes a Rotation first; from_parts(xyz=.., rpy=..) says which is which"
             raise ValueInvalid(f"rotation: expected a Rotation, got {kind}; {advice}")
         shift = validation.columns(translation, 3, "translation")
-        parts = (*shift, *rotation.components)
-        self._components = validation.joined(parts, "translation")
+        self._components = validation.joined(shift, rotation.components, "translation")
 
     @classmethod
     def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
@@ -83,7 +82,7 @@ class Transform(Batched):
         (name, inputs), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
         turn = inputs if name == "rotation" else Rotation.from_notation(name, inputs, normalize=normalize)
         shift = validation.columns(xyz, 3, "xyz")
-        return cls._of_columns(validation.joined((*shift, *require(turn, "rotation").components), "xyz"))
+        return cls._of_columns(validation.joined(shift, require(turn, "rotation").components, "xyz"))
 
     @classmethod
     def from_arrays(cls, xyz: Numbers, xyzw: Numbers, *, normalize: bool = False) -> Transform:
@@ -93,7 +92,8 @@ class Transform(Batched):
             ValueInvalid: wrong shapes, not finite, or not a rotation; names the first such row.
         """
         shift = validation.columns(xyz, 3, "xyz")
-        return cls._read(shift, "xyz", "xyzw", validation.columns(xyzw, 4, "xyzw"), "xyzw", normalize=normalize)
+        rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
+        return cls._of_columns(validation.joined(shift, rotation.components, "xyz"))
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
@@ -104,24 +104,8 @@ class Transform(Batched):
         """
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")
-        turn = *m[0:3], *m[4:7], *m[8:11]
-        return cls._read((m[3], m[7], m[11]), "matrix", "matrix", turn, "matrix", normalize=normalize)
-
-    @classmethod
-    def _read(
-        cls, shift: Components, shift_name: str, spec: str, turn: Components, turn_name: str, *, normalize: bool
-    ) -> Transform:
-        """Check and convert columns; if there are as many rotations as translations, without a copy."""
-        shape = validation.batch_shape(shift)
-        if not shape or validation.batch_shape(turn) != shape:
-            rotation = Rotation.from_columns(spec, turn, turn_name, normalize=normalize)
-            return cls._of_columns(validation.joined((*shift, *rotation.components), shift_name))
-        import numpy as np
-
-        made = np.empty((7, *shape))
-        Rotation.from_columns(spec, turn, turn_name, normalize=normalize, into=made[3:])
-        validation.copy_finite(shift, made[:3], shift_name)
-        return cls._of_columns(tuple(made))
+        rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
+        return cls._of_columns(validation.joined((m[3], m[7], m[11]), rotation.components, "matrix"))
 
     @classmethod
     def exp(cls, twist: Numbers) -> Transform:

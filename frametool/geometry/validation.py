@@ -134,60 +134,31 @@ def shown_row(columns: Components, bad: Any) -> str:
     return " ".join(f"{value:g}" for value in first_row(columns, bad))
 
 
-def joined(inputs: Components, name: str) -> Components:
-    """Broadcast components to one kind and shape, the first three finite; nothing is shared with the caller."""
-    if single(inputs):
-        return inputs
+def joined(shift: Components, turn: Components, name: str) -> Components:
+    """Broadcast translations and rotations to one shape; the translations are copied, and checked to be finite."""
+    if single((*shift, *turn)):
+        return (*shift, *turn)
     import numpy as np
 
     from frametool.geometry import arrays
 
-    out = np.empty((len(inputs), *arrays.batch_shape(inputs)))
-    for target, part in zip(out[3:], inputs[3:], strict=True):
-        target[...] = part
-    copy_finite(inputs[:3], out[:3], name)
-    return tuple(out)
-
-
-def copy_finite(inputs: Components, out: Array, name: str) -> None:
-    """Copy columns into others, to which they broadcast; raise ValueInvalid for the first row that is not finite."""
-    import numpy as np
-
-    from frametool.geometry import arrays
-
-    columns = tuple(np.broadcast_to(one, out.shape[1:]) if np.shape(one) != out.shape[1:] else one for one in inputs)
-    flat = out.reshape(len(columns), -1)
-    for place, block in arrays.cut(columns, len(columns)):
-        for target, part in zip(flat, block, strict=True):
-            target[place] = part
-        if not all(isfinite(arrays.furthest(part)) for part in block):
-            all_finite(columns, name)
+    shape = arrays.batch_shape((*shift, *turn))
+    moved = tuple(np.array(np.broadcast_to(part, shape), np.float64, order="C") for part in shift)
+    if not all(isfinite(arrays.furthest(part)) for part in moved):
+        all_finite(moved, name)
+    return *moved, *(part if np.shape(part) == shape else np.broadcast_to(part, shape).copy() for part in turn)
 
 
 def check_last_row(entries: Components, name: str) -> None:
     """Raise ValueInvalid unless the last rows of homogeneous matrices are 0 0 0 1, to 1e-6."""
-    last = entries[12:]
-    if _is_last_row(last):
+    off = sum(abs(entry - wanted) for entry, wanted in zip(entries[12:], LAST_ROW, strict=True))
+    if type(off) is float and off <= SILENT:
         return
     import numpy as np
 
-    off = sum(abs(entry - wanted) for entry, wanted in zip(last, LAST_ROW, strict=True))
     bad = ~(np.asarray(off) <= SILENT)
     if bad.any():
-        raise ValueInvalid(f"{at_first(name, bad)}: last row {shown_row(last, bad)}; expected 0 0 0 1")
-
-
-def _is_last_row(last: Components) -> bool:
-    """Return True if all last rows are 0 0 0 1 to 1e-6, block by block; may be False for rows that barely are."""
-    if single(last):
-        return bool(sum(abs(entry - wanted) for entry, wanted in zip(last, LAST_ROW, strict=True)) <= SILENT)
-    from frametool.geometry import arrays
-
-    return all(
-        arrays.furthest(part, wanted) <= SILENT / len(LAST_ROW)
-        for _, block in arrays.cut(last, 0)
-        for part, wanted in zip(block, LAST_ROW, strict=True)
-    )
+        raise ValueInvalid(f"{at_first(name, bad)}: last row {shown_row(entries[12:], bad)}; expected 0 0 0 1")
 
 
 def weights(value: Numbers, shape: tuple[int, ...]) -> Array:
@@ -266,7 +237,7 @@ def moved(
 ) -> Array:  # fmt: skip
     """Transform vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster.
 
-    Vectors that are overwritten are checked first: if one is not finite, all are unchanged.
+    If a vector is not finite, vectors that would be overwritten are unchanged.
     """
     inner = (len(inputs),)
     if single(inputs) and single(mover):
@@ -276,11 +247,7 @@ def moved(
     parts = (*mover, *inputs)
     if flatten and single(mover):
         kernel, parts = _matrix_kernel(flatten(*mover)), inputs
-    if out is None or not arrays.shares_memory(out, inputs):
-        kernel = arrays.guarded(kernel, lambda: all_finite(inputs, name))
-    elif not arrays.finite_throughout(inputs):
-        all_finite(inputs, name)
-    return arrays.rows(kernel, inner, parts, out=out)
+    return arrays.rows(arrays.guarded(kernel, lambda: all_finite(inputs, name)), inner, parts, out=out)
 
 
 def _one_row(components: Components, inner: tuple[int, ...], out: Array | None) -> Array:

@@ -421,18 +421,3 @@ def test_singular_values_of_more_than_a_thousandth_apart_are_no_multiple() -> No
     for each in entries:
         with pytest.raises(ValueInvalid, match="normalize it"):
             Rotation.from_matrix(each)
-
-
-@pytest.mark.parametrize(
-    ("owner", "name", "own"),
-    [
-        (Rotation, "from_quat", "; it has from_quaternion"), (Rotation.identity(), "as_quat", "; it has as_quaternion"),
-        (Transform, "from_euler", "; it has from_parts(euler=..)"), (Transform.identity(), "as_euler", "; it has rotation.as_euler"),
-        (Transform.identity(), "inv", "; it has inverse"), (Rotation, "translation", ""), (Rotation.identity(), "foo", ""),
-    ],
-)  # fmt: skip
-def test_a_name_of_other_libraries_names_ours(owner: Any, name: str, own: str) -> None:
-    with pytest.raises(AttributeError) as raised:
-        getattr(owner, name)
-    kind = owner if isinstance(owner, type) else type(owner)
-    assert str(raised.value) == f"{kind.__name__} has no attribute {name!r}{own}"
