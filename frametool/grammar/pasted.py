@@ -2,9 +2,9 @@
 
     array([[ 0., -1.], ..                  numpy, PyTorch, JAX; [0 -1; 1 0] is MATLAB
     0.7071 + 0.7071k                       algebra in tutorials: x, y, z of i, j, k, then w
-    0.7071 << 0, 0, 0.7071 >>              spatialmath: w, then x, y, z; (x,y,z,w) = .. is Pinocchio's
+    (x,y,z,w) = 0 0 0.7071 0.7071          Pinocchio
     Quaternion(x=0.0, ..)                  a repr with names; <Euler (x=0, ..), order='XYZ'> of Blender
-    R = .. p = ..                          a rotation and a position; t = 1, 2, 3; rpy/zyx = 0, 0, 90 deg
+    R = .. p = ..                          a rotation and a position
 
 Printed 3x3, 3x4 and 4x4 arrays are matrices, other rows what the caller states.  Each number remains its text.  None
 means that a text is nothing of the kind; an ambiguous meaning returns the bare list that the grammar refuses.
@@ -57,10 +57,9 @@ _DECORATIONS: Sequence[tuple[str, str]] = (
     (rf"\A({LABEL})\s*\d+[\xd7x]\d+\b[^\n]*\n", ""),  # heading of MATLAB's live scripts
     (rf"\A({LABEL})\s*(?:se3|so3)[ \t]*\n", ""),  # MATLAB's classes
     (r"(?s)\A([^<]*)<Matrix \d+x\d+\s*(.*)>", r"\1[\2]"),  # Blender
-    (r"[│┌┐└┘]", " "),  # brackets printed by nalgebra
     (_SCALAR, r"\1"),
 )
-_DECORATED = r"""[\x1b\\⎡⎛│┌`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
+_DECORATED = r"""[\x1b\\⎡⎛`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[ \t]*se3|so3)"""
 
 
 def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
@@ -78,7 +77,7 @@ def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
     pieces = _bracketed(body) if body[:1] and body[0] in _OPEN else re.split(r";|\n", body)
     if pieces is None:
         return None
-    rows = _without_indices([_cells(piece) for piece in pieces if piece.strip()])
+    rows = [_cells(piece) for piece in pieces if piece.strip()]
     cells = [cell for row in rows for cell in row]
     fits = any if any_text and not re.search("[:=\"']", body) else all
     if not cells or not fits(map(_is_number, cells)):
@@ -121,15 +120,6 @@ def _side_by_side(body: str) -> str:
     return "\n".join(map(" ".join, zip(*lines, strict=True)))
 
 
-def _without_indices(rows: Rows) -> Rows:
-    """Remove the row and the column of indices that pandas prints."""
-    if len(rows) < 2 or rows[0] != [str(at) for at in range(len(rows[0]))]:
-        return rows
-    if any(row[0] != str(at) or len(row) != len(rows[0]) + 1 for at, row in enumerate(rows[1:])):
-        return rows
-    return [row[1:] for row in rows[1:]]
-
-
 def _bracketed(body: str) -> list[str] | None:
     """Return the contents of the innermost brackets; None if there is other text around them."""
     plain = body.translate(str.maketrans("({)}", "[[]]"))
@@ -164,13 +154,8 @@ def _times(cell: str, scale: str) -> str:
 
 _TERM = re.compile(rf"([-+]*)((?:{DECIMAL})?)\*?([ijk]?)")
 _MEMBERS = rf"\s*[A-Za-z_]\w*\s*[=:]\s*(?:{NUMBER}|[A-Za-z_][\w.]*\()"
-_THREE = rf"\(?\s*({NUMBER})(°?)\s*,\s*({NUMBER})°?\s*,\s*({NUMBER})°?\s*\)?"
-_SCALAR_FIRST = rf"\s*({NUMBER})\s*(<<|<)\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({NUMBER})\s*>>?\s*"
-_ONE_LINE = rf"\s*(?:\w+:\s*)?t\s*=\s*{_THREE}[;,]\s*(\S+)\s*=\s*(.*)"
 _ABOUT = rf"\((?:x=)?({NUMBER}),\s*(?:y=)?({NUMBER}),\s*(?:z=)?({NUMBER})\)"
 _EULER = rf"\s*(?:<Euler {_ABOUT}, order='([XYZ]{{3}})'>|Euler\({_ABOUT}, '([XYZ]{{3}})'\))\s*"
-_LISTED = r"(?:wxyz|xyzw|xyz)\s*+=\s*+(?:\w++\()?\[[^\[\]]*+\](?:,\s*+dtype=\w++)?\)?"
-_LISTS = rf"\s*+\w++\(\s*+((?:{_LISTED}\s*+(?:,\s*+)?)+)\)\s*"
 _TURNED = "R|rot|rotation|rotation_matrix"
 _MOVED = "t|p|T|trans|translation|tvec"
 _PART = re.compile(rf"(?:^|(?<=[\s(]))({_TURNED}|{_MOVED})\s*[=:]\s*(?=[\[(]|\n|np\.|array|Rot|{NUMBER})")
@@ -184,7 +169,7 @@ def named_values(text: str, default: Notation | None = None) -> list[Any] | None
     robots = [_robot(line, default) for line in text.strip().splitlines() if line.strip()]
     if robots and None not in robots:
         return [*robots]
-    for read in (_algebra, _scalar_first, _members, _lists, _euler, _one_line, _parts):
+    for read in (_algebra, _named_order, _members, _euler, _parts):
         if (found := read(text)) is not None:
             return [found]
     return _origins(text) if re.match(r"\s*<(?!Matrix\b)", text) else None
@@ -239,13 +224,11 @@ def _algebra(text: str) -> dict[str, Any] | None:
     return {"quaternion": {name: parts.get(unit, "0") for name, unit in zip("xyzw", ("i", "j", "k", ""), strict=True)}}
 
 
-def _scalar_first(text: str) -> dict[str, Any] | None:
-    """Read `w << x, y, z >>`, and four numbers after `(x,y,z,w) =`."""
-    if stated := re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text):
-        rows = number_rows(text[stated.end() :])
-        return {"xyzw": rows[0]} if rows and len(rows) == 1 and len(rows[0]) == 4 else None
-    found = re.fullmatch(_SCALAR_FIRST, text)
-    return None if found is None else {"wxyz": [found[1], *found.groups()[2:]]}
+def _named_order(text: str) -> dict[str, Any] | None:
+    """Read four numbers after `(x,y,z,w) =`."""
+    stated = re.match(r"\s*\((x,\s*y,\s*z,\s*w)\)\s*=\s*", text)
+    rows = number_rows(text[stated.end() :]) if stated else None
+    return {"xyzw": rows[0]} if rows and len(rows) == 1 and len(rows[0]) == 4 else None
 
 
 def _members(text: str) -> dict[str, Any] | None:
@@ -282,16 +265,6 @@ def _members(text: str) -> dict[str, Any] | None:
     return stack[0] if len(stack) == 1 and not depth else None
 
 
-def _lists(text: str) -> dict[str, Any] | None:
-    """Read `SE3(wxyz=[..], xyz=[..])`, whose names are those of the grammar."""
-    found = re.fullmatch(_LISTS, text)
-    if found is None:
-        return None
-    lists = re.findall(r"(wxyz|xyzw|xyz)\s*=\s*(?:\w+\()?(\[[^\[\]]*\])", found[1])
-    read = {key: rows[0] for key, numbers in lists if (rows := number_rows(numbers))}
-    return read if len(read) == len(lists) else None
-
-
 def _euler(text: str) -> dict[str, Any] | None:
     """Read Blender's angles: about x, y, z each, applied about the fixed axes in the order of the letters."""
     found = re.fullmatch(_EULER, text)
@@ -299,19 +272,6 @@ def _euler(text: str) -> dict[str, Any] | None:
         return None
     *about, order = [each for each in found.groups() if each is not None]
     return {"euler": {"axes": f"s{order.lower()}", "angles": [about["XYZ".index(letter)] for letter in order]}}
-
-
-def _one_line(text: str) -> dict[str, Any] | None:
-    """Read `t = 0.5, -1.25, 2; rpy/zyx = 68.8°, -22.9°, 17.2°`; angles without a unit are in radians."""
-    found = re.fullmatch(_ONE_LINE, text.strip())
-    if found is None:
-        return None
-    xyz, kind = [found[1], found[3], found[4]], found[5]
-    angles = re.fullmatch(rf"{_THREE}\s*(deg|rad)?", found[6].strip())
-    if kind.lower() != "rpy/zyx" or angles is None:
-        raise ValueInvalid(f"{shown(kind)} is not read; print with rpy/zyx, or print the matrix")
-    is_degrees = angles[2] == "°" or angles[5] == "deg"
-    return {"xyz": xyz, "rpy_deg" if is_degrees else "rpy_rad": [angles[1], angles[3], angles[4]]}
 
 
 def _parts(text: str) -> dict[str, Any] | None:
@@ -462,20 +422,12 @@ def begins_freely(head: str, default: Notation | None, *, moves: bool, alone: bo
         return True
     if moves:
         return False
-    if _is_counted([line.split() for line in lines[:2]]):
-        return True
     matrix = default is None or default.representation.whole is not None
     if (len(cells), len(lines)) == (3, 3) and matrix:
         return default is not None or alone or (None if is_rotation([line.split() for line in lines]) else False)
     if matrix:
         return (len(cells), len(lines)) in ((4, 3), (4, 4))  # a line of twelve is a KITTI file with one pose
     return len(cells) == 1 and len(lines) > 1
-
-
-def _is_counted(rows: list[list[str]]) -> bool:
-    """Return True for the heading of a pandas print: column numbers, before a row that begins with its own number."""
-    counts = [str(at) for at in range(len(rows[0]))]
-    return len(rows) > 1 and rows[0] == counts and rows[1][0] == "0" and len(rows[1]) == len(counts) + 1
 
 
 def _is_long(head: str) -> bool:

@@ -95,7 +95,6 @@ def test_what_manuals_show_is_read(run: Run, way: str, name: str) -> None:
         ("\u23a10.0  -1.0  0.0\u23a4\n\u23a21.0  0.0   0.0\u23a5\n\u23a30.0  0.0   1.0\u23a6", "a print of SymPy is not read"),
         ("Matrix([[Float('0.5', precision=53), Integer(0), Integer(1)]])", "a print of SymPy is not read"),
         ("[[100, 200, 300], [0, 0, 0, 1]]", "two lists state neither unit nor order; write {xyz: [..], wxyz: [..]}"),  # ABB?
-        ("t = 0.5, -1.25, 2; eul = -9.61°, 12.8°, 26.2°", "print with rpy/zyx"),  # spatialmath
         ("- Pose [ XYZ (m) ] [ RPY (rad) ]:\n [1 2 3]\n [0 0 0]\n- Pose [ XYZ (m) ] [ RPY (rad) ]:\n [1 2 3]\n [0 0 0]", "-p"),
     ],
 )
