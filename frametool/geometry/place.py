@@ -119,14 +119,19 @@ class Place(NamedTuple):
         return cls(name, POSITIONS[name].names, name, None, said.origin if name in LOCAL else None)
 
     @property
+    def all(self) -> tuple[Place, ...]:
+        """Return the notations of a result: this one, then the others."""
+        return (self, *self.more)
+
+    @property
     def size(self) -> int:
         """Return the number of its fields."""
-        return len(self.fields) + sum(each.size for each in self.more)
+        return sum(len(each.fields) for each in self.all)
 
     @property
     def is_local(self) -> bool:
         """Return True if one of its notations has an origin."""
-        return any(each.origin is not None for each in (self, *self.more))
+        return any(each.origin is not None for each in self.all)
 
     @property
     def sample(self) -> tuple[float, ...]:
@@ -136,19 +141,18 @@ class Place(NamedTuple):
     @property
     def columns(self) -> tuple[str, ...]:
         """Return the column names of its fields."""
-        own = dict(zip(POSITIONS[self.name].names, POSITIONS[self.name].columns, strict=True))
-        rest = (name for each in self.more for name in each.columns)
-        return (*(own.get(field, field) for field in self.fields), *rest)
+        found: list[str] = []
+        for each in self.all:
+            row = POSITIONS[each.name]
+            own = dict(zip(row.names, row.columns, strict=True))
+            found += (own.get(field, field) for field in each.fields)
+        return tuple(found)
 
     @property
     def words(self) -> dict[int, tuple[str, ...]]:
         """Return the words for numbers that are written as words, by the index of the field: zones."""
-        found = {at: mercator.ZONES for at, field in enumerate(self.fields) if field == ZONE}
-        first = len(self.fields)
-        for each in self.more:
-            found |= {first + at: words for at, words in each.words.items()}
-            first += each.size
-        return found
+        fields = [field for each in self.all for field in each.fields]
+        return {at: mercator.ZONES for at, field in enumerate(fields) if field == ZONE}
 
     def with_grid(self, *, gridded: bool) -> Place:
         """Return the same with or without convergence and scale in addition to UTM."""
@@ -158,17 +162,17 @@ class Place(NamedTuple):
 
     # --- reading ---
 
-    def lla(self, numbers: Sequence[Any]) -> Components:
+    def lla(self, numbers: Sequence[Any]) -> Vector:
         """Return lat, lon in degrees and alt from its numbers."""
         xp, row = namespace(numbers), kernels(self.name)
-        a, b, c = row.read(self, self.given(numbers), xp)
-        return (a, b, c) if row.is_angular else earth.lla(a, b, c, xp)
+        found = row.read(self, self.given(numbers), xp)
+        return found if row.is_angular else earth.lla(*found, xp)
 
-    def ecef(self, numbers: Sequence[Any]) -> Components:
+    def ecef(self, numbers: Sequence[Any]) -> Vector:
         """Return x, y, z in ECEF from its numbers; NaN for an invalid position; `check` raises the reason."""
         xp, row = namespace(numbers), kernels(self.name)
-        a, b, c = row.read(self, self.given(numbers), xp)
-        return earth.ecef(a, b, c, xp) if row.is_angular else (a, b, c)
+        found = row.read(self, self.given(numbers), xp)
+        return earth.ecef(*found, xp) if row.is_angular else found
 
     def given(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers by field."""
@@ -236,7 +240,7 @@ class Place(NamedTuple):
 
     def settle(self, x: Any, y: Any, z: Any) -> None:
         """Use the first of positions in ECEF as the origin, if requested."""
-        for each in (self, *self.more):
+        for each in self.all:
             if each.origin is not None:
                 each.origin.settle(x, y, z)
 
@@ -251,7 +255,7 @@ class Place(NamedTuple):
             lat, lon, alt = read.place.lla(read.numbers)
             lla = lat, earth.eastward(lon, xp), earth.with_latitude(x, y, z, alt, xp)
         found: list[Any] = []
-        for each in (self, *self.more):
+        for each in self.all:
             row = kernels(each.name)
             if each.origin is not None:
                 each.origin.settle(x, y, z)
@@ -280,7 +284,7 @@ class Place(NamedTuple):
 
     def check_result(self, x: float, y: float, z: float) -> None:
         """Raise ValueInvalid unless a position in ECEF can be written in this notation."""
-        for each in (self, *self.more):
+        for each in self.all:
             if kernels(each.name).is_angular:
                 earth.check_ecef(x, y, z)
             if each.name == UTM or each.axes == GRID:
@@ -289,16 +293,14 @@ class Place(NamedTuple):
 
     def entry(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers as the keys of a mapping."""
-        own = dict(zip(self.fields, numbers, strict=False))
-        if self.name == UTM:
-            own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else mercator.ZONES[int(own[ZONE])]}}
-        elif self.name == ECEF:
-            own = {ECEF: [*own.values()]}
-        rest = numbers[len(self.fields) :]
-        for each in self.more:
-            own |= each.entry(rest)
-            rest = rest[each.size :]
-        return own
+        found: dict[str, Any] = {}
+        rest = iter(numbers)
+        for each in self.all:
+            own = dict(zip(each.fields, rest, strict=False))
+            if each.name == UTM:
+                own = {UTM: own | {ZONE: own[ZONE] if own[ZONE] == SAMPLE else mercator.ZONES[int(own[ZONE])]}}
+            found |= {ECEF: [*own.values()]} if each.name == ECEF else own
+        return found
 
 
 class Spot(NamedTuple):
@@ -335,7 +337,7 @@ class Kernels(NamedTuple):
     is_nested: a mapping has the numbers below its name
     """
 
-    read: Callable[[Place, dict[str, Any], Namespace], Components]
+    read: Callable[[Place, dict[str, Any], Namespace], Vector]
     write: Callable[[Place, Components, Namespace], Components]
     is_angular: bool = True
     least: int | None = None
@@ -343,12 +345,12 @@ class Kernels(NamedTuple):
     is_nested: bool = False
 
 
-def _read_lla(_: Place, given: dict[str, Any], _xp: Namespace) -> Components:
+def _read_lla(_: Place, given: dict[str, Any], _xp: Namespace) -> Vector:
     lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
     return lat, lon, _height(given, lat)
 
 
-def _read_utm(place: Place, given: dict[str, Any], xp: Namespace) -> Components:
+def _read_utm(place: Place, given: dict[str, Any], xp: Namespace) -> Vector:
     east = given["easting"]
     zone = given[ZONE] if place.zone is None else place.zone + (east - east)
     return *mercator.lat_lon(zone, east, given["northing"], xp), _height(given, east)
@@ -362,7 +364,7 @@ def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
     return zone, easting, northing, alt, *grid
 
 
-def _read_local(place: Place, given: dict[str, Any], _: Namespace) -> Components:
+def _read_local(place: Place, given: dict[str, Any], _: Namespace) -> Vector:
     """Return x, y, z of axes at the origin; missing numbers are 0."""
     zero = next(iter(given.values())) * 0.0
     return rigid.apply(*_origin(place), *(given.get(name, zero) for name in POSITIONS[place.name].names))
@@ -386,7 +388,7 @@ LLA_KERNELS = Kernels(_read_lla, _as_is, least=2)
 UTM_KERNELS = Kernels(_read_utm, _write_utm, least=3, axes=GRID, is_nested=True)
 LOCAL_KERNELS = Kernels(_read_local, _write_local, is_angular=False)
 ECEF_KERNELS = Kernels(
-    lambda _, given, _xp: tuple(given[axis] for axis in "xyz"), _as_is, is_angular=False, axes=ECEF, is_nested=True
+    lambda _, given, _xp: (given["x"], given["y"], given["z"]), _as_is, is_angular=False, axes=ECEF, is_nested=True
 )
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import ValueInvalid, shown
 from frametool.geometry import earth as wgs84
 from frametool.geometry import floats, placed, quaternion
-from frametool.geometry.place import ECEF, ENU, GRID, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
+from frametool.geometry.place import ECEF, ENU, GRID, GRIDDED, LLA, LOCAL, NED, UNSAID, UTM, ZONE, Place, Spot
 from frametool.geometry.representations import HEADING, POSITIONS
 from frametool.geometry.transverse_mercator import NORTH, SOUTH, ZONES, standard_zone, utm, zone_number
 from frametool.grammar.names import EARTH_FRAMES, FLAT, FLAT_NAMES
@@ -36,6 +36,7 @@ SAME = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng"
 SAME |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt"}
 SEA_LEVEL = ("msl", "ele", "elevation", "orthometric")
 GEOID = {"undulation": "undulation", "geoid_separation": "undulation"}
+FIELDS = SAME | GEOID | dict.fromkeys(SEA_LEVEL, "msl") | {"utm_zone": ZONE}
 LLA_KEYS = frozenset((*SAME, "lat_rad", "lon_rad", *SEA_LEVEL, *GEOID))
 LOCAL_KEYS = frozenset(("east", "north", "up", "down"))
 UTM_KEYS = frozenset((UTM, "easting", "northing", ZONE, "utm_zone"))
@@ -46,17 +47,15 @@ NOT_READ = {  # key or column -> what to write instead
     LLA: "lla does not say which number is lat; write {lat: .., lon: .., alt: ..}",
     "mgrs": "MGRS is not read; convert it to lat, lon first (GeoConvert, or python's mgrs)",
 }
-BESIDE = frozenset(("convergence_deg", "grid_scale"))
-EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | BESIDE | {ECEF, AT, *HEADINGS} | FLAT_NAMES
+EARTH_KEYS = LLA_KEYS | LOCAL_KEYS | UTM_KEYS | NOT_READ.keys() | {*GRIDDED} | {ECEF, AT, *HEADINGS} | FLAT_NAMES
 NO_ALT = "no alt: 0 is taken, on the ellipsoid"
 LEVEL = 1e-9  # below this length the horizontal part has no direction
 NEAR = 0.01  # metres: the largest distance between two positions of one entry
 MINUTE, SECOND = "['\u2032\u2019]", "(?:[\"\u2033\u201d]|'')"
 DMS = re.compile(
-    r"\s*([-+]?)(\d+(?:\.\d*)?)\s*[°d]\s*"
-    rf"(?:(\d+(?:\.\d*)?)\s*{MINUTE}\s*(?:(\d+(?:\.\d*)?)\s*{SECOND}\s*)?)?([NSEWnsew]?)\s*"
+    r"\s*([-+]?)(\d+(?:\.\d*)?)\s*(?:[°d]\s*"
+    rf"(?:(\d+(?:\.\d*)?)\s*{MINUTE}\s*(?:(\d+(?:\.\d*)?)\s*{SECOND}\s*)?)?)?([NSEWnsew]?)\s*"
 )
-COMPASS = re.compile(r"\s*(\d+(?:\.\d*)?)\s*([NSEWnsew])\s*")
 
 
 def not_on_ellipsoid(name: str) -> str:
@@ -85,10 +84,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
     turn = _heading(own, axes)
     if turn is not None and inner.rotation is not None:
         raise Misfit("a heading is a rotation; keep one", (next(key for key in HEADINGS if key in own),), key=True)
-    (place, numbers), *others = spots
-    position = _position(spots[0])
-    for other in others:
-        _agree(position, _position(other))
+    (place, numbers), position = spots[0], _position(spots[0])
     if AT not in own and inner.position is not None:
         _agree(position, inner.position)
         if not said:  # also stated in ecef: then the rotation is relative to it
@@ -113,7 +109,7 @@ def placed_by(mapping: dict[str, Any], inner: Pose, reading: Reading) -> Pose:
 
 
 def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
-    """Read all positions in the keys of a mapping."""
+    """Read all positions in the keys of a mapping; they have to agree."""
     _refuse_not_read(own)
     found = []
     if AT in own:
@@ -123,8 +119,7 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
     if UTM in own:
         found.append(within((UTM,), _utm, own[UTM], reading))
     elif "easting" in own:
-        flat = {key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}
-        found.append(_utm(flat, reading))
+        found.append(_utm({key: own[key] for key in own if key in UTM_KEYS or SAME.get(key) == "alt"}, reading))
     if any(key in own for key in ("lat", "latitude", "lat_rad")):
         found.append(_lla(own, reading))
     if LOCAL_KEYS.intersection(own):
@@ -138,6 +133,8 @@ def _spots(own: dict[str, Any], reading: Reading) -> list[Spot]:
             spot.place.check(spot.numbers)
         except ValueInvalid as error:
             raise Misfit(str(error), (next(iter(own)),)) from None
+    for other in found[1:]:
+        _agree(_position(found[0]), _position(other))
     return found
 
 
@@ -156,58 +153,60 @@ def _placed_at(value: Any, reading: Reading) -> list[Spot]:
     found = _spots(value, reading)
     if not found:
         raise Misfit(_incomplete(value))
-    first = _position(found[0])
-    for other in found[1:]:
-        _agree(first, _position(other))
     return found[:1]
+
+
+def _by_field(own: dict[str, Any]) -> dict[str, str]:
+    """Return the key of each field of a position; raise Misfit for two of one field."""
+    named: dict[str, str] = {}
+    for key in own:
+        if (field := FIELDS.get(key, key)) in named:
+            raise Misfit(f"{named[field]} and {key} are both {field}; keep one", (key,), key=True)
+        named[field] = key
+    return named
+
+
+def _heights(named: dict[str, str], reading: Reading, *path: str) -> list[str]:
+    """Return the fields of a position that make its height above the ellipsoid; note that there is none."""
+    if "alt" in named:
+        return ["alt"]
+    if "msl" not in named:
+        reading.note(NO_ALT, *path, rule="no-alt")
+        return []
+    if "undulation" not in named:
+        raise Misfit(not_on_ellipsoid(named["msl"]), (named["msl"],), key=True)
+    return ["msl", "undulation"]
 
 
 def _lla(own: dict[str, Any], reading: Reading) -> Spot:
     """Read latitude, longitude and height."""
-    named: dict[str, str] = {}
-    for key in own:
-        field = SAME.get(key) or GEOID.get(key) or ("msl" if key in SEA_LEVEL else key)
-        if field in ("lat", "lon", "alt", "msl", "undulation", "lat_rad", "lon_rad"):
-            if field in named:
-                raise Misfit(f"{named[field]} and {key} are both {field}; keep one", (key,), key=True)
-            named[field] = key
+    named = _by_field(own)
     latitude, longitude = ([each for each in (name, f"{name}_rad") if each in named] for name in ("lat", "lon"))
     if len(latitude) != 1 or len(longitude) != 1:
         raise Misfit(_incomplete(own), (next(iter(own)),), key=True)
-    fields = [*latitude, *longitude]
-    if "alt" in named:
-        fields.append("alt")
-    elif "msl" in named:
-        if "undulation" not in named:
-            raise Misfit(not_on_ellipsoid(named["msl"]), (named["msl"],), key=True)
-        fields += ["msl", "undulation"]
-    else:
-        reading.note(NO_ALT, named[fields[0]], rule="no-alt")
-    numbers = [_member(named[field], coordinate, own[named[field]], field) for field in fields]
-    return Spot(Place(LLA, tuple(fields)), tuple(numbers))
+    fields = *latitude, *longitude, *_heights(named, reading, named[latitude[0]])
+    return Spot(Place(LLA, fields), tuple(_member(named[each], coordinate, own[named[each]], each) for each in fields))
 
 
 def coordinate(value: Any, field: str) -> float:
     """Read a number, for latitude and longitude also with marks: 48°08'14.5"N, 48.1N."""
     if type(value) is not str:
         raise Misfit(f"expected a number, found {kind(value)}")
-    if field not in ("lat", "lon"):
-        return parse_number(value)
-    if match := COMPASS.fullmatch(value):
-        return _signed(parse_number(match[1]), match[2], value, field)
-    if match := DMS.fullmatch(value):
-        sign, degrees, minutes, seconds, letter = match.groups()
-        parts = [float(part or 0.0) for part in (degrees, minutes, seconds)]
-        if max(parts[1:]) >= 60.0 or (sign and letter):
-            raise Misfit(f"{shown(value)}: minutes and seconds are below 60, and a sign or a letter states the side")
-        size = (parts[0] * 3600.0 + parts[1] * 60.0 + parts[2]) / 3600.0
-        return _signed(-size if sign == "-" else size, letter, value, field)
     try:
         return parse_number(value)
     except ValueInvalid as error:
-        if len(re.findall(r"\d+(?:\.\d+)?", value)) > 1:
-            raise Misfit(f"{shown(value)}: degrees, minutes and seconds need their marks: 48°08'14.5\"N") from None
-        raise Misfit(str(error), rule=error.rule) from None
+        if field not in ("lat", "lon"):
+            raise
+        if (match := DMS.fullmatch(value)) is None:
+            marks = f"{shown(value)}: degrees, minutes and seconds need their marks: 48°08'14.5\"N"
+            is_several = len(re.findall(r"\d+(?:\.\d+)?", value)) > 1
+            raise Misfit(marks if is_several else str(error), rule=error.rule) from None
+    sign, degrees, minutes, seconds, letter = match.groups()
+    parts = [float(part or 0.0) for part in (degrees, minutes, seconds)]
+    if max(parts[1:]) >= 60.0 or (sign and letter):
+        raise Misfit(f"{shown(value)}: minutes and seconds are below 60, and a sign or a letter states the side")
+    size = (parts[0] * 3600.0 + parts[1] * 60.0 + parts[2]) / 3600.0 if minutes else parts[0]
+    return _signed(-size if sign == "-" else size, letter, value, field)
 
 
 def _signed(size: float, letter: str, text: str, field: str) -> float:
@@ -224,33 +223,23 @@ def _utm(value: Any, reading: Reading) -> Spot:
         example = "{zone: 32N, easting: .., northing: .., alt: ..}"
         raise Misfit(f"expected {example}, found {kind(value)}")
     _refuse_not_read(value)
-    known = {*POSITIONS[UTM].names, "utm_zone", *GEOID, *SEA_LEVEL, "altitude", "height", "hae",
-             "convergence_deg", "grid_scale"}  # fmt: skip
+    known = {*POSITIONS[UTM].names, "utm_zone", *GEOID, *SEA_LEVEL, "altitude", "height", "hae", *GRIDDED}
     if unknown := [key for key in value if key not in known]:
         what = f"unknown key {shown(unknown[0])} of utm; it has zone, easting, northing, alt"
         raise Misfit(what, (unknown[0],), key=True)
-    zones = [_member(key, _zone, value[key]) for key in (ZONE, "utm_zone") if key in value]
-    zones += [reading.earth.zone] if not zones and reading.earth and reading.earth.zone is not None else []
-    if not zones or len({*zones}) > 1:
-        raise Misfit("utm needs its zone: 32N, or 32S south of the equator" if not zones else "two zones; keep one")
-    missing = [key for key in ("easting", "northing") if key not in value]
-    if missing:
+    named = _by_field(value)
+    zone = reading.earth.zone if reading.earth else None
+    if ZONE in named:
+        zone = _member(named[ZONE], _zone, value[named[ZONE]])
+    if zone is None:
+        raise Misfit("utm needs its zone: 32N, or 32S south of the equator")
+    if missing := [key for key in ("easting", "northing") if key not in value]:
         raise Misfit(f"missing {' and '.join(missing)}; utm has zone, easting, northing, alt")
-    numbers = [zones[0], *(_member(key, read_number, value[key]) for key in ("easting", "northing"))]
-    height = next((key for key in value if SAME.get(key) == "alt"), "")
-    if sea := next((key for key in SEA_LEVEL if key in value and not height), ""):
-        geoid = next((key for key in GEOID if key in value), "")
-        if not geoid:
-            raise Misfit(not_on_ellipsoid(sea), (sea,), key=True)
-        numbers.append(_member(sea, read_number, value[sea]) + _member(geoid, read_number, value[geoid]))
-    elif height:
-        numbers.append(_member(height, read_number, value[height]))
-    else:
-        reading.note(NO_ALT, rule="no-alt")
-        numbers.append(0.0)
-    if zones[0] < 0.0 and 3.5e6 <= numbers[2] <= 4.5e6:
-        reading.note(band_s(zones[0], numbers[2]), rule="band-s")
-    return Spot(Place(UTM, POSITIONS[UTM].names), tuple(numbers))
+    fields = "easting", "northing", *_heights(named, reading)
+    numbers = zone, *(_member(named[each], read_number, value[named[each]]) for each in fields)
+    if zone < 0.0 and 3.5e6 <= numbers[2] <= 4.5e6:
+        reading.note(band_s(zone, numbers[2]), rule="band-s")
+    return Spot(Place(UTM, (ZONE, *fields)), numbers)
 
 
 def band_s(zone: float, northing: float) -> str:
