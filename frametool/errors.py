@@ -31,9 +31,8 @@ if TYPE_CHECKING:
 
 SHOWN = 60  # maximum length of quoted input in a message
 LONGEST_NAME = 200  # names up to this length are compared with others
-MOST_COMPARED = 500  # names
+MOST_COMPARED, NEIGHBOURS = 500, 60  # names
 NEAREST = 5  # names listed first in a shortened list
-USUAL_NAME = 20  # characters
 
 
 class FrametoolError(Exception):
@@ -268,38 +267,17 @@ def any_near(name: str, known: Iterable[str], otherwise: str) -> str:
 
 
 def _likely(name: str, known: list[str]) -> list[str]:
-    """Return the names to compare: of many those with the same first or second half and the most in common.
-
-    A typing error leaves one half of a name unchanged.  Longer names cost more, so fewer are compared.
-    """
+    """Return the names to compare: of many those next to it in alphabetical order, read forwards and backwards."""
     if len(known) <= MOST_COMPARED:
         return known
-    half = len(name) // 2
-    first, second = _sharing(known, name, half, ends=False), _sharing(known, name, half, ends=True)
-    ways = (first, False, half), (first, True, 0), (second, False, 0), (second, True, half)
-    most = max(MOST_COMPARED // 4 * USUAL_NAME**2 // max(len(name), USUAL_NAME) ** 2, 4)
-    return [each for names, ends, least in ways for each in _sharing_most(names, name, least, ends=ends)[:most]]
+    from bisect import bisect
 
-
-def _sharing(names: list[str], name: str, count: int, *, ends: bool) -> list[str]:
-    """Return the names that begin with the first characters of a name, or end with its last."""
-    if ends:
-        end = name[len(name) - count :]
-        return [each for each in names if each.endswith(end)]
-    start = name[:count]
-    return [each for each in names if each.startswith(start)]
-
-
-def _sharing_most(names: list[str], name: str, least: int, *, ends: bool) -> list[str]:
-    """Return the names with the most characters in common with a name; all have the `least` in common."""
-    most = len(name)
-    while least < most:
-        middle = (least + most + 1) // 2
-        if some := _sharing(names, name, middle, ends=ends):
-            least, names = middle, some
-        else:
-            most = middle - 1
-    return names
+    near: dict[str, None] = {}
+    for step in (1, -1):
+        texts = sorted(each[::step] for each in known)
+        at = bisect(texts, name[::step])
+        near |= dict.fromkeys(each[::step] for each in texts[max(at - NEIGHBOURS, 0) : at + NEIGHBOURS])
+    return [*near]
 
 
 def alternatives(name: str, known: Iterable[str], label: str) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from itertools import chain, pairwise
+from itertools import chain, islice, pairwise
 from operator import itemgetter
 
 from frametool.geometry import floats, rigid
@@ -98,8 +98,8 @@ class MovingTrack:
     one sort inserts many.
     """
 
-    __slots__ = ("authority", "child", "first_ns", "known", "last_ns", "late", "parent", "parents", "samples",
-                 "segments", "stamps", "table", "varies")  # fmt: skip
+    __slots__ = ("authority", "begin", "child", "first_ns", "known", "last_ns", "late", "parent", "parents",
+                 "samples", "segments", "stamps", "table", "varies")  # fmt: skip
     is_static: Literal[False] = False
 
     def __init__(self, child: str, stamp_ns: int, parent: str, components: Rigid) -> None:
@@ -109,6 +109,7 @@ class MovingTrack:
         self.varies = False
         self.stamps, self.parents = [stamp_ns], [parent]
         self.samples = [components]  # or Packed, which behaves like such a list
+        self.begin = 0  # the index of the oldest sample: those before it were dropped
         self.late: list[tuple[int, str, Rigid]] = []
         self.segments: dict[int, Way] = {}  # by the stamp at which they begin
         self.first_ns = self.last_ns = stamp_ns
@@ -119,7 +120,7 @@ class MovingTrack:
     @property
     def count(self) -> int:
         """Return how many samples there are."""
-        return len(self.stamps) + len(self.late)
+        return len(self.stamps) - self.begin + len(self.late)
 
     @property
     def span(self) -> tuple[int, int]:
@@ -134,7 +135,7 @@ class MovingTrack:
     def walk(self) -> Iterator[tuple[int, str, Rigid]]:
         """Yield every sample as (stamp, parent, components), oldest first."""
         self._settle()
-        return zip(self.stamps, self.parents, self.samples, strict=True)
+        return islice(zip(self.stamps, self.parents, self.samples, strict=True), self.begin, None)
 
     def changes(self) -> Iterator[int]:
         """Yield the stamps at which the parent changes."""
@@ -205,10 +206,10 @@ class MovingTrack:
         self.late.clear()
 
     def _place(self, at_ns: int) -> int:
-        """Return the index of the newest sample that is not after a time; -1 if there is none."""
+        """Return the index of the newest sample that is not after a time; `begin` - 1 if there is none."""
         if self.late:
             self._settle()
-        return bisect_right(self.stamps, at_ns) - 1
+        return bisect_right(self.stamps, at_ns, self.begin) - 1
 
     def sample_at(self, stamp_ns: int) -> tuple[str, Rigid]:
         """Return parent and components at a stamp that there is."""
@@ -229,23 +230,26 @@ class MovingTrack:
             self.varies = any(True for _ in self.changes())
 
     def drop_before(self, stamp_ns: int) -> None:
-        """Drop the samples older than a stamp, but never the newest."""
-        if min(stamp_ns, self.last_ns) <= self.first_ns:
+        """Drop the samples older than a stamp, but never the newest; half of the lists goes at once."""
+        oldest = min(stamp_ns, self.last_ns)
+        if oldest <= self.first_ns:
             return
         self._settle()
-        self._unpack()
-        count = bisect_left(self.stamps, min(stamp_ns, self.last_ns))
-        may_settle = self.varies and len({*self.parents[: count + 1]}) > 1
-        for gone in self.stamps[:count]:
-            self.segments.pop(gone, None)
-        if self.known is not None:
-            self.known.difference_update(self.stamps[:count])
-        for column in (self.stamps, self.parents, self.samples):
-            del column[:count]
-        self.first_ns = self.stamps[0]
+        gone = slice(self.begin, bisect_left(self.stamps, oldest))
+        self.begin = gone.stop
+        self.first_ns = self.stamps[self.begin]
         self.table = None
-        if may_settle:
+        for dropped in self.stamps[gone]:
+            self.segments.pop(dropped, None)
+        if self.known is not None:
+            self.known.difference_update(self.stamps[gone])
+        if self.varies and len({*self.parents[gone], self.parents[self.begin]}) > 1:
             self.varies = any(True for _ in self.changes())
+        if 2 * self.begin > len(self.stamps):
+            self._unpack()
+            for column in (self.stamps, self.parents, self.samples):
+                del column[: self.begin]
+            self.begin = 0
 
     def covers(self, at_ns: int) -> bool:
         """Return True if a time is within the samples."""
@@ -259,7 +263,7 @@ class MovingTrack:
 
     def parent_near(self, at_ns: int) -> str:
         """Return the parent at a time, or at the sample nearest to it."""
-        return self.parents[max(self._place(at_ns), 0)]
+        return self.parents[max(self._place(at_ns), self.begin)]
 
     def at(self, at_ns: int) -> Rigid | None:
         """Return parent_from_child at a time, interpolated between two samples; None outside of them.
@@ -267,7 +271,7 @@ class MovingTrack:
         Between samples under different parents the older one is valid, as in tf2.
         """
         at = self._place(at_ns)
-        if at < 0:
+        if at < self.begin:
             return None
         begin = self.stamps[at]
         if begin == at_ns:

@@ -91,11 +91,10 @@ def _repaired(
     """Return the deviations of a block's rows (None: nothing to report), the block made rotations, and the worst."""
     if rule is None:
         return None, block, 0.0
-    worst = rule.furthest(*block, arrays)
-    if worst <= min(rule.exact, SILENT):
-        return None, block, worst
     off = rule.deviation(*block, arrays)
     worst = arrays.furthest(off)
+    if worst <= min(rule.exact, SILENT):
+        return None, block, worst
     refused = ~(off < np.inf) if normalize else ~(off <= TOLERATED)
     rough = np.flatnonzero((off > rule.exact) & ~refused)
     grades = None if worst <= SILENT else np.where(refused, np.inf, 0.0 if normalize else off)

@@ -93,20 +93,6 @@ def _is_positive(aa: N, bb: N, cc: N, ab: N, ac: N, bc: N) -> Condition:
     return (aa > 0.0) & (aa * bb - ab * ab > 0.0) & (determinant(aa, ab, ac, ab, bb, bc, ac, bc, cc) > 0.0)
 
 
-def furthest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> float:
-    """Return the largest deviation of all rows, inf if one is mirrored or far off.
-
-    It uses minima and maxima, which cost a quarter of the deviation of each row.
-    """
-    off = [
-        xp.furthest(a * a + b * b + c * c, 1.0), xp.furthest(d * d + e * e + f * f, 1.0),
-        xp.furthest(g * g + h * h + i * i, 1.0), xp.furthest(a * d + b * e + c * f),
-        xp.furthest(a * g + b * h + c * i), xp.furthest(d * g + e * h + f * i),
-    ]  # fmt: skip
-    right = all(part <= TOLERATED for part in off) and xp.least(determinant(a, b, c, d, e, f, g, h, i)) > SINGULAR
-    return max(off) if right else inf
-
-
 def nearest(a: N, b: N, c: N, d: N, e: N, f: N, g: N, h: N, i: N, xp: Functions[N]) -> Nine[N]:
     """Return the rotation nearest to a matrix that is close to one: its orthogonal polar factor.
 
@@ -250,11 +236,6 @@ def six_d_deviation(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) 
     first, second = quaternion.unit_vector(ax, ay, az, xp), quaternion.unit_vector(bx, by, bz, xp)
     sine = length(*quaternion.cross(*first, *second), xp)
     return xp.where(sine > PARALLEL, 0.0, inf)
-
-
-def six_d_furthest(ax: N, ay: N, az: N, bx: N, by: N, bz: N, xp: Functions[N]) -> float:
-    """Return 0 if all pairs of columns span a plane, else inf."""
-    return xp.furthest(six_d_deviation(ax, ay, az, bx, by, bz, xp))
 
 
 def six_d_repaired(ax: N, ay: N, az: N, bx: N, by: N, bz: N, _xp: Functions[N]) -> Six[N]:

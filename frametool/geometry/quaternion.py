@@ -221,11 +221,6 @@ def explained(parts: Sequence[Any], halves: Sequence[Any], xp: Functions[Any]) -
     return found
 
 
-def furthest(x: N, y: N, z: N, w: N, xp: Functions[N]) -> float:
-    """Return the largest deviation of a squared norm from 1: the deviation if all are within 1e-6, larger elsewhere."""
-    return xp.furthest(x * x + y * y + z * z + w * w, 1.0)
-
-
 def repaired(x: N, y: N, z: N, w: N, xp: Functions[N]) -> Four[N]:
     """Normalise quaternions that are not unit to 4 eps; only those with a large deviation take the slower path."""
     squared = x * x + y * y + z * z + w * w

@@ -48,8 +48,6 @@ class BatchRule(NamedTuple):
 
     what: what the rows are, in the plural
     deviation: kernel (components, xp) of the deviation of each row from a rotation; inf if it cannot be repaired
-    furthest: function (components, xp) of the largest deviation, at least where none is above `exact`; otherwise
-        any value above it, or NaN
     repair: kernel (components, xp) that makes rotations of rows
     exact: the deviation up to which a row keeps its bits
     explained: function (components, halves, xp) that returns True if a row is a rotation up to half a unit of the last
@@ -58,7 +56,6 @@ class BatchRule(NamedTuple):
 
     what: str
     deviation: Callable[..., Any]
-    furthest: Callable[..., float]
     repair: Kernel
     exact: float
     explained: Callable[..., Any] | None = None
@@ -209,12 +206,9 @@ HOMOGENEOUS = Whole(
     tuple(f"m{row}{column}" for row in range(1, 5) for column in range(1, 5)), _homogeneous, _of_homogeneous, LAST_ROW
 )
 QUATERNIONS = BatchRule(
-    "quaternions", quaternion.deviation, quaternion.furthest, quaternion.repaired, quaternion.UNIT,
-    quaternion.explained,
-)  # fmt: skip
-MATRICES = BatchRule(
-    "matrices", matrix.deviation, matrix.furthest, matrix.nearest, matrix.ORTHONORMAL, matrix.explained
+    "quaternions", quaternion.deviation, quaternion.repaired, quaternion.UNIT, quaternion.explained
 )
+MATRICES = BatchRule("matrices", matrix.deviation, matrix.nearest, matrix.ORTHONORMAL, matrix.explained)
 RPY, EULER_COLUMNS = ("roll", "pitch", "yaw"), ("euler_1", "euler_2", "euler_3")
 XYZW = Representation(
     ("qx", "qy", "qz", "qw"), (), "unit quaternion, scalar last", short=("x", "y", "z", "w"), label="quaternion",
@@ -237,8 +231,7 @@ ROTATIONS = _named({
         forward=_arithmetic(_of_wxyz(_xyzw)), backward=_plain(_as_wxyz(quaternion.from_quaternion)),
         check=_as_wxyz(_of_wxyz(quaternion.check)), kept=_wxyz,
         batch=QUATERNIONS._replace(
-            deviation=_of_wxyz(quaternion.deviation), furthest=_of_wxyz(quaternion.furthest),
-            repair=_as_wxyz(_of_wxyz(quaternion.repaired)),
+            deviation=_of_wxyz(quaternion.deviation), repair=_as_wxyz(_of_wxyz(quaternion.repaired))
         ),
     ),
     "rpy": Representation(
@@ -277,7 +270,7 @@ ROTATIONS = _named({
         ("r11", "r21", "r31", "r12", "r22", "r32"), (), "first two columns of the matrix (Zhou's continuous 6D)",
         label="6d", searched=False,
         forward=_plain(matrix.from_six_d), backward=_arithmetic(matrix.as_six_d), check=matrix.check_six_d,
-        batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_furthest, matrix.six_d_repaired, inf),
+        batch=BatchRule("pairs of columns", matrix.six_d_deviation, matrix.six_d_repaired, inf),
     ),
     "rpy_unreal": Representation(
         RPY, (0, 1, 2), "degrees, as Unreal's FRotator and CARLA turn their own axes",

@@ -33,8 +33,8 @@ class Batched:
     _components: Components
 
     @classmethod
-    def _of_columns(cls, components: Components) -> Self:
-        """Create from trusted components, all floats or all arrays of one shape."""
+    def of(cls, *components: Any) -> Self:
+        """Create without checks from (tx, ty, tz and) x, y, z, w: all floats, or all arrays of one shape."""
         made = _new(cls)
         made._components = components  # noqa: SLF001 - its own class
         return made
@@ -54,7 +54,7 @@ class Batched:
         """Select elements as numpy does."""
         if not self.shape:
             raise TypeError(f"one {type(self).__name__.lower()} has no elements")
-        return self._of_columns(validation.chosen(self._components, index))
+        return self.of(*validation.chosen(self._components, index))
 
     def __iter__(self) -> Iterator[Self]:
         """Iterate over the first axis."""
@@ -79,13 +79,6 @@ class Rotation(Batched):
     def __init__(self, xyzw: Numbers) -> None:
         """Create from quaternions x, y, z, w of shape (..., 4), as `from_quaternion`."""
         self._components = Rotation.from_quaternion(xyzw).components
-
-    @classmethod
-    def of(cls, x: Any, y: Any, z: Any, w: Any) -> Rotation:
-        """Create from unit components without checks, all floats or all arrays of one shape."""
-        made = _new(cls)
-        made._components = (x, y, z, w)  # noqa: SLF001 - its own class
-        return made
 
     @property
     def components(self) -> Quaternion:
@@ -184,7 +177,7 @@ class Rotation(Batched):
         """
         parts = (*validation.columns(start, 3, "start"), *validation.columns(end, 3, "end"))
         made = validation.checked(quaternion.between, 4, parts, "start, end", quaternion.check_directions)
-        return cls._of_columns(made)
+        return cls.of(*made)
 
     @classmethod
     def from_columns(cls, spec: str, inputs: Components, name: str, *, normalize: bool = False) -> Rotation:
@@ -194,7 +187,7 @@ class Rotation(Batched):
             return cls.of(*rep.checked_quaternion(inputs, floats, normalize=normalize))
         from frametool.geometry.batch_validation import require_rotations
 
-        return cls._of_columns(require_rotations(rep, inputs, name, normalize=normalize))
+        return cls.of(*require_rotations(rep, inputs, name, normalize=normalize))
 
     def _as(self, spec: str, out: Array | None, inner: tuple[int, ...] = ()) -> Array:
         """Return rows of the columns of a notation, in shape `inner` if set, in `out` if passed."""
@@ -255,7 +248,7 @@ class Rotation(Batched):
             product = _new(Rotation)
             product._components = quaternion.compose(*ours, *theirs)
             return product
-        return self._of_columns(validation.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
+        return self.of(*validation.run(quaternion.compose, 4, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Rotation:
         """Return the inverse rotation."""
@@ -263,7 +256,7 @@ class Rotation(Batched):
 
     def canonical(self) -> Rotation:
         """Return the same rotation with a quaternion of canonical sign."""
-        return self._of_columns(validation.run(quaternion.from_quaternion, 4, self._components))
+        return self.of(*validation.run(quaternion.from_quaternion, 4, self._components))
 
     def apply(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Rotate vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
@@ -289,7 +282,7 @@ class Rotation(Batched):
         fraction: a number, or an array that broadcasts with the rotations.
         """
         parts = (*self._components, *require(other, "other").components, validation.scalars(fraction, "fraction"))
-        return self._of_columns(validation.run(quaternion.slerp, 4, parts))
+        return self.of(*validation.run(quaternion.slerp, 4, parts))
 
     def mean(self, weights: Numbers | None = None) -> Rotation:
         """Return the chordal mean of all elements: the rotation with the least sum of squared matrix differences.

@@ -40,13 +40,6 @@ class Transform(Batched):
         shift = validation.columns(translation, 3, "translation")
         self._components = validation.joined(shift, rotation.components, "translation")
 
-    @classmethod
-    def of(cls, tx: Any, ty: Any, tz: Any, x: Any, y: Any, z: Any, w: Any) -> Transform:
-        """Create from components without checks, all floats or all arrays of one shape, the quaternion unit."""
-        made = _new(cls)
-        made._components = (tx, ty, tz, x, y, z, w)  # noqa: SLF001 - its own class
-        return made
-
     @property
     def components(self) -> Rigid:
         """Return tx, ty, tz, x, y, z, w: floats of one transform, else arrays of the batch's shape."""
@@ -82,7 +75,7 @@ class Transform(Batched):
         (name, inputs), *_ = [*rotation.items(), ("rotation", Rotation.identity())]
         turn = inputs if name == "rotation" else Rotation.from_notation(name, inputs, normalize=normalize)
         shift = validation.columns(xyz, 3, "xyz")
-        return cls._of_columns(validation.joined(shift, require(turn, "rotation").components, "xyz"))
+        return cls.of(*validation.joined(shift, require(turn, "rotation").components, "xyz"))
 
     @classmethod
     def from_arrays(cls, xyz: Numbers, xyzw: Numbers, *, normalize: bool = False) -> Transform:
@@ -93,7 +86,7 @@ class Transform(Batched):
         """
         shift = validation.columns(xyz, 3, "xyz")
         rotation = Rotation.from_quaternion(xyzw, normalize=normalize)
-        return cls._of_columns(validation.joined(shift, rotation.components, "xyz"))
+        return cls.of(*validation.joined(shift, rotation.components, "xyz"))
 
     @classmethod
     def from_matrix(cls, matrices: Numbers, *, normalize: bool = False) -> Transform:
@@ -105,7 +98,7 @@ class Transform(Batched):
         m = validation.matrices(matrices, 4, "matrix")
         validation.check_last_row(m, "matrix")
         rotation = Rotation.from_columns("matrix", (*m[0:3], *m[4:7], *m[8:11]), "matrix", normalize=normalize)
-        return cls._of_columns(validation.joined((m[3], m[7], m[11]), rotation.components, "matrix"))
+        return cls.of(*validation.joined((m[3], m[7], m[11]), rotation.components, "matrix"))
 
     @classmethod
     def exp(cls, twist: Numbers) -> Transform:
@@ -114,7 +107,7 @@ class Transform(Batched):
         Linear part first, as in ROS messages: metres, then radians.
         """
         inputs = validation.columns(twist, 6, "twist")
-        return cls._of_columns(validation.checked(rigid.exp, 7, inputs, "twist", rigid.check_twist))
+        return cls.of(*validation.checked(rigid.exp, 7, inputs, "twist", rigid.check_twist))
 
     @property
     def xyz(self) -> Array:
@@ -148,16 +141,16 @@ class Transform(Batched):
             product = _new(Transform)
             product._components = rigid.compose(*ours, *theirs)
             return product
-        return self._of_columns(validation.run(rigid.compose, 7, (*ours, *theirs), functions=False))
+        return self.of(*validation.run(rigid.compose, 7, (*ours, *theirs), functions=False))
 
     def inverse(self) -> Transform:
         """Return b_from_a of a_from_b."""
-        return self._of_columns(validation.run(rigid.inverse, 7, self._components, functions=False))
+        return self.of(*validation.run(rigid.inverse, 7, self._components, functions=False))
 
     def relative(self, other: Transform) -> Transform:
         """Return the pose of the other in this one: self.inverse() @ other, accurate also for close poses."""
-        return self._of_columns(
-            validation.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
+        return self.of(
+            *validation.run(rigid.relative, 7, (*self._components, *_components_of(other)), functions=False)
         )
 
     def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
@@ -185,7 +178,7 @@ class Transform(Batched):
         fraction: a number, or an array that broadcasts with the transforms.
         """
         parts = (*self._components, *_components_of(other), validation.scalars(fraction, "fraction"))
-        return self._of_columns(validation.run(rigid.interpolate, 7, parts))
+        return self.of(*validation.run(rigid.interpolate, 7, parts))
 
     def distance(self, other: Transform) -> tuple[Any, Any]:
         """Return the distance in metres and the angle in radians between two."""

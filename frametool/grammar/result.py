@@ -5,6 +5,7 @@ Drawings show an edge in short: millimetres and hundredths of a degree.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, shown, warn
@@ -55,10 +56,10 @@ class Style:
     recording: how results are written to a recording
     """
 
-    __slots__ = (
-        "axes", "degrees", "format", "full", "in_camera", "in_cm", "keep_sign", "notations", "place", "precision",
-        "recording", "screen",
-    )  # fmt: skip
+    axes = ""
+    in_camera = in_cm = screen = False
+    place: Place | None = None
+    recording = RecordingStyle()
 
     def __init__(
         self,
@@ -72,10 +73,6 @@ class Style:
     ) -> None:
         """Store the options of a command."""
         self.format = fmt
-        self.axes = ""
-        self.in_camera = self.in_cm = self.screen = False
-        self.place: Place | None = None
-        self.recording = RecordingStyle()
         self.notations = notations
         self.degrees = degrees
         self.precision = precision
@@ -84,12 +81,8 @@ class Style:
 
     def with_format(self, fmt: str) -> Style:
         """Return the same style in another format."""
-        style = Style(
-            fmt, self.notations, degrees=self.degrees, precision=self.precision, full=self.full,
-            keep_sign=self.keep_sign,
-        )  # fmt: skip
-        style.axes, style.in_camera, style.in_cm, style.screen = self.axes, self.in_camera, self.in_cm, self.screen
-        style.recording = self.recording
+        style = copy(self)
+        style.format = fmt
         style.put_at(self.place)
         return style
 
@@ -99,7 +92,7 @@ class Style:
 
     def in_notations(self, notations: tuple[Notation, ...]) -> Style:
         """Return the same style with other notations."""
-        style = self.with_format(self.format)
+        style = copy(self)
         style.notations = notations
         return style
 
@@ -238,8 +231,8 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
 
 def _by_xyz(style: Style) -> Style:
     """Return the same style with positions as x, y, z."""
-    plain = style.with_format(style.format)
-    plain.put_at(None)
+    plain = copy(style)
+    plain.place = None
     return plain
 
 
