@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import arrays, floats, matrix, quaternion, vectors
+from frametool.geometry import arrays, floats, matrix, quaternion
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -150,14 +150,14 @@ def as_quaternion(rotations: Array) -> Quaternion:
 def exp(rotvecs: Array) -> Array:
     """Return the rotation matrices of rotation vectors (.., 3), radians."""
     x, y, z = np.moveaxis(rotvecs, -1, 0)
-    nine = quaternion.to_matrix(*vectors.from_rotvec(x, y, z, arrays))
+    nine = quaternion.to_matrix(*quaternion.from_rotvec(x, y, z, arrays))
     return np.stack(nine, -1).reshape(*rotvecs.shape, 3)
 
 
 def log(rotations: Array) -> Array:
     """Return the rotation vectors of rotation matrices (.., 3, 3)."""
     x, y, z, w = as_quaternion(rotations)
-    return np.stack(vectors.as_rotvec(x, y, z, w, arrays), -1)
+    return np.stack(quaternion.as_rotvec(x, y, z, w, arrays), -1)
 
 
 def skew(v: Array) -> Array:

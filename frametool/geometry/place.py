@@ -165,16 +165,16 @@ class Place(NamedTuple):
     def lla(self, numbers: Sequence[Any]) -> Vector:
         """Return lat, lon in degrees and alt from its numbers."""
         xp, row = namespace(numbers), kernels(self.name)
-        found = row.read(self, self.given(numbers), xp)
+        found = row.read(self, self.named(numbers), xp)
         return found if row.is_angular else earth.lla(*found, xp)
 
     def ecef(self, numbers: Sequence[Any]) -> Vector:
         """Return x, y, z in ECEF from its numbers; NaN for an invalid position; `check` raises the reason."""
         xp, row = namespace(numbers), kernels(self.name)
-        found = row.read(self, self.given(numbers), xp)
+        found = row.read(self, self.named(numbers), xp)
         return earth.ecef(*found, xp) if row.is_angular else found
 
-    def given(self, numbers: Sequence[Any]) -> dict[str, Any]:
+    def named(self, numbers: Sequence[Any]) -> dict[str, Any]:
         """Return its numbers by field."""
         return dict(zip(self.fields, numbers, strict=True))
 
@@ -223,16 +223,16 @@ class Place(NamedTuple):
         return earth.ecef_from_axes(lat, lon, self.axes, xp, convergence)
 
     def _zone_of(self, numbers: Sequence[Any]) -> Any:
-        return self.given(numbers).get(ZONE, self.zone)
+        return self.named(numbers).get(ZONE, self.zone)
 
     def check(self, numbers: Sequence[float]) -> None:
         """Raise ValueInvalid unless floats are a valid position."""
-        given = self.given(numbers)
+        named = self.named(numbers)
         if self.name == UTM:
-            mercator.check_grid(given[ZONE] if self.zone is None else self.zone, given["easting"], given["northing"])
+            mercator.check_grid(named[ZONE] if self.zone is None else self.zone, named["easting"], named["northing"])
         elif kernels(self.name).is_angular:
             earth.check_lla(*self.lla(numbers))
-        if GRID in (self.axes, AXES in given and earth.AXES[int(given[AXES])]):
+        if GRID in (self.axes, AXES in named and earth.AXES[int(named[AXES])]):
             lat, lon, _ = self.lla(numbers)
             mercator.check_utm(_held(self._zone_of(numbers), lat, lon, floats), lat, lon)
 
@@ -263,7 +263,7 @@ class Place(NamedTuple):
                 lla = lla or earth.lla(x, y, z, xp)
             own = row.write(each, lla if row.is_angular else (x, y, z), xp)[: len(each.fields)]
             if read is not None and (read.place.name, read.place.origin) == (each.name, each.origin):
-                as_read = read.place.given(read.numbers)
+                as_read = read.place.named(read.numbers)
                 own = tuple(
                     _as_read(as_read.get(field), number, xp) for field, number in zip(each.fields, own, strict=True)
                 )
@@ -345,15 +345,15 @@ class Kernels(NamedTuple):
     is_nested: bool = False
 
 
-def _read_lla(_: Place, given: dict[str, Any], _xp: Namespace) -> Vector:
-    lat, lon = (given[f"{name}_rad"] * RADIAN if f"{name}_rad" in given else given[name] for name in ("lat", "lon"))
-    return lat, lon, _height(given, lat)
+def _read_lla(_: Place, named: dict[str, Any], _xp: Namespace) -> Vector:
+    lat, lon = (named[f"{name}_rad"] * RADIAN if f"{name}_rad" in named else named[name] for name in ("lat", "lon"))
+    return lat, lon, _height(named, lat)
 
 
-def _read_utm(place: Place, given: dict[str, Any], xp: Namespace) -> Vector:
-    east = given["easting"]
-    zone = given[ZONE] if place.zone is None else place.zone + (east - east)
-    return *mercator.lat_lon(zone, east, given["northing"], xp), _height(given, east)
+def _read_utm(place: Place, named: dict[str, Any], xp: Namespace) -> Vector:
+    east = named["easting"]
+    zone = named[ZONE] if place.zone is None else place.zone + (east - east)
+    return *mercator.lat_lon(zone, east, named["northing"], xp), _height(named, east)
 
 
 def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
@@ -364,10 +364,10 @@ def _write_utm(place: Place, lla: Components, xp: Namespace) -> Components:
     return zone, easting, northing, alt, *grid
 
 
-def _read_local(place: Place, given: dict[str, Any], _: Namespace) -> Vector:
+def _read_local(place: Place, named: dict[str, Any], _: Namespace) -> Vector:
     """Return x, y, z of axes at the origin; missing numbers are 0."""
-    zero = next(iter(given.values())) * 0.0
-    return rigid.apply(*_origin(place), *(given.get(name, zero) for name in POSITIONS[place.name].names))
+    zero = next(iter(named.values())) * 0.0
+    return rigid.apply(*_origin(place), *(named.get(name, zero) for name in POSITIONS[place.name].names))
 
 
 def _write_local(place: Place, xyz: Components, _: Namespace) -> Components:
@@ -388,7 +388,7 @@ LLA_KERNELS = Kernels(_read_lla, _as_is, least=2)
 UTM_KERNELS = Kernels(_read_utm, _write_utm, least=3, axes=GRID, is_nested=True)
 LOCAL_KERNELS = Kernels(_read_local, _write_local, is_angular=False)
 ECEF_KERNELS = Kernels(
-    lambda _, given, _xp: (given["x"], given["y"], given["z"]), _as_is, is_angular=False, axes=ECEF, is_nested=True
+    lambda _, named, _xp: (named["x"], named["y"], named["z"]), _as_is, is_angular=False, axes=ECEF, is_nested=True
 )
 
 
@@ -399,9 +399,9 @@ def kernels(name: str) -> Kernels:
     return getattr(import_module(module), found)  # type: ignore[no-any-return]
 
 
-def _height(given: dict[str, Any], other: Any) -> Any:
+def _height(named: dict[str, Any], other: Any) -> Any:
     """Return the height above the ellipsoid, by default 0."""
-    return given["msl"] + given["undulation"] if "msl" in given else given.get("alt", other - other)
+    return named["msl"] + named["undulation"] if "msl" in named else named.get("alt", other - other)
 
 
 def _as_read(own: Any, made: Any, xp: Namespace) -> Any:

@@ -11,7 +11,7 @@ from math import inf, isfinite, tau
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import ValueInvalid, did_you_mean, listing, nearest, shown
-from frametool.geometry import euler, floats, matrix, quaternion, vectors
+from frametool.geometry import euler, floats, matrix, quaternion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -247,13 +247,13 @@ ROTATIONS = _named({
     "axis_angle": Representation(
         ("axis_x", "axis_y", "axis_z", "angle"), (3,), "axis of any length, then the angle about it",
         short=("x", "y", "z", "angle"), label="axis-angle", shape=(("axis", 3), ("angle", 1)), overview=("_rad",),
-        forward=_angular(vectors.from_axis_angle), backward=_angular(vectors.as_axis_angle),
-        check=vectors.check_axis_angle,
+        forward=_angular(quaternion.from_axis_angle), backward=_angular(quaternion.as_axis_angle),
+        check=quaternion.check_axis_angle,
     ),
     "rotvec": Representation(
         ("rotvec_x", "rotvec_y", "rotvec_z"), (0, 1, 2), "rotation vector: unit axis times angle",
-        label="rotation vector",
-        forward=_angular(vectors.from_rotvec), backward=_angular(vectors.as_rotvec), check=vectors.check_rotvec,
+        label="rotation vector", check=quaternion.check_rotvec,
+        forward=_angular(quaternion.from_rotvec), backward=_angular(quaternion.as_rotvec),
     ),
     "matrix": Representation(
         ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"), (), "rotation matrix, row by row",
@@ -263,8 +263,8 @@ ROTATIONS = _named({
     ),
     "mrp": Representation(
         ("mrp_x", "mrp_y", "mrp_z"), (), "modified Rodrigues parameters: unit axis times tan(angle/4)",
-        forward=_arithmetic(vectors.from_mrp), backward=_plain(vectors.as_mrp),
-        check=partial(vectors.check_rotvec, what="mrp"),
+        forward=_arithmetic(quaternion.from_mrp), backward=_plain(quaternion.as_mrp),
+        check=partial(quaternion.check_rotvec, what="mrp"),
     ),
     "six_d": Representation(
         ("r11", "r21", "r31", "r12", "r22", "r32"), (), "first two columns of the matrix (Zhou's continuous 6D)",

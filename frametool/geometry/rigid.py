@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import isfinite
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import quaternion, vectors
+from frametool.geometry import quaternion
 from frametool.geometry.floats import half_sincos, half_sincos_deg, incline, polynomial
 from frametool.geometry.quaternion import cross, either, length, settled
 
@@ -139,7 +139,7 @@ def check_twist(vx: float, vy: float, vz: float, wx: float, wy: float, wz: float
     """Raise ValueInvalid for a twist that is not finite, or so large that no digit of its angle is left."""
     if not all(isfinite(value) for value in (vx, vy, vz)):
         raise ValueInvalid(f"twist {vx:g} {vy:g} {vz:g} is not finite; give finite numbers")
-    vectors.check_rotvec(wx, wy, wz)
+    quaternion.check_rotvec(wx, wy, wz)
 
 
 def exp(vx: N, vy: N, vz: N, wx: N, wy: N, wz: N, xp: Functions[N]) -> Seven[N]:
@@ -169,7 +169,7 @@ def log(tx: N, ty: N, tz: N, x: N, y: N, z: N, w: N, xp: Functions[N]) -> Six[N]
 
     Source: v = t - w x t / 2 + D w x (w x t), D = (1 - (a/2) cot(a/2))/a^2, by its series below 0.6 rad.
     """
-    wx, wy, wz = vectors.as_rotvec(x, y, z, w, xp)
+    wx, wy, wz = quaternion.as_rotvec(x, y, z, w, xp)
     sine, cosine = length(x, y, z, xp), abs(w)
     half = incline(sine, cosine, xp)
     squared = 4.0 * half * half

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import rigid, vectors
+from frametool.geometry import quaternion, rigid
 from frametool.geometry.floats import RADIAN
 from frametool.geometry.representations import HEADING, notation
 from frametool.geometry.rigid import EXACT, SCALED, UNCERTAIN
@@ -332,7 +332,7 @@ def _with_velocity(parts: Components, seconds: Number, xp: Namespace) -> Compone
 
     Linear R_A' (p_B - p_A) / dt, angular the rotation vector of A^-1 B over dt: position and rotation on their own.
     """
-    turned = vectors.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
+    turned = quaternion.as_rotvec(parts[3], parts[4], parts[5], parts[6], xp)
     return (*parts, *(part / seconds for part in (*parts[:3], *turned)))
 
 

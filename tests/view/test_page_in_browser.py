@@ -18,7 +18,7 @@ from flow import poses_in
 from samples import LATTICE, LOCK_GAPS, random_quaternions
 
 import frametool
-from frametool.geometry import euler, floats, quaternion, vectors
+from frametool.geometry import euler, floats, quaternion
 from frametool.view.exports import write_page
 from frametool.view.scene import FrameScene
 
@@ -101,13 +101,13 @@ def test_hostile_rotations_have_the_numbers_of_the_command_to_the_bit(page_of: M
     assert len(rotations) >= 400
     found = tab.evaluate("(all) => all.map((q) => window.frameview.notations([0, 0, 0, ...q]))", rotations)
     for q, page in zip(rotations, found, strict=True):
-        *axis, angle = vectors.as_axis_angle(*q, floats)
+        *axis, angle = quaternion.as_axis_angle(*q, floats)
         assert page["q"] == list(q)
         assert page["rpy"] == list(euler.from_quaternion(*q, "sxyz", floats)), q
         assert page["rpy_deg"] == list(euler.from_quaternion(*q, "sxyz", floats, degrees=True))
         assert page["locked"] == bool(euler.locked(*q, "sxyz"))
         assert (page["axis"], page["angle"]) == (axis, angle)
-        assert page["rotvec"] == list(vectors.as_rotvec(*q, floats))
+        assert page["rotvec"] == list(quaternion.as_rotvec(*q, floats))
         assert [part for row in page["matrix"] for part in row] == list(quaternion.to_matrix(*q))
 
 

@@ -24,7 +24,7 @@ from frametool.documents.xml import XmlFile, XmlNode, read_nodes
 from frametool.errors import FormatError, alternatives, shown
 from frametool.formats.robots.joints import JointSample, JointState
 from frametool.formats.robots.model import Joint, JointValue, Link
-from frametool.geometry import floats, matrix, quaternion, rigid, vectors
+from frametool.geometry import floats, matrix, quaternion, rigid
 from frametool.geometry.floats import DEGREE, half_sincos, half_sincos_deg
 from frametool.geometry.quaternion import cross, unit_vector
 from frametool.geometry.rigid import IDENTITY
@@ -402,7 +402,7 @@ class PoseReader:
     def _axisangle(self, attributes: Attributes) -> Quaternion:
         x, y, z, angle = self.numbers(attributes, "axisangle", 4, ())
         axis = self._unit(attributes, "axisangle", (x, y, z))
-        return vectors.from_axis_angle(*axis, angle, floats, degrees=self.degrees)
+        return quaternion.from_axis_angle(*axis, angle, floats, degrees=self.degrees)
 
     def _euler(self, attributes: Attributes) -> Quaternion:
         """Multiply the rotations about the axes of eulerseq: a moving axis on the right, a fixed one on the left."""
