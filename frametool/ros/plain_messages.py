@@ -15,10 +15,11 @@ messages are left to the full reader, so that both return the same records.
 
 from __future__ import annotations
 
+import json
 import re
 from contextlib import suppress
 from itertools import accumulate
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.json import JSON_NUMBER
 from frametool.frames.stamps import BILLION
@@ -33,42 +34,32 @@ if TYPE_CHECKING:
 
 INFINITE = float("inf")
 LATEST = 1 << 32  # seconds that no message can hold
-FIELDS = """\
-header:
-  stamp:
-    sec:WHOLE
-    nanosec:WHOLE
-  frame_id: NAME
-child_frame_id: NAME
-transform:
-  translation:
-    x: NUMBER
-    y: NUMBER
-    z: NUMBER
-  rotation:
-    x: NUMBER
-    y: NUMBER
-    z: NUMBER
-    w: NUMBER
-"""
-ROS2 = "- " + FIELDS[:-1].replace("\n", "\n  ") + "\n"
-ROS1 = (
-    ("  -\n" + FIELDS[:-1]).replace("\n", "\n    ").replace("nanosec", "nsecs").replace(" sec:", " secs:")
-    .replace("header:", "header:\n      seq: [0-9]+") + "\n"
-)  # fmt: skip
+STAMPED = {"stamp": {"sec": "WHOLE", "nanosec": "WHOLE"}, "frame_id": "NAME"}
+STAMPED1 = {"seq": "COUNT", "stamp": {"secs": "WHOLE", "nsecs": "WHOLE"}, "frame_id": "NAME"}
+PLACED = {
+    "child_frame_id": "NAME",
+    "transform": {"translation": dict.fromkeys("xyz", "NUMBER"), "rotation": dict.fromkeys("xyzw", "NUMBER")},
+}
+FIELDS, FIELDS1 = {"header": STAMPED, **PLACED}, {"header": STAMPED1, **PLACED}  # of ROS 2, and of ROS 1
+
+
+def _block(fields: dict[str, Any], indent: str) -> str:
+    """Return fields as the echo tools print them."""
+    lines = (
+        f"{indent}{key}:\n{_block(each, indent + '  ')}" if type(each) is dict else f"{indent}{key}: {each}\n"
+        for key, each in fields.items()
+    )
+    return "".join(lines)
+
+
 ECHO_GROUPS = {
     ":\n": ": ?\n",  # rostopic writes a blank where a block opens
     "-\n": "- ?\n",
     "NUMBER": "([-+0-9.eE]+)",
+    "COUNT": "[0-9]+",
     "WHOLE": " *([0-9]{1,20})",
     "NAME": r"""([A-Za-z0-9_/][\w/.+-]*|"[^"\\\n]+"|'[^'\n]+')""",
 }
-JSON_FIELDS = (
-    '{"header": {STAMP, "frame_id": NAME}, "child_frame_id": NAME, '
-    '"transform": {"translation": {"x": NUMBER, "y": NUMBER, "z": NUMBER}, '
-    '"rotation": {"x": NUMBER, "y": NUMBER, "z": NUMBER, "w": NUMBER}}}'
-)
-STAMPS = '"stamp": {"sec": WHOLE, "nanosec": WHOLE}', '"seq": [0-9]+, "stamp": {"secs": WHOLE, "nsecs": WHOLE}'
 PUBLISHED = '{"op": "publish", "topic": TOPIC, "msg": '
 TRANSFORMS = '{"transforms": LIST'
 JSON_GROUPS = {
@@ -77,9 +68,10 @@ JSON_GROUPS = {
     ": ": ": ?",  # some tools omit the blanks after colons and commas
     ", ": ", ?",
     "LIST": r"\[",
-    "NUMBER": f"({JSON_NUMBER})",
-    "WHOLE": "(0|[1-9][0-9]{0,19})",
-    "NAME": r'("[A-Za-z0-9_][\w/.+-]*")',  # a leading / is reported with its place
+    '"NUMBER"': f"({JSON_NUMBER})",
+    '"COUNT"': "[0-9]+",
+    '"WHOLE"': "(0|[1-9][0-9]{0,19})",
+    '"NAME"': r'("[A-Za-z0-9_][\w/.+-]*")',  # a leading / is reported with its place
     "TOPIC": r'("/[\w/]+")',
 }
 
@@ -121,12 +113,12 @@ def _echoed(entry: str) -> MessageLayout:
 
 def _on_lines(opening: str, between: str, closing: str) -> list[MessageLayout]:
     """Return the layouts of a kind of lines, in ROS 2 and in ROS 1."""
-    entries = (JSON_FIELDS.replace("STAMP", stamp) for stamp in STAMPS)
-    return [_layout(_pattern(opening, JSON_GROUPS), _pattern(each, JSON_GROUPS), between, closing) for each in entries]
+    begin, *entries = (_pattern(part, JSON_GROUPS) for part in (opening, json.dumps(FIELDS), json.dumps(FIELDS1)))
+    return [_layout(begin, each, between, closing) for each in entries]
 
 
 LAYOUTS = (
-    (_echoed(ROS2), _echoed(ROS1)),
+    (_echoed(f"- {_block(FIELDS, '  ')[2:]}"), _echoed(f"  -\n{_block(FIELDS1, '    ')}")),
     _on_lines(PUBLISHED + TRANSFORMS, ", ?", r"\]\}\}\n"),
     _on_lines(TRANSFORMS, ", ?", r"\]\}\n"),
     _on_lines("", "\n", "\n"),
