@@ -6,6 +6,7 @@ in which other messages must agree exactly.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from json import dumps
 from math import isfinite
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from frametool.errors import ValueInvalid
 from frametool.ros.messages import PATH
 from frametool.text.spans import MARGIN, Spans, framed, join
 from frametool.text.write import shortest_spans
@@ -33,7 +33,8 @@ CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "u
 MOST_NUMBERS = 200  # per message
 MOST_LAYOUTS = 16  # of messages of one length
 CDR_LE = b"\0\1"
-HOLE = "\0"  # a placeholder for a number; no JSON text contains it
+HOLE = b"\0"  # a placeholder for a number; no JSON text contains it
+STRING_OR_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|-?\d[-+.\de]*')
 POINT_ZERO = 2  # the characters `.0` that an integer written as a float has too many
 
 
@@ -79,10 +80,6 @@ def _plain(value: Any) -> Any:
     return {name: _plain(each) for name, each in vars(value).items() if name[0].islower()}  # others are constants
 
 
-class Varies(Exception):
-    """Raised for a part of a message that has no fixed position."""
-
-
 class BinaryLayout(NamedTuple):
     """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between.
 
@@ -125,69 +122,64 @@ def _repeated(text: bytes, count: int) -> Spans:
     return Spans(framed(text), np.tile(starts + MARGIN, (count, 1)), np.tile(ends + MARGIN, (count, 1)))
 
 
-class _Reader:
-    """Parses one message."""
+class Fields:
+    """The numbers in one message: their places and types, and the parts that other messages must share with it."""
 
-    def __init__(self, types: MessageTypes, data: bytes) -> None:
+    def __init__(self, types: MessageTypes, kind: str, data: bytes) -> None:
+        """Read a message; raises ValueError if one of its parts has no fixed place."""
         self.fields, self.data = types.store.fielddefs, data
-        self.begin = 0 if types.ros1 else 4
-        self.aligned, self.at = not types.ros1, self.begin
-        self.places: list[tuple[int, str]] = []
+        self.begin = self.at = 0 if types.ros1 else 4
+        self.aligned = not types.ros1
+        self.numbers: list[tuple[int, str]] = []
         self.shared = [slice(self.begin)]
+        self._message(kind)
+        if self.at != len(data) or not self.numbers or (self.aligned and data[:2] != CDR_LE):
+            raise ValueError
+
+    def _message(self, kind: str) -> None:
+        for _, node in self.fields[kind][1]:
+            self._value(*node)
+
+    def _value(self, node: Nodetype, what: Any) -> None:
+        if node == Nodetype.NAME:
+            self._message(what)
+        elif node == Nodetype.ARRAY:
+            for _ in range(min(what[1], MOST_NUMBERS)):
+                self._value(*what[0])
+        elif node == Nodetype.SEQUENCE or what[0] == "string":
+            begin = self._place(4)
+            count = int.from_bytes(self.data[begin : self.at], "little")
+            self.at += count if node == Nodetype.BASE else 0
+            self.shared.append(slice(begin, self.at))
+            for _ in range(min(count, MOST_NUMBERS) if node == Nodetype.SEQUENCE else 0):
+                self._value(*what[0])
+        else:
+            code = CODES.get(what[0])
+            if code is None or len(self.numbers) > MOST_NUMBERS:
+                raise ValueError
+            self.numbers.append((self._place(int(code[-1])), code))
 
     def _place(self, size: int) -> int:
         """Skip the next part of this many bytes; return its position."""
         place = self.at + (-(self.at - self.begin) % size if self.aligned else 0)
         self.at = place + size
-        if self.at > len(self.data):
-            raise Varies
         return place
-
-    def line(self, kind: str) -> str:
-        """Return a message of a type, or a part of one, as JSON with a placeholder for each number."""
-        parts = (f"{dumps(name)}: {self._value(*node)}" for name, node in self.fields[kind][1])
-        return f"{{{', '.join(parts)}}}"
-
-    def _value(self, node: Nodetype, what: Any) -> str:
-        if node == Nodetype.NAME:
-            return self.line(what)
-        if node == Nodetype.ARRAY and what[1] <= MOST_NUMBERS:
-            return f"[{', '.join(self._value(*what[0]) for _ in range(what[1]))}]"
-        if node == Nodetype.SEQUENCE:
-            begin = self._place(4)
-            count = int.from_bytes(self.data[begin : self.at], "little")
-            self.shared.append(slice(begin, self.at))
-            return f"[{', '.join(self._value(*what[0]) for _ in range(min(count, MOST_NUMBERS + 1)))}]"
-        if node != Nodetype.BASE or len(self.places) > MOST_NUMBERS:
-            raise Varies
-        if what[0] in CODES:
-            code = CODES[what[0]]
-            self.places.append((self._place(int(code[-1])), code))
-            return HOLE
-        if what[0] != "string":
-            raise Varies
-        begin = self._place(4)
-        self.at += int.from_bytes(self.data[begin : begin + 4], "little")
-        self.shared.append(slice(begin, self.at))
-        return dumps(self.data[begin + 4 : self.at].rstrip(b"\0").decode(), ensure_ascii=False)
 
 
 def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayout | None:
     """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
-    reader = _Reader(types, data)
-    if reader.aligned and data[:2] != CDR_LE:
-        return None
     try:
         line = text_of(types, channel, data)
-        texts = f"{reader.line(channel.type)}\n".encode().split(HOLE.encode())
-    except (Varies, UnicodeDecodeError, ValueInvalid):
+        fields = Fields(types, channel.type, data)
+    except ValueError:
         return None
-    if not reader.places or reader.at != len(data):
-        return None
-    places, codes = zip(*reader.places, strict=True)
+    places, codes = zip(*fields.numbers, strict=True)
     names = [f"f{at}" for at in range(len(codes))]
-    numbers: Any = {"names": names, "formats": codes, "offsets": places, "itemsize": len(data)}
-    made = BinaryLayout(np.dtype(numbers), reader.shared, texts, data)
+    numbers = np.dtype({"names": names, "formats": codes, "offsets": places, "itemsize": len(data)})
+    texts = STRING_OR_NUMBER.sub(lambda found: found[1] or HOLE, line).split(HOLE)
+    if len(texts) != len(codes) + 1:
+        return None
+    made = BinaryLayout(numbers, fields.shared, texts, data)
     values, alike = made.values([data])
     return made if alike.all() and made.lines(values) == line else None
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import shutil
 from bisect import bisect_left
+from collections import Counter
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from io import BufferedReader, BytesIO, FileIO
+from io import BytesIO
 from itertools import chain
 from operator import attrgetter, itemgetter
 from pathlib import Path, PurePath
@@ -19,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.documents.document import parse_documents
 from frametool.errors import FileProblem, FormatError, FrametoolError, shown
-from frametool.frames.stamps import BILLION
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -37,10 +37,6 @@ NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
 RECORD_HEAD = 9  # bytes
 RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # the header of a record, and of a message in it (mcap.dev/spec)
 BLOCK = 1 << 10  # messages
-LENGTH = Struct("<I")  # of ROS 1 bags (wiki.ros.org/Bags/Format/2.0), with the fields of their record headers
-TIME = Struct("<II")
-OF_MESSAGE, OF_CONNECTION = b"\4\0\0\0op=\2", b"\4\0\0\0op=\7"
-CONNECTION, OF_TIME = b"\x09\0\0\0conn=", b"\x0d\0\0\0time="
 
 
 @dataclass(eq=False, slots=True)
@@ -82,26 +78,17 @@ class Recorded(NamedTuple):
     sequence: int = 0
 
 
-class _Bounded(BufferedReader):
-    """A file wrapper that never reads more than exists, whatever a length field states."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(FileIO(path))
-        self.length = path.stat().st_size
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        """Read some bytes."""
-        return super().read(-1 if size is None else min(size, self.length))
-
-
 class McapFile:
-    """An MCAP file; compression: of its chunks."""
+    """An MCAP file.
+
+    compression: of its chunks; stated: the number of messages by channel, None if it does not state them
+    """
 
     def __init__(self, path: Path, opened: ExitStack, tally: Diagnostics) -> None:
         """Read its summary, or the whole file if the summary is incomplete."""
         from mcap.reader import SeekingReader
 
-        self.stream = opened.enter_context(_Bounded(path))
+        self.stream = opened.enter_context(path.open("rb"))
         self._schemas: dict[int, tuple[str, str, bytes]] = {}
         self.channels: dict[int, Channel] = {}
         reader = SeekingReader(self.stream)
@@ -109,7 +96,7 @@ class McapFile:
         said = summary.statistics if summary else None
         if said is None:
             tally.note(NO_SUMMARY.format(path.name), 1)
-        self.said = said
+        self.said, self.stated = said, said.channel_message_counts if said else None
         chunks = summary.chunk_indexes if summary else []
         self._chunks = chunks if said and said.chunk_count == len(chunks) else []
         self.compression = self._chunks[0].compression if self._chunks else ""
@@ -118,13 +105,6 @@ class McapFile:
         else:
             for _ in self._found(None):
                 pass
-
-    def expected(self, wanted: Collection[Channel] | None) -> int | None:
-        """Return the stated number of messages on some channels, or on all; None if it is not stated."""
-        if wanted is None or self.said is None:
-            return self.said.message_count if self.said else None
-        counts = self.said.channel_message_counts
-        return sum(counts.get(number, 0) for number, each in self.channels.items() if each in wanted)
 
     def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages on some channels, or on all."""
@@ -215,14 +195,10 @@ class McapFile:
 
 def _unpacked_chunk(chunk: Any) -> bytes:
     """Return the records of a chunk; raises ValueError for one that is too large, before it is unpacked."""
-    import zstandard
     from mcap.stream_reader import get_chunk_data_stream
 
-    size = chunk.uncompressed_size
-    if chunk.compression == "zstd" and size <= MOST:
-        size = max(size, zstandard.frame_content_size(chunk.data))
-    if size > MOST:
-        raise ValueError(f"a chunk of {size} bytes; {MOST} are read")
+    if chunk.uncompressed_size > MOST:
+        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes; {MOST} are read")
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     return bytes(stream.read(length))
 
@@ -245,7 +221,7 @@ def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
 class DatabaseFile:
     """A sqlite3 file of rosbag2; the contents of its tables depend on its version."""
 
-    head, compression = None, ""
+    head, compression, stated = None, "", None
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Let sqlite3 check its pages, because rows on a broken one would be missing silently, and read its topics."""
@@ -273,9 +249,6 @@ class DatabaseFile:
         schema = (kind, defined[0], defined[1].encode()) if defined else None
         return Channel(topic["name"], kind, topic["serialization_format"], schema, said, digest)
 
-    def expected(self, _wanted: Collection[Channel] | None) -> None:
-        """Return None: only the metadata of the folder state the number of messages."""
-
     def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages on some channels, or on all."""
         numbers = ",".join(str(number) for number, each in self.channels.items() if wanted is None or each in wanted)
@@ -299,8 +272,8 @@ class Bag1File:
                 """Leave it unread."""
 
         self.reader: Any = opened.enter_context(Unindexed(path))
-        self._connections = {each.id: each for each in self.reader.connections}
-        self.channels = {number: self._channel(each) for number, each in self._connections.items()}
+        self.channels = {each.id: self._channel(each) for each in self.reader.connections}
+        self.stated = sum((Counter(each.connection_counts) for each in self.reader.chunk_infos), Counter[int]())
         used = {id(each.decompressor) for each in self.reader.chunks.values()}
         names = [name for name, each in decompressors.items() if id(each) in used]
         self.compression = names[0].removeprefix("none") if names else ""
@@ -311,12 +284,6 @@ class Bag1File:
         said = {name: str(each) for name, each in said.items() if each is not None}
         schema = connection.msgtype, "ros1msg", connection.msgdef.data.encode()
         return Channel(connection.topic, connection.msgtype, "ros1", schema, said, connection.digest)
-
-    def expected(self, wanted: Collection[Channel] | None) -> int:
-        """Return the number of messages on some channels, or on all, as stated in the chunks."""
-        others = {number for number, each in self.channels.items() if wanted is not None and each not in wanted}
-        counts = (chunk.connection_counts for chunk in self.reader.chunk_infos)
-        return sum(count for each in counts for number, count in each.items() if number not in others)
 
     def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
         """Yield the messages on some channels, or on all."""
@@ -336,22 +303,18 @@ class Bag1File:
                     yield found
 
     def _take(self, chunk: bytes, numbers: set[int], found: list[Recorded]) -> None:
-        """Add the messages of some connections in a chunk: the library makes an object of each header."""
-        end, size = 0, LENGTH.size
-        while end < len(chunk):
-            middle = end + size + LENGTH.unpack_from(chunk, end)[0]
-            header, begin = chunk[end:middle], middle + size
-            end = begin + LENGTH.unpack_from(chunk, middle)[0]
-            if end > len(chunk):
-                raise ValueError("a record is longer than its chunk")
-            if OF_MESSAGE in header:
-                (number,) = LENGTH.unpack_from(header, header.index(CONNECTION) + len(CONNECTION))
-                if number in numbers:
-                    second, part = TIME.unpack_from(header, header.index(OF_TIME) + len(OF_TIME))
-                    log_ns = second * BILLION + part
-                    found.append(Recorded(self.channels[number], log_ns, chunk[begin:end], log_ns))
-            elif OF_CONNECTION not in header:
-                raise ValueError("neither a message nor a connection")
+        """Add the messages of some connections in a chunk."""
+        from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
+
+        records = BytesIO(chunk)
+        while records.tell() < len(chunk):
+            header = Header.read(records)
+            data = read_bytes(records, read_uint32(records))
+            if header.get_uint8("op") == RecordType.CONNECTION:
+                continue
+            if (number := header.get_uint32("conn")) in numbers:
+                log_ns = header.get_time("time")
+                found.append(Recorded(self.channels[number], log_ns, data, log_ns))
 
 
 class RecordingReader:
@@ -405,7 +368,9 @@ class RecordingReader:
             for block in file.messages(wanted):
                 yield map(_unpacked, block) if self._is_packed else block
                 count += len(block)
-            self._check(count, file.expected(wanted), wanted)
+            if file.stated is not None:
+                numbers = [number for number, each in file.channels.items() if wanted is None or each in wanted]
+                self._check(count, sum(file.stated.get(number, 0) for number in numbers), wanted)
             total += count
         self._check(total, self._expected(wanted), wanted)
 
@@ -446,15 +411,8 @@ def _unpacked(message: Recorded) -> Recorded:
 
 
 def read_metadata(text: str, name: str) -> dict[str, Any]:
-    """Read metadata, of a folder or in an MCAP file; all values are text.
-
-    Raises ValueError if they are not YAML.
-    """
-    try:
-        documents = parse_documents(text, name)
-    except FormatError as error:
-        raise ValueError(str(error)) from None
-    found = next((each.value for each in documents if type(each.value) is dict), {})
+    """Read metadata, of a folder or in an MCAP file; all values are text.  Raises FormatError."""
+    found = next((each.value for each in parse_documents(text, name) if type(each.value) is dict), {})
     return dict(found.get(INFORMATION, found))
 
 

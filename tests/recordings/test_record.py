@@ -357,7 +357,8 @@ def test_a_count_in_the_summary_that_is_not_that_of_messages_is_an_error(run: Ru
     path = recording(tmp_path, "mcap")
     data, count = path.read_bytes(), len(read(path))
     at = data.rindex(b"\x0b" + struct.pack("<Q", 46 + 10 * 6) + struct.pack("<Q", count))
-    path.write_bytes(data[: at + 9] + struct.pack("<Q", count + 1) + data[at + 17 :])
+    at += 9 + 42 + 4 + 2  # the count of the first channel
+    path.write_bytes(data[:at] + struct.pack("<Q", struct.unpack_from("<Q", data, at)[0] + 1) + data[at + 8 :])
     done = run("record", str(path), "-o", "new.mcap")
     assert (done.status, done.err) == (1, f"frametool: {path}: the bag is damaged: {count} of {count + 1} messages are there\n")
 
