@@ -411,8 +411,15 @@ def _unpacked(message: Recorded) -> Recorded:
 
 
 def read_metadata(text: str, name: str) -> dict[str, Any]:
-    """Read metadata, of a folder or in an MCAP file; all values are text.  Raises FormatError."""
-    found = next((each.value for each in parse_documents(text, name) if type(each.value) is dict), {})
+    """Read metadata, of a folder or in an MCAP file; all values are text.
+
+    Raises ValueError if they are not YAML.
+    """
+    try:
+        documents = parse_documents(text, name)
+    except FormatError as error:
+        raise ValueError(str(error)) from None
+    found = next((each.value for each in documents if type(each.value) is dict), {})
     return dict(found.get(INFORMATION, found))
 
 

@@ -155,15 +155,15 @@ def read_messages(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> 
 def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
     """Yield the messages of documents that end in `---`, or of lines."""
     if fmt == "jsonl":
-        for number, text in enumerate(piece.text.split("\n"), piece.line):
-            yield from line_messages(text, number, name, tally)
+        for number, text in _data_lines(piece, tally):
+            yield from _parsed(text.removeprefix("\ufeff"), number, name, fmt)
         return
     at, line = 0, piece.line
     while at < len(piece.text):
         separator = _SEPARATOR.search(piece.text, at)
         end = separator.end() if separator else len(piece.text)
         text = piece.text[at:end]
-        yield from _parsed(without_noise(text, line, tally), line, name)
+        yield from _parsed(without_noise(text, line, tally), line, name, fmt)
         line += text.count("\n")
         at = end
 
@@ -180,48 +180,33 @@ def without_noise(text: str, line: int, tally: Diagnostics) -> str:
     return "\n".join(kept)
 
 
-def _parsed(text: str, line: int, name: str) -> Iterator[TextMessage | FormatError]:
-    """Read the documents of a text whose first line has this number."""
+def _parsed(text: str, line: int, name: str, fmt: str) -> Iterator[TextMessage | FormatError]:
+    """Read the documents of a text, or one line of JSON, that begins on this line."""
+    source = Source(name, text)
     try:
         with counted_from(line):
-            found = parse_documents(text, name)
+            if fmt == "jsonl":
+                check_text(source)
+                found = [*enumerate(strict_json(source))]
+            else:
+                found = [(document.index, document.value) for document in parse_documents(text, name)]
     except FormatError as error:
         yield error
         return
-    for document in found:
-        yield TextMessage(document.value, Source(name, text), line, document.index)
-
-
-def line_messages(text: str, line: int, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
-    """Yield the messages on a line that must be JSON, unless it is blank or noise."""
-    if not _is_data(text, line, tally):
-        return
-    source = Source(name, text.removeprefix("\ufeff"))
-    try:
-        with counted_from(line):
-            check_text(source)
-            values = strict_json(source)
-    except FormatError as error:
-        yield error
-        return
-    for index, value in enumerate(values):
+    for index, value in found:
         yield TextMessage(value, source, line, index)
 
 
 def line_texts(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[tuple[int, str]]:
     """Yield the lines that are neither blank nor noise, with their numbers."""
     for piece in lines(stream, name):
-        for number, line in enumerate(piece.text.split("\n"), piece.line):
-            if _is_data(line, number, tally):
-                yield number, line
+        yield from _data_lines(piece, tally)
 
 
-def _is_data(line: str, number: int, tally: Diagnostics) -> bool:
-    """Return True if a line is neither blank nor noise; count noise."""
-    if NOISE(line):
-        tally.noise.append((number, line.strip()))
-        return False
-    return bool(line.strip())
+def _data_lines(piece: Piece, tally: Diagnostics) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(without_noise(piece.text, piece.line, tally).split("\n"), piece.line):
+        if line.strip():
+            yield number, line
 
 
 def _csv(stream: BinaryIO, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
@@ -246,7 +231,7 @@ _HEADER = re.compile(r"\bheader\b")
 
 def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
     """Yield the transforms of every message, in the order of the recording."""
-    if file.format in {"echo", "jsonl"} and (file.format == "echo" or not options.topics.chosen):
+    if file.format in {"echo", "jsonl"}:
         cut, end = (documents, "---\n") if file.format == "echo" else (lines, "\n")
         for piece in cut(file.stream, file.name):
             for stretch in _cut(piece, end, sizes.STRETCH):

@@ -11,9 +11,9 @@ static_transform_publisher` may precede them.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from typing import TYPE_CHECKING
 
-from frametool.documents.chunks import lines
 from frametool.documents.source import Source
 from frametool.errors import FormatError, ValueInvalid, shown
 from frametool.frames.topology import own_parent
@@ -48,16 +48,12 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
     Raises ValueInvalid.
     """
-    poses: dict[str, Pose] = {}
-    calls, moving = [], []
-    for pose in (result.pose for result in results):
-        calls.append(f"{_line(pose, style)}\n")
-        known = poses.setdefault(pose.name or "", pose)
-        if (known.parent, known.components) != (pose.parent, pose.components):
-            moving.append(known.name or "")
-    if moving:
-        raise ValueInvalid(moving_frames(dict.fromkeys(moving)))
-    return "".join(calls)
+    poses = [result.pose for result in results]
+    text = "".join(f"{_line(pose, style)}\n" for pose in poses)
+    different = {(pose.name, pose.parent, pose.components): pose.name for pose in poses}
+    if moving := [name for name, count in Counter(different.values()).items() if count > 1]:
+        raise ValueInvalid(moving_frames(map(str, moving)))
+    return text
 
 
 def moving_frames(names: Iterable[str]) -> str:
@@ -93,26 +89,13 @@ def _line(pose: Pose, style: Style) -> str:
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the pose that each line publishes."""
-    for number, line in _calls(file):
-        is_call = line.strip() and not line.lstrip().startswith("#")
-        if is_call and (edge := read_edge(line, file, options, number)):
+    """Yield the pose that each line publishes; a line that ends in a backslash continues in the next."""
+    line = 1
+    for call in re.findall(r"(?:[ \t]*#.*|(?:.*\\\n)*.*)(?:\n|\Z)", re.sub("\r\n?", "\n", file.text)):
+        is_call = call.strip() and not call.lstrip().startswith("#")
+        if is_call and (edge := read_edge(call, file, options, line)):
             yield edge
-
-
-def _calls(file: InputFile) -> Iterator[tuple[int, str]]:
-    """Yield the lines of a file with their numbers; a line that ends in a backslash continues in the next."""
-    number, first, call = 0, 1, ""
-    for piece in lines(file.stream, file.name):
-        for line in re.split(r"\r\n|[\r\n]", piece.text.removesuffix("\n").removesuffix("\r")):
-            number += 1
-            call += line
-            if line.endswith("\\") and not call.lstrip().startswith("#"):
-                call += "\n"
-                continue
-            yield first, call
-            first, call = number + 1, ""
-    yield first, call
+        line += call.count("\n")
 
 
 def read_edge(
@@ -184,18 +167,16 @@ def _flags(words: Sequence[str]) -> dict[str, str]:
 def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
     """Read the new syntax; missing values are 0 or the identity."""
     both = [name for name in (*QUATERNION, *RPY) if name in flags]
-    if any(name in QUATERNION for name in both) and any(name in RPY for name in both):
+    angles = not {*both}.isdisjoint(RPY)
+    if angles and not {*both}.isdisjoint(QUATERNION):
         raise ValueInvalid(f"a quaternion and angles at once (--{', --'.join(both)}); keep one")
     for name in FRAMES:
         if not flags.get(name):
             raise ValueInvalid(f"missing --{name}: a transform is that of a child frame in its parent")
-    angles = any(name in RPY for name in both)
-    rotation = [flags.get(name, "0") for name in RPY] if angles else [flags.get(name, "0") for name in QUATERNION]
-    if not angles and "qw" not in flags:
-        rotation[3] = "1"  # the tool's default, also with other components: refused below unless they are 0
-    numbers = [flags.get(name, "0") for name in XYZ]
-    key = "rpy" if angles else "quaternion"
-    return _pose(numbers, key, rotation, flags["frame-id"], flags["child-frame-id"], reading)
+    flags = {"qw": "1", **flags}  # the tool's default, also with other components: refused below unless they are 0
+    position, rotation = ([flags.get(name, "0") for name in names] for names in (XYZ, RPY if angles else QUATERNION))
+    frames = flags["frame-id"], flags["child-frame-id"]
+    return _pose(position, "rpy" if angles else "quaternion", rotation, *frames, reading)
 
 
 def read_positional(words: Sequence[str], reading: Reading) -> Pose:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,6 @@ from frametool.stream.writers import refuse_scale_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from typing import Any
 
     from frametool.grammar.result import Style
     from frametool.stream.row_poses import RowPoses
@@ -59,9 +59,9 @@ class RecordingWriter:
         if asked.topic and len(self.kinds) > 1:
             raise ValueInvalid(f"there are {len(self.kinds)} topics ({', '.join(self.kinds)}); {asked.topic} names one")
         self.file = RecordingFile(style.format, asked.folder)
-        self.channels: dict[str, Any] = {}
+        self.channel = cache(lambda name: self.file.channel(KINDS[name], asked.topic))
         self.dropped = dict.fromkeys(extras)
-        self.templates: dict[tuple[str, str, str], MessageTemplate] = {}
+        self.template = cache(lambda name, frames: MessageTemplate(KINDS[name], style.format, *frames))
         self.path: list[tuple[str, Ints, Floats]] = []
         self.lost: dict[str, None] = {}  # names of frames that poses are of
         self.is_named = True  # whether all rows say what they are seen from
@@ -88,16 +88,13 @@ class RecordingWriter:
         refuse_scale_in(self.style.format, self.dropped)
         frames = self._frames(block)
         numbers = self._places(block) if "fix" in self.kinds else self._numbers(block)
-        messages = [self._messages(name, frames, stamps, numbers) for name in self.kinds if name != "path"]
-        for name in self.kinds:
-            if name not in self.channels:
-                self.channels[name] = self.file.channel(KINDS[name], self.style.recording.topic)
-        channels = [self.channels[name] for name in self.kinds if name != "path"]
-        for stamp, *row in zip(stamps.tolist(), *messages, strict=True):
-            for channel, message in zip(channels, row, strict=True):
-                self.file.write(channel, stamp, message)
-        if "path" in self.kinds:
+        channels = {name: self.channel(name) for name in self.kinds}
+        if channels.pop("path", None):
             self.path += [(frames[0][0], stamps, numbers)]
+        messages = [self._messages(name, frames, stamps, numbers) for name in channels]
+        for stamp, *row in zip(stamps.tolist(), *messages, strict=True):
+            for channel, message in zip(channels.values(), row, strict=True):
+                self.file.write(channel, stamp, message)
         return b""
 
     def end(self) -> Iterator[bytes]:
@@ -168,20 +165,14 @@ class RecordingWriter:
     ) -> Sequence[bytes]:
         """Return the message of each row."""
         if len(frames) == 1:
-            return self._template(name, *frames[0]).filled(stamps, numbers)
+            return self.template(name, frames[0]).filled(stamps, numbers)
         made: dict[int, bytes] = {}
         rows_of: dict[tuple[str, str], list[int]] = {}
         for row, each in enumerate(frames):
             rows_of.setdefault(each, []).append(row)
         for each, rows in rows_of.items():
-            made |= zip(rows, self._template(name, *each).filled(stamps[rows], numbers[rows]), strict=True)
+            made |= zip(rows, self.template(name, each).filled(stamps[rows], numbers[rows]), strict=True)
         return [made[row] for row in range(len(frames))]
-
-    def _template(self, name: str, parent: str, child: str) -> MessageTemplate:
-        key = (name, parent, child)
-        if key not in self.templates:
-            self.templates[key] = MessageTemplate(KINDS[name], self.style.format, parent, child)
-        return self.templates[key]
 
     def _write_path(self) -> None:
         """Write all poses in one message, at the last stamp."""
@@ -191,4 +182,4 @@ class RecordingWriter:
         stamps = [stamp for _, each, _ in self.path for stamp in each.tolist()]
         poses = [pose for _, _, each in self.path for pose in each.tolist()]
         message = serialised(KINDS["path"], self.style.format, [(parents.pop(), "")] * len(poses), stamps, poses)
-        self.file.write(self.channels["path"], stamps[-1], message)
+        self.file.write(self.channel("path"), stamps[-1], message)
