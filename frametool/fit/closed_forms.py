@@ -12,10 +12,10 @@ from frametool.errors import ValueInvalid, warn
 from frametool.fit.alignment import STILL, THIN, Fit, centre, principal_axes, umeyama
 from frametool.fit.least_squares import (
     LEAST,
-    PoseArrays,
     batch_of,
     deviations,
     draws,
+    errors,
     fitted_sigmas,
     inverse,
     length,
@@ -112,7 +112,7 @@ def solve_mean(
     if robust and counts.sum() >= FEWEST_POSES:
         used[counts] = _agreeing(poses[counts], mass[counts])
     mean, spread = mean_and_spread(poses[used], None if weights is None else mass[used])
-    off = PoseArrays.of(poses).errors(PoseArrays.of(mean))
+    off = errors(poses, mean)
     count, kept = int(used.sum()), roots[used] * off[used]
     s_t, s_r = fitted_sigmas(kept, np.ones(count), 3).tolist()
     covariance = kept.T @ kept * (count / mass[used].sum() / (count - 1)) if count > 1 else None
@@ -122,10 +122,10 @@ def solve_mean(
 
 def _agreeing(poses: Transform, mass: Array) -> Mask:
     """Return the poses that are no outliers."""
-    rows, roots = PoseArrays.of(poses), np.sqrt(mass)[:, None]
+    roots = np.sqrt(mass)[:, None]
 
     def residuals(middle: Transform) -> Array:
-        found: Array = roots * rows.errors(PoseArrays.of(middle))
+        found: Array = roots * errors(poses, middle)
         return found
 
     def mean(_: Transform, weights: Array) -> Transform:

@@ -16,9 +16,7 @@ from frametool.errors import ValueInvalid, warn
 from frametool.fit.least_squares import (
     KEPT,
     LEAST,
-    PoseArrays,
     align_vectors,
-    applied,
     batch_of,
     deviations,
     draws,
@@ -31,15 +29,15 @@ from frametool.fit.least_squares import (
     settled,
     skew,
     solve_normal,
+    stepped,
 )  # fmt: skip
-from frametool.fit.least_squares import log as rotvecs_of
+from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from typing import TypeAlias
 
     from frametool.fit.least_squares import Mask, Rows
-    from frametool.geometry.transform import Transform
     from frametool.geometry.types import Array, Indices, Numbers
 
     Batch: TypeAlias = Transform | Numbers | Sequence[Transform]
@@ -61,7 +59,7 @@ CLEARLY = 2.0  # ratio by which both metres and radians must be better
 FLAT, FLAT_SHARE = radians(0.5), 0.02  # about the second axis: none, also relative to the first
 SLIGHT = radians(5.0)
 CLEAR = (radians(1.0), radians(175.0))  # rotations of a pair whose axis is certain
-ONE = PoseArrays(np.eye(3), np.zeros(3))
+ONE = Transform.identity()
 
 
 class HandEye(NamedTuple):
@@ -106,11 +104,10 @@ def solve_hand_eye(
         raise ValueInvalid(f"gripper has {len(gripper)} poses, target {len(target)}")
     if (count := len(gripper)) < FEWEST:
         raise ValueInvalid(f"{count} sample{'s'[: count != 1]}; hand-eye needs {FEWEST}, turned about two axes")
-    base_hand, camera = PoseArrays.of(gripper), PoseArrays.of(target)
-    require_near(base_hand.translations, "gripper")
-    require_near(camera.translations, "target")
-    hand = base_hand.inverse if eye_to_hand else base_hand
-    samples, other = _Samples(hand, camera), _Samples(hand.inverse, camera)
+    require_near(gripper.xyz, "gripper")
+    require_near(target.xyz, "target")
+    hand = gripper.inverse() if eye_to_hand else gripper
+    samples, other = _Samples(hand, target), _Samples(hand.inverse(), target)
     holder = names[0] if eye_to_hand else names[1]
     robust = robust and count >= FEWEST_ROBUST
     _require_two_axes(_turns(hand), 0.0, holder, names[2])
@@ -121,7 +118,7 @@ def solve_hand_eye(
     def likeliest(model: _Model, weights: Array) -> _Model:
         if (kept := weights > 0.0).sum() < FEWEST:
             raise _unfitting(medians)
-        _require_two_axes(_turns(hand.at(kept)), 0.0, holder, names[2])
+        _require_two_axes(_turns(hand[kept]), 0.0, holder, names[2])
         begin, steps = (model, STEPS) if kept.sum() >= FEWEST_APART else (start, 0)
         models = (samples.fitted(begin._replace(cut=cut), weights, steps) for cut in CUTS)
         return min(models, key=lambda fit: fit.misfit)
@@ -135,7 +132,7 @@ def solve_hand_eye(
     s_t, s_r = model.sigmas.tolist()
     count, off = int(found.kept.sum()), lengths(found.residuals[found.kept]).T
     rms = np.sqrt((off**2).mean(1))
-    turns = _turns(hand.at(found.kept))
+    turns = _turns(hand[found.kept])
     if turns.rms[0] < KEPT * s_r * sqrt(2.0):
         raise _unfitting(rms)
     _require_two_axes(turns, s_r, holder, names[2])
@@ -145,8 +142,8 @@ def solve_hand_eye(
     for warning in warnings:
         warn(warning)
     return HandEye(
-        model.x.transform.canonical(),
-        model.z.transform.canonical(),
+        model.x.canonical(),
+        model.z.canonical(),
         covariance[:6, :6],
         covariance[6:, 6:],
         None if s_t == s_r == LEAST else "base" if eye_to_hand and model.cut == "gripper" else model.cut,
@@ -165,8 +162,8 @@ def solve_hand_eye(
 class _Model(NamedTuple):
     """X and Z, the location of the noise, and what a fit found: sigmas, Hessian (12, 12) and 2 ln s_t + 2 ln s_r."""
 
-    x: PoseArrays
-    z: PoseArrays
+    x: Transform
+    z: Transform
     cut: str = "target"
     sigmas: Array = np.ones(2)
     hessian: Array = np.eye(12)
@@ -176,27 +173,27 @@ class _Model(NamedTuple):
 class _Loop(NamedTuple):
     """The errors E = left X right = before inv(Z) after: the factors around X and Z."""
 
-    left: PoseArrays
-    right: PoseArrays
-    before: PoseArrays
-    after: PoseArrays
+    left: Transform
+    right: Transform
+    before: Transform
+    after: Transform
 
 
-CUTS: dict[str, Callable[[PoseArrays, PoseArrays, PoseArrays, PoseArrays], _Loop]] = {
-    "target": lambda g, c, x, z: _Loop(z.inverse @ g, c, ONE, g @ x @ c),
-    "camera": lambda g, c, x, z: _Loop(c @ z.inverse @ g, ONE, c, g @ x),
-    "gripper": lambda g, c, x, z: _Loop(ONE, c @ z.inverse @ g, x @ c, g),
+CUTS: dict[str, Callable[[Transform, Transform, Transform, Transform], _Loop]] = {
+    "target": lambda g, c, x, z: _Loop(z.inverse() @ g, c, ONE, g @ x @ c),
+    "camera": lambda g, c, x, z: _Loop(c @ z.inverse() @ g, ONE, c, g @ x),
+    "gripper": lambda g, c, x, z: _Loop(ONE, c @ z.inverse() @ g, x @ c, g),
 }
 
 
 class _Samples(NamedTuple):
     """Pairs of poses: of the gripper, and of the target in the camera."""
 
-    gripper: PoseArrays
-    camera: PoseArrays
+    gripper: Transform
+    camera: Transform
 
     def at(self, index: Rows) -> _Samples:
-        return _Samples(self.gripper.at(index), self.camera.at(index))
+        return _Samples(self.gripper[index], self.camera[index])
 
     def residuals(self, model: _Model) -> Array:
         """Return [t(E), Log R(E)] of a model."""
@@ -205,14 +202,14 @@ class _Samples(NamedTuple):
 
     def fitted(self, model: _Model, weights: Array, steps: int) -> _Model:
         """Minimise ln S_t + ln S_r by Gauss-Newton steps with updated sigmas, damped if a step does not help."""
-        extent = max(np.abs(poses.translations).max() for poses in self)
+        extent = max(np.abs(poses.xyz).max() for poses in self)
         units = np.repeat([extent or 1.0, 1.0, extent or 1.0, 1.0], 3)
         now, gradient = self._linear(model, weights)
         damping = UNDAMPED
         for _ in range(steps):
             bent = now.hessian + damping * np.diag(np.diag(now.hessian))
             step = -solve_normal(bent, gradient[:, None])[:, 0]
-            moved = now._replace(x=now.x.stepped(step[:6]), z=now.z.stepped(step[6:]))
+            moved = now._replace(x=stepped(now.x, step[:6]), z=stepped(now.z, step[6:]))
             tried, its_gradient = self._linear(moved, weights)
             if tried.misfit <= now.misfit + DONE:
                 now, gradient, damping = tried, its_gradient, max(damping / 10.0, UNDAMPED)
@@ -234,28 +231,29 @@ class _Samples(NamedTuple):
         return model._replace(sigmas=sigmas, hessian=slopes.T @ (weighed * slopes), misfit=misfit), gradient[:, 0]
 
 
-def _errors(loop: _Loop, x: PoseArrays) -> Array:
+def _errors(loop: _Loop, x: Transform) -> Array:
     off = loop.left @ x @ loop.right
-    return np.concatenate([off.translations, rotvecs_of(off.rotations)], 1)
+    return np.concatenate([off.xyz, off.rotation.as_rotvec()], 1)
 
 
 def _jacobian(loop: _Loop, model: _Model, turned: Array) -> Array:
     """Return the derivatives of errors (n, 6) by steps of X and of Z: (n, 6, 12)."""
-    left, back = loop.left.rotations, loop.before.rotations @ model.z.rotations.T
+    left = loop.left.rotation.as_matrix()
+    back = (loop.before.rotation @ model.z.rotation.inverse()).as_matrix()
     bent = inverse_left_jacobian(turned)
     slopes = np.zeros((len(turned), 6, 12))
     slopes[:, :3, :3] = left
-    slopes[:, :3, 3:6] = -left @ skew(applied(model.x.rotations, loop.right.translations))
+    slopes[:, :3, 3:6] = -left @ skew(model.x.rotation.apply(loop.right.xyz))
     slopes[:, 3:, 3:6] = bent @ left
     slopes[:, :3, 6:9] = -back
-    slopes[:, :3, 9:] = back @ skew(loop.after.translations - model.z.translations)
+    slopes[:, :3, 9:] = back @ skew(loop.after.xyz - model.z.xyz)
     slopes[:, 3:, 9:] = -bent @ back
     return slopes
 
 
 def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
     """Return the best closed form of all samples and of small random subsets, with the medians of its errors."""
-    count = len(samples.gripper.translations)
+    count = len(samples.gripper)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
     fives: Iterable[Rows] = draws(DRAWS * robust, min(DRAWN, count - 1), count)
     for few in chain([slice(None)], fives):
@@ -263,40 +261,40 @@ def _start(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
         if _turns(chosen.gripper).rms[1] < FLAT:
             continue
         x = park_martin(*chosen)
-        z = PoseArrays.of((chosen.gripper @ x @ chosen.camera).transform.mean())
+        z = (chosen.gripper @ x @ chosen.camera).mean()
         medians = np.maximum(np.median(lengths(samples.residuals(_Model(x, z))), axis=0), LEAST)
         best = min(best, (log(medians[0]) + log(medians[1]), _Model(x, z), medians), key=lambda each: each[0])
     return best[1:]
 
 
-def park_martin(gripper: PoseArrays, camera: PoseArrays) -> PoseArrays:
+def park_martin(gripper: Transform, camera: Transform) -> Transform:
     """Return the X of A X = X B, in closed form: first the rotation, then the position; source: Park and Martin 1994.
 
     A and B are the motions of gripper and camera between two samples: R_X rotates the rotation vectors of B to those
     of A, and (R_A - I) t_X = R_X t_B - t_A.
     """
     a, b = _motions(gripper, camera)
-    alpha, beta = rotvecs_of(a.rotations), rotvecs_of(b.rotations)
+    alpha, beta = a.rotation.as_rotvec(), b.rotation.as_rotvec()
     angle = lengths(alpha)[:, 0]
     if (clear := (angle > CLEAR[0]) & (angle < CLEAR[1])).sum() > 1:
-        a, b, alpha, beta = a.at(clear), b.at(clear), alpha[clear], beta[clear]
-    turn = align_vectors(beta, alpha).as_matrix()
-    wanted = (applied(turn, b.translations) - a.translations).reshape(-1)
-    place, _ = _least_squares((a.rotations - np.eye(3)).reshape(-1, 3), wanted)
-    return PoseArrays(turn, place)
+        a, b, alpha, beta = a[clear], b[clear], alpha[clear], beta[clear]
+    turn = align_vectors(beta, alpha)
+    wanted = (turn.apply(b.xyz) - a.xyz).reshape(-1)
+    place, _ = _least_squares((a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), wanted)
+    return Transform(turn, place)
 
 
-def _motions(gripper: PoseArrays, camera: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
-    i, j = _pairs(len(gripper.translations))
-    return gripper.at(i).inverse @ gripper.at(j), camera.at(i) @ camera.at(j).inverse
+def _motions(gripper: Transform, camera: Transform) -> tuple[Transform, Transform]:
+    i, j = _pairs(len(gripper))
+    return gripper[i].inverse() @ gripper[j], camera[i] @ camera[j].inverse()
 
 
-def _scale_warnings(samples: _Samples, x: PoseArrays) -> list[str]:
+def _scale_warnings(samples: _Samples, x: Transform) -> list[str]:
     """Return a warning if a factor on the target's translations fits better: (R_A - I) t_X - s R_X t_B = -t_A."""
     a, b = _motions(*samples)
-    lever, turned = (a.rotations - np.eye(3)).reshape(-1, 3), applied(x.rotations, b.translations).reshape(-1)
-    place, plain = _least_squares(lever, turned - a.translations.reshape(-1))
-    place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.translations.reshape(-1))
+    lever, turned = (a.rotation.as_matrix() - np.eye(3)).reshape(-1, 3), x.rotation.apply(b.xyz).reshape(-1)
+    place, plain = _least_squares(lever, turned - a.xyz.reshape(-1))
+    place, scaled = _least_squares(np.column_stack([lever, -turned]), -a.xyz.reshape(-1))
     if place[3] <= 0.0 or plain <= max(BETTER * scaled, LEAST):
         return []
     return [f"TARGET fits better with its places times {place[3]:.4g}: another unit, or the size of a marker?"]
@@ -324,9 +322,9 @@ class _Turns(NamedTuple):
     axis: str
 
 
-def _turns(gripper: PoseArrays) -> _Turns:
-    i, j = _pairs(len(gripper.translations))
-    turns = rotvecs_of(np.swapaxes(gripper.rotations[i], 1, 2) @ gripper.rotations[j])
+def _turns(gripper: Transform) -> _Turns:
+    i, j = _pairs(len(gripper))
+    turns = (gripper[i].rotation.inverse() @ gripper[j].rotation).as_rotvec()
     squares, axes = np.linalg.eigh(turns.T @ turns / len(turns))
     axis = axes[:, 2] * np.sign(axes[np.abs(axes[:, 2]).argmax(), 2])
     _, second, first = np.sqrt(np.maximum(squares, 0.0)).tolist()

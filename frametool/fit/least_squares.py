@@ -1,6 +1,6 @@
-"""Common parts of all fits: normal equations, poses as arrays of matrices, and robust outlier rejection.
+"""Common parts of all fits: normal equations, errors and steps of poses, and robust outlier rejection.
 
-rotations: (n, 3, 3); translations: (n, 3), metres.  An error or a step is (n, 6): metres and a rotation vector, both
+An error or a step is (n, 6): metres and a rotation vector, both
 along the fixed axes of the parent frame, as in the covariances of ROS: t + d[:3], Exp(d[3:]) R.
 u is the residual of a measurement in sigmas, the root mean square of its components; sigmas that the user does not
 state are estimated from medians.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from frametool.errors import ValueInvalid
-from frametool.geometry import arrays, floats, matrix, quaternion
+from frametool.geometry import arrays, floats
 from frametool.geometry.rotation import Rotation
 from frametool.geometry.transform import Transform
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from frametool.geometry.types import Array, Quaternion
+    from frametool.geometry.types import Array
 
     Mask: TypeAlias = NDArray[np.bool_]
     Rows: TypeAlias = slice | list[int] | Mask
@@ -94,70 +94,16 @@ def length(vectors: Array) -> Array:
 NEAR = 1e-4  # radians: below, the series of J^-1 is exact to the last bits
 
 
-class PoseArrays(NamedTuple):
-    """Many poses, or one without the first axis."""
-
-    rotations: Any
-    translations: Any
-
-    @classmethod
-    def of(cls, transform: Transform) -> PoseArrays:
-        """Convert transforms."""
-        whole = transform.as_matrix()
-        return cls(whole[..., :3, :3].copy(), whole[..., :3, 3].copy())
-
-    @property
-    def transform(self) -> Transform:
-        """The same as transforms."""
-        x, y, z = np.moveaxis(self.translations, -1, 0)
-        return Transform.of(x, y, z, *as_quaternion(self.rotations))
-
-    @property
-    def inverse(self) -> PoseArrays:
-        """The inverse poses."""
-        back = np.swapaxes(self.rotations, -1, -2)
-        return PoseArrays(back, -applied(back, self.translations))
-
-    def __matmul__(self, other: PoseArrays) -> PoseArrays:
-        """Compose: a_from_c = a_from_b @ b_from_c."""
-        return PoseArrays(self.rotations @ other.rotations, self.apply(other.translations))
-
-    def apply(self, points: Array) -> Array:
-        """Transform points."""
-        moved: Array = applied(self.rotations, points) + self.translations
-        return moved
-
-    def at(self, index: Any) -> PoseArrays:
-        """Select poses as numpy does."""
-        return PoseArrays(self.rotations[index], self.translations[index])
-
-    def stepped(self, steps: Array) -> PoseArrays:
-        """Add small steps: t + d[:3], Exp(d[3:]) R."""
-        return PoseArrays(exp(steps[..., 3:]) @ self.rotations, self.translations + steps[..., :3])
-
-    def errors(self, measured: PoseArrays) -> Array:
-        """Return [t - measured t, Log(R measured R')]."""
-        turned = log(self.rotations @ np.swapaxes(measured.rotations, -1, -2))
-        return np.concatenate([self.translations - measured.translations, turned], -1)
+def stepped(poses: Transform, steps: Array) -> Transform:
+    """Add small steps: t + d[:3], Exp(d[3:]) R."""
+    turned = Rotation.from_rotvec(steps[..., 3:]) @ poses.rotation
+    return Transform(Rotation.from_quaternion(turned.as_quaternion(), normalize=True), poses.xyz + steps[..., :3])
 
 
-def as_quaternion(rotations: Array) -> Quaternion:
-    """Return x, y, z, w >= 0 of rotation matrices."""
-    entries = matrix.nine(rotations[..., i, j] for i in range(3) for j in range(3))
-    return quaternion.unit(*matrix.to_quaternion(*entries, arrays), arrays)
-
-
-def exp(rotvecs: Array) -> Array:
-    """Return the rotation matrices of rotation vectors (.., 3), radians."""
-    x, y, z = np.moveaxis(rotvecs, -1, 0)
-    nine = quaternion.to_matrix(*quaternion.from_rotvec(x, y, z, arrays))
-    return np.stack(nine, -1).reshape(*rotvecs.shape, 3)
-
-
-def log(rotations: Array) -> Array:
-    """Return the rotation vectors of rotation matrices (.., 3, 3)."""
-    x, y, z, w = as_quaternion(rotations)
-    return np.stack(quaternion.as_rotvec(x, y, z, w, arrays), -1)
+def errors(poses: Transform, measured: Transform) -> Array:
+    """Return [t - measured t, Log(R measured R')], (.., 6)."""
+    turned = (poses.rotation @ measured.rotation.inverse()).as_rotvec()
+    return np.concatenate([poses.xyz - measured.xyz, turned], -1)
 
 
 def skew(v: Array) -> Array:

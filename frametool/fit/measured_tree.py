@@ -15,7 +15,7 @@ import numpy as np
 
 from frametool.errors import Finding, NotConnected, ValueInvalid, alternatives, first_of, printable, shown, warn
 from frametool.fit.graph import bodies_of, bridges, require_connected
-from frametool.fit.least_squares import KEPT, NotSettled, PoseArrays, applied, inverse, length, stacked
+from frametool.fit.least_squares import KEPT, NotSettled, applied, errors, inverse, length, stacked
 from frametool.fit.tree_solver import Fitted, Noise, TreeProblem, TreeRows, jacobians, of_body
 from frametool.frames.lookups import FrameTree
 from frametool.frames.topology import Groups
@@ -45,14 +45,14 @@ class Uncertainty:
         for row in np.flatnonzero(found.kept & (problem.rows.stated | found.estimated)).tolist():
             self._known.join(*problem.pairs[row])
 
-    def between(self, target: tuple[int, PoseArrays], source: tuple[int, PoseArrays]) -> Array | None:
+    def between(self, target: tuple[int, Transform], source: tuple[int, Transform]) -> Array | None:
         """Return the covariance of source in target, each a body and the pose of a frame of it."""
         if target[0] == source[0]:
             return np.zeros((6, 6))
         if self._known.of(target[0]) != self._known.of(source[0]):
             return None
         by_ends = zip((target, source), jacobians(target[1], source[1], np.zeros(3)), strict=True)
-        slopes = np.hstack([of_body(by, self._found.bodies.at(body), frame) for (body, frame), by in by_ends])
+        slopes = np.hstack([of_body(by, self._found.bodies[body], frame) for (body, frame), by in by_ends])
         ends = [target[0], source[0]]
         found: Array = slopes @ self._of_bodies[ends][:, :, ends].reshape(12, 12) @ slopes.T
         return (found + found.T) / 2.0
@@ -105,7 +105,7 @@ BLUNDERS: dict[str, Callable[[Measurement], Transform | None]] = {
 }  # fmt: skip
 
 
-def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array) -> str | None:
+def best_blunder(measurement: Measurement, pose: Transform, information: Array) -> str | None:
     """Return the mistake that best explains a measurement of a pose; None if none does.
 
     pose: of the child in the parent; information: the inverse covariance (6, 6) of the measurement
@@ -115,12 +115,12 @@ def best_blunder(measurement: Measurement, pose: PoseArrays, information: Array)
     """
     meant = {words: made for words, blunder in BLUNDERS.items() if (made := blunder(measurement)) is not None}
     tried = [*meant.values(), measurement.transform]
-    errors = pose.at(None).errors(PoseArrays.of(stacked(tried)))
-    u = _sigmas(errors, information)
+    off = errors(pose, stacked(tried))
+    u = _sigmas(off, information)
     best = int(u[:-1].argmin())
     if u[best] > FITTING or u[best] >= u[-1] * (1 - TIE):
         return None
-    as_good = (_sigmas(errors - errors[best], information) <= ALIKE) & (u <= FITTING)
+    as_good = (_sigmas(off - off[best], information) <= ALIKE) & (u <= FITTING)
     return list(meant)[int(as_good.argmax())]
 
 
@@ -138,11 +138,11 @@ def loops(
         if unknown:
             continue
         try:
-            pose = PoseArrays.of(tree.lookup(each.parent, each.child))
+            pose = tree.lookup(each.parent, each.child)
         except NotConnected:
             apart += 1
             continue
-        error = pose.errors(PoseArrays.of(each.transform))
+        error = errors(pose, each.transform)
         metres, radians = map(float, length(error.reshape(2, 3)))
         if tolerance is None and each.covariance is not None:
             information = np.linalg.pinv(np.reshape(each.covariance, (6, 6)), hermitian=True)
@@ -202,7 +202,7 @@ def judged(problem: TreeProblem, measurements: Sequence[Measurement], found: Fit
         else:
             break
         tried.add(kept.tobytes())
-        bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())]).at(0)
+        bodies = problem.placed([problem.tree(np.flatnonzero(kept).tolist())])[0]
         found = problem.selected(bodies, kept, found.noise, robust=True)
     if undecided:
         raise ValueInvalid(case.open_loop(*undecided))
@@ -223,8 +223,8 @@ class _Case:
         self.tree = problem.tree(kept)
         self.alone = bridges(self.tree, problem.pairs, kept)
         self.parents, self.children = problem.ends(found.bodies)
-        self.poses = self.parents.inverse @ self.children
-        self.errors = self.poses.errors(problem.rows.measured)
+        self.poses = self.parents.inverse() @ self.children
+        self.errors = errors(self.poses, problem.rows.measured)
         self.information = problem.information(found.noise, found.noise.factor)
         noise = found.noise.at_least(Noise()) if found.few_loops else found.noise
         self.least_information = problem.information(noise, noise.factor)
@@ -236,7 +236,7 @@ class _Case:
         noise, swaps, undecided = [], [], None
         for row in np.flatnonzero(~self.found.kept).tolist():
             rivals = sorted(self.alone.intersection(self.tree.way(*self.problem.pairs[row])))
-            words = {row: best_blunder(self.measurements[row], self.poses.at(row), self.information[row])}
+            words = {row: best_blunder(self.measurements[row], self.poses[row], self.information[row])}
             for rival in rivals:
                 pose = self._pose_without(rival, row)
                 words[rival] = best_blunder(self.measurements[rival], pose, self.information[rival])
@@ -246,7 +246,7 @@ class _Case:
                 noise.append(row)
             if not rivals:
                 doubted = self._with_doubt(row, self.information[row])
-                fits[row] = words[row] or best_blunder(self.measurements[row], self.poses.at(row), doubted)
+                fits[row] = words[row] or best_blunder(self.measurements[row], self.poses[row], doubted)
             elif blamed == [row]:
                 fits[row] = words[row]
             elif len(blamed) == 1:
@@ -258,21 +258,21 @@ class _Case:
     def _with_doubt(self, row: int, information: Array) -> Array:
         """Return the information of a row relative to the fit, whose own uncertainty between the frames is included."""
         parent, child = self.problem.pairs[row]
-        doubt = self.uncertainty.between((parent, self.parents.at(row)), (child, self.children.at(row)))
+        doubt = self.uncertainty.between((parent, self.parents[row]), (child, self.children[row]))
         return information if doubt is None else inverse(inverse(information) + doubt)
 
-    def _pose_without(self, rival: int, row: int) -> PoseArrays:
+    def _pose_without(self, rival: int, row: int) -> Transform:
         """Return the pose that a rival would measure if the rejected row placed the bodies below it."""
-        measured, pairs = self.problem.rows.measured.at(row), self.problem.pairs
+        measured, pairs = self.problem.rows.measured[row], self.problem.pairs
         hanging = set(self.tree.beyond(rival))
-        parent, child = self.parents.at(row), self.children.at(row)
+        parent, child = self.parents[row], self.children[row]
         if pairs[row][1] in hanging:
-            moved = parent @ measured @ child.inverse
+            moved = parent @ measured @ child.inverse()
         else:
-            moved = child @ measured.inverse @ parent.inverse
-        ends = self.parents.at(rival), self.children.at(rival)
+            moved = child @ measured.inverse() @ parent.inverse()
+        ends = self.parents[rival], self.children[rival]
         parent, child = (moved @ end if body in hanging else end for end, body in zip(ends, pairs[rival], strict=True))
-        return parent.inverse @ child
+        return parent.inverse() @ child
 
     def open_loop(self, row: int, rivals: list[int]) -> str:
         """Return the rows of a loop and its closure error, on one line."""
@@ -289,7 +289,6 @@ class _Case:
         return text
 
 
-ROOT = PoseArrays(np.eye(3), np.zeros(3))
 FEW_LOOPS = 6  # with fewer the sigmas are rough if rotations can close them
 SINGULAR = 1e-12  # of the correlations: the least eigenvalue of a valid covariance
 
@@ -341,10 +340,8 @@ def _rows(measurements: Sequence[Measurement], bodies: Bodies) -> TreeRows:
             information[row] = inverse(covariance)
     return TreeRows(
         np.array([bodies.number[name] for name in parents]), np.array([bodies.number[name] for name in children]),
-        PoseArrays.of(stacked(bodies.pose[name] for name in parents)),
-        PoseArrays.of(stacked(bodies.pose[name] for name in children)),
-        PoseArrays.of(stacked(m.transform for m in measurements)),
-        np.array([m.covariance is not None for m in measurements]),
+        stacked(bodies.pose[name] for name in parents), stacked(bodies.pose[name] for name in children),
+        stacked(m.transform for m in measurements), np.array([m.covariance is not None for m in measurements]),
         information,
     )  # fmt: skip
 
@@ -406,9 +403,8 @@ class TreeSolution:
         self.rows = {name: ends[name] for name in self.frames}
         self.parents = self._entries()
         number = np.array([bodies.number[name] for name in self.frames])
-        self._poses = found.bodies.at(number) @ PoseArrays.of(stacked(bodies.pose[name] for name in self.frames))
-        components = zip(*(part.tolist() for part in self._poses.transform.components), strict=True)
-        self.poses = {name: Transform.of(*each) for name, each in zip(self.frames, components, strict=True)}
+        self._poses = found.bodies[number] @ stacked(bodies.pose[name] for name in self.frames)
+        self.poses = dict(zip(self.frames, self._poses.canonical(), strict=True))
         self.tree = FrameTree("the result")
         kept = {each[:2]: (Transform.of(*each[2]), each[3]) for each in fixed}
         for name in self.frames:
@@ -436,15 +432,15 @@ class TreeSolution:
 
     def marginal(self, frame: str) -> Array | None:
         """Return the covariance (6, 6) of the pose of a frame in the root; None if it is not known."""
-        return self._uncertainty.between((0, ROOT), self._at(frame))
+        return self._uncertainty.between((0, Transform.identity()), self._at(frame))
 
     def _known(self, frame: str) -> str:
         if frame not in self.poses:
             raise ValueInvalid(f"unknown frame {shown(frame)}{alternatives(frame, self.frames, 'frames')}")
         return frame
 
-    def _at(self, frame: str) -> tuple[int, PoseArrays]:
-        return self._of.number[self._known(frame)], self._poses.at(self.frames.index(frame))
+    def _at(self, frame: str) -> tuple[int, Transform]:
+        return self._of.number[self._known(frame)], self._poses[self.frames.index(frame)]
 
     def _entries(self) -> dict[str, str]:
         """Return the parent of every frame but one: the root, or the parent of the root if that is fixed."""

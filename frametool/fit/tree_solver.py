@@ -16,8 +16,8 @@ from frametool.fit.graph import SpanningTree, bridges, spanning_tree
 from frametool.fit.least_squares import (
     LEAST,
     MEDIAN_OF_SIX,
-    PoseArrays,
     applied,
+    errors,
     first_inliers,
     inverse,
     inverse_left_jacobian,
@@ -27,7 +27,11 @@ from frametool.fit.least_squares import (
     rms_sigma,
     skew,
     solve_normal,
+    stacked,
+    stepped,
 )  # fmt: skip
+from frametool.geometry.rigid import IDENTITY
+from frametool.geometry.transform import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -68,9 +72,9 @@ class TreeRows(NamedTuple):
 
     parent: Indices
     child: Indices
-    in_parent: PoseArrays
-    in_child: PoseArrays
-    measured: PoseArrays
+    in_parent: Transform
+    in_child: Transform
+    measured: Transform
     stated: Any
     information: Array
 
@@ -82,28 +86,28 @@ class Fitted(NamedTuple):
     few_loops: whether rotations can close all loops, so that metres alone do not determine their sigma
     """
 
-    bodies: PoseArrays
+    bodies: Transform
     kept: Any
     noise: Noise
     estimated: bool = False
     few_loops: bool = False
 
 
-def jacobians(parent: PoseArrays, child: PoseArrays, turned: Array) -> tuple[Array, Array]:
+def jacobians(parent: Transform, child: Transform, turned: Array) -> tuple[Array, Array]:
     """Return dr/da, dr/db, (n, 6, 6), of rows between frames at a and b; turned: the errors of the rotations."""
-    back = np.swapaxes(parent.rotations, -1, -2)
+    back = parent.rotation.inverse().as_matrix()
     turn = inverse_left_jacobian(turned) @ back
     by_parent, by_child = np.zeros((2, *turned.shape[:-1], 6, 6))
     by_child[..., :3, :3], by_child[..., 3:, 3:] = back, turn
     by_parent[..., :3, :3], by_parent[..., 3:, 3:] = -back, -turn
-    by_parent[..., :3, 3:] = back @ skew(child.translations - parent.translations)
+    by_parent[..., :3, 3:] = back @ skew(child.xyz - parent.xyz)
     return by_parent, by_child
 
 
-def of_body(jacobian: Array, body: PoseArrays, frame: PoseArrays) -> Array:
+def of_body(jacobian: Array, body: Transform, frame: Transform) -> Array:
     """Return the Jacobian by the step of a body from that by the step of a frame in it, by its lever arm."""
     moved = jacobian.copy()
-    moved[..., 3:] -= jacobian[..., :3] @ skew(frame.translations - body.translations)
+    moved[..., 3:] -= jacobian[..., :3] @ skew(frame.xyz - body.xyz)
     return moved
 
 
@@ -115,18 +119,18 @@ class TreeProblem:
         self.rows, self.count, self.size = rows, count, len(rows.parent)
         self.unknown = count - 1
         self.pairs = list(zip(rows.parent.tolist(), rows.child.tolist(), strict=True))
-        self.arm = max(float(np.median(length(rows.measured.translations))), LEAST) if self.size else 1.0
+        self.arm = max(float(np.median(length(rows.measured.xyz))), LEAST) if self.size else 1.0
         self._moves = (rows.parent != rows.child)[:, None, None]  # a row within a body has no effect
 
-    def ends(self, bodies: PoseArrays) -> tuple[PoseArrays, PoseArrays]:
+    def ends(self, bodies: Transform) -> tuple[Transform, Transform]:
         """Return the poses of the frames of each row."""
         rows = self.rows
-        return bodies.at(rows.parent) @ rows.in_parent, bodies.at(rows.child) @ rows.in_child
+        return bodies[rows.parent] @ rows.in_parent, bodies[rows.child] @ rows.in_child
 
-    def errors(self, bodies: PoseArrays) -> Array:
+    def errors(self, bodies: Transform) -> Array:
         """Return the residuals, (n, 6)."""
         parent, child = self.ends(bodies)
-        return (parent.inverse @ child).errors(self.rows.measured)
+        return errors(parent.inverse() @ child, self.rows.measured)
 
     def information(self, noise: Noise, factor: float = 1.0) -> Array:
         """Return the inverse covariances, (n, 6, 6); factor: of stated sigmas."""
@@ -145,7 +149,7 @@ class TreeProblem:
 
     # initial values
 
-    def start(self, trees: int) -> PoseArrays:
+    def start(self, trees: int) -> Transform:
         """Place the bodies by the spanning tree with which most other rows, including outliers, agree.
 
         The rows are tried in their order, shuffled, and last sorted by how well each ever closed a loop: outliers never
@@ -153,7 +157,7 @@ class TreeProblem:
         """
         shuffled = random.Random(0)  # noqa: S311 - random() gives the same numbers in every Python
         rows = range(self.size)
-        best = PoseArrays(np.tile(np.eye(3), (self.count, 1, 1)), np.zeros((self.count, 3)))
+        best = stacked([Transform.identity()] * self.count)
         least, closest = math.inf, np.full(self.size, math.inf)
         orders = [rows, *(sorted(rows, key=[shuffled.random() for _ in rows].__getitem__) for _ in range(trees - 1))]
         at_once = max(1, ROWS_AT_ONCE // max(self.size, self.count))
@@ -161,44 +165,44 @@ class TreeProblem:
             some, orders = [self.tree(order) for order in orders[:at_once]], orders[at_once:]
             placed = self.placed(some)
             for at, tree in enumerate(some):
-                off = np.log1p(self.u(self.errors(placed.at(at)), Noise()) ** 2)
+                off = np.log1p(self.u(self.errors(placed[at]), Noise()) ** 2)
                 if (sum_off := float(off.sum())) < least:
-                    best, least = placed.at(at), sum_off
+                    best, least = placed[at], sum_off
                 off[tree.row[1:]] = math.inf  # a tree agrees with its own rows
                 closest = np.minimum(closest, off)
             if not orders and trees > 1:
                 orders, trees = [np.argsort(closest, kind="stable").tolist()], 1
         return best
 
-    def placed(self, trees: list[SpanningTree]) -> PoseArrays:
+    def placed(self, trees: list[SpanningTree]) -> Transform:
         """Return the poses of bodies in trees of rows, (trees, bodies): paths to the root by doubling."""
         rows = self.rows
         above, row = np.array([tree.above for tree in trees]), np.array([tree.row for tree in trees])
-        across = rows.in_parent @ rows.measured @ rows.in_child.inverse
-        forth, back = across.at(row), across.inverse.at(row)
+        across = rows.in_parent @ rows.measured @ rows.in_child.inverse()
+        forth, back = across[row].components, across.inverse()[row].components
         down = rows.child[row] == np.arange(self.count)
-        rotations = np.where(down[..., None, None], forth.rotations, back.rotations)
-        translations = np.where(down[..., None], forth.translations, back.translations)
-        rotations[:, 0], translations[:, 0] = np.eye(3), 0.0
-        poses = PoseArrays(rotations, translations)
+        parts = [np.where(down, one, other) for one, other in zip(forth, back, strict=True)]
+        for part, own in zip(parts, IDENTITY, strict=True):
+            part[:, 0] = own
+        poses = Transform.of(*parts)
         each = np.arange(len(trees))[:, None]
         while above.any():
-            poses = poses.at((each, above)) @ poses
+            poses = poses[each, above] @ poses
             above = above[each, above]
         return poses
 
     # Gauss-Newton
 
-    def normal_equations(self, bodies: PoseArrays, information: Array) -> tuple[Array, Array, float]:
+    def normal_equations(self, bodies: Transform, information: Array) -> tuple[Array, Array, float]:
         """Return J'LJ and J'Lr, six rows for each unknown body, and r'Lr."""
         rows, (parent, child), count = self.rows, self.ends(bodies), self.count
-        errors = (parent.inverse @ child).errors(rows.measured)
-        by_parent, by_child = (self._moves * by for by in jacobians(parent, child, errors[:, 3:]))
+        off = errors(parent.inverse() @ child, rows.measured)
+        by_parent, by_child = (self._moves * by for by in jacobians(parent, child, off[:, 3:]))
         sides = [
-            (rows.parent, of_body(by_parent, bodies.at(rows.parent), parent)),
-            (rows.child, of_body(by_child, bodies.at(rows.child), child)),
+            (rows.parent, of_body(by_parent, bodies[rows.parent], parent)),
+            (rows.child, of_body(by_child, bodies[rows.child], child)),
         ]
-        weighed = applied(information, errors)
+        weighed = applied(information, off)
         normal, gradient = np.zeros((count, count, 6, 6)), np.zeros((count, 6))
         for body, by in sides:
             np.add.at(gradient, body, applied(by.swapaxes(1, 2), weighed))
@@ -206,28 +210,28 @@ class TreeProblem:
                 np.add.at(normal, (body, other), by.swapaxes(1, 2) @ information @ by_other)
         size = 6 * self.unknown
         matrix = normal[1:, 1:].swapaxes(1, 2).reshape(size, size)
-        return matrix, gradient[1:].reshape(size), float((errors * weighed).sum())
+        return matrix, gradient[1:].reshape(size), float((off * weighed).sum())
 
-    def improved(self, bodies: PoseArrays, information: Array, damping: float) -> tuple[PoseArrays, float, float]:
+    def improved(self, bodies: Transform, information: Array, damping: float) -> tuple[Transform, float, float]:
         """Take one step, damped until it helps; return the bodies, the size of the step and the damping."""
         normal, gradient, before = self.normal_equations(bodies, information)
         diagonal = np.diagonal(normal).copy()
-        extent = max(float(np.abs(bodies.translations).max()), LEAST)
+        extent = max(float(np.abs(bodies.xyz).max()), LEAST)
         while damping < MOST_DAMPED:
             np.fill_diagonal(normal, diagonal * (1.0 + damping))
             step = np.zeros((self.count, 6))
             step[1:] = -solve_normal(normal, gradient[:, None]).reshape(-1, 6)
-            moved, size = bodies.stepped(step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
-            errors = self.errors(moved)
-            after = float((errors * applied(information, errors)).sum())
+            moved, size = stepped(bodies, step), float(np.abs(step / ([extent] * 3 + [1.0] * 3)).max())
+            off = self.errors(moved)
+            after = float((off * applied(information, off)).sum())
             if size <= REST or after <= before * (1 + 1e-12):
                 return moved, size, damping / 10 if damping > 1e-9 else 0.0
             damping = max(damping * 10, 1e-6)
         return bodies, 0.0, 0.0
 
     def settled(
-        self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
-    ) -> tuple[PoseArrays, Noise]:
+        self, bodies: Transform, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool
+    ) -> tuple[Transform, Noise]:
         """Return the least-squares solution of the used rows, and their noise, both converged."""
         damping = 0.0
         for _ in range(STEPS):
@@ -241,7 +245,7 @@ class TreeProblem:
 
     # noise, and selection of rows
 
-    def estimated(self, bodies: PoseArrays, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool) -> Noise:
+    def estimated(self, bodies: Transform, kept: Any, noise: Noise, *, estimate: bool, few_loops: bool) -> Noise:
         """Return the noise of the used rows: sums of squares over their degrees of freedom."""
         dof = 3.0 * (kept.sum() - self.unknown)
         if dof <= 0:
@@ -263,7 +267,7 @@ class TreeProblem:
         place, turn = map(rms_sigma, squares, dofs)
         return Noise(place, turn, factor)
 
-    def redundancies(self, bodies: PoseArrays, kept: Any, noise: Noise) -> list[float]:
+    def redundancies(self, bodies: Transform, kept: Any, noise: Noise) -> list[float]:
         """Return the degrees of freedom of metres and of radians of rows without sigmas.
 
         With these the sigmas converge to the maximum of the restricted likelihood (REML); source: Foerstner 1979.
@@ -300,11 +304,11 @@ class TreeProblem:
         looped = kept.copy()
         looped[list(bridges(self.tree(every), self.pairs, every))] = False
 
-        def by_medians(bodies: PoseArrays) -> Array:
+        def by_medians(bodies: Transform) -> Array:
             errors = self.errors(bodies)
             return self.u(errors, self.medians(errors, looped))
 
-        def rough(bodies: PoseArrays, weights: Array) -> PoseArrays:
+        def rough(bodies: Transform, weights: Array) -> Transform:
             information = self.information(self.medians(self.errors(bodies), looped))
             return self.improved(bodies, information * weights[:, None, None], 0.0)[0]
 
@@ -314,7 +318,7 @@ class TreeProblem:
         report(0.6)
         return self.selected(bodies, kept, noise, robust=robust)
 
-    def selected(self, bodies: PoseArrays, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
+    def selected(self, bodies: Transform, kept: Any, noise: Noise, *, robust: bool) -> Fitted:
         """Fit the used rows and test all of them again, until the set does not change."""
         return reselected(Fitted(bodies, kept, noise), kept, self.refitted, robust=robust)
 
@@ -325,7 +329,7 @@ class TreeProblem:
         tree = self.tree(np.lexsort((u, ~kept)).tolist() if not kept.all() else range(self.size))
         reached = np.isin(np.arange(self.size), tree.row)
         if (reached & ~kept).any():
-            kept, bodies = kept | reached, self.placed([tree]).at(0)
+            kept, bodies = kept | reached, self.placed([tree])[0]
         alone = np.isin(np.arange(self.size), list(bridges(tree, self.pairs, np.flatnonzero(kept).tolist())))
         estimate = bool((kept & ~alone & ~self.rows.stated).any()) and kept.sum() > self.unknown
         few_loops = bool((kept & ~alone).sum() <= 2 * (self.unknown - alone.sum()))
