@@ -32,8 +32,6 @@ UNITS: dict[str, tuple[float, float, str]] = {
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
-TIME_UNITS = {"s": "", "ms": "e-3", "us": "e-6", "ns": "ns"}
-ARROW = "<-"
 LOOKUP = "a look-up is written TARGET<-SOURCE"
 HINTS = {
     "}": "a { before it is missing", '"': 'a quote is not closed: "name"', "<": LOOKUP, ">": LOOKUP,
@@ -41,13 +39,15 @@ HINTS = {
     ";": "write one expression a line", "~": "the inverse is inv(..)", "'": 'write names with blanks in "',
 }  # fmt: skip
 
-_BLANKS = re.compile(r"\s*+")
-_NUMBER = re.compile(r"((?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(\w*+)")
-_NAME = re.compile(r"(?!\d)\w++")
-_FRAME = re.compile(r'"[^"\n]*+"|/?+([^\W\d][\w/:.-]*+)')
-_COLUMN = r'\s*+\.\s*+(?:"[^"\n]*"|\w++(?:\.\w++)*+)'
+_FRAME = r'(?:"[^"\n]*+"|/?+[^\W\d](?:[\w/:.]|-(?!-*+[<>]))*+)'
+_TOKEN = re.compile(rf"""(?x)
+    (?P<lookup>(?P<target>{_FRAME})\s*+<-\s*+(?P<source>{_FRAME}))
+  | (?P<text>"[^"\n]*+")
+  | (?P<number>(?P<digits>(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+)(?P<unit>\w*+))
+  | (?P<column>row\s*+\.\s*+(?:"[^"\n]*"|\w++(?:\.\w++)*+))
+  | (?P<name>(?!\d)\w++)
+  | (?P<op>[-+*/^@()\[\],=])""")
 _BRACES = r"""(?s)(?<=[{\[,: \t\r\n])(?:"(?:[^"\\]|\\.)*+"|'[^']*+'|(?P<unclosed>["']))|[{}]"""
-_OPERATORS = "-+*/^@()[],="
 
 
 class CalcError(FrametoolError):
@@ -90,73 +90,28 @@ def tokens_of(text: str) -> list[Token]:
     if len(text) > LONGEST:
         raise CalcError(f"an expression of {len(text)} characters; the most are {LONGEST}")
     tokens: list[Token] = []
-    at, before = _behind_blanks(text, 0), ""
-    while at < len(text):
-        tokens.append(_word(text, at, before))
-        at, before = _behind_blanks(text, tokens[-1].end), tokens[-1].text
+    blank, at, before = re.compile(r"\s*+"), 0, ""
+    while (at := blank.match(text, at).end()) < len(text):  # type: ignore[union-attr]
+        tokens.append(_token(text, at, before))
+        at, before = tokens[-1].end, tokens[-1].text
     return [*tokens, Token("end", "", at, at)]
 
 
-def _behind_blanks(text: str, at: int) -> int:
-    found = _BLANKS.match(text, at)
-    return found.end() if found else at
-
-
-def _word(text: str, at: int, before: str) -> Token:
+def _token(text: str, at: int, before: str) -> Token:
     """Read the token at a position."""
     first = text[at]
     if first == "{":
         close = closing_brace(text, at)
         return Token("pose", text[at:close], at, close)
-    if (frame := _behind_frame(text, at)) > at:
-        if before == "in":
-            return Token("frame", text[at:frame], at, frame)
-        if (lookup := _lookup(text, at, frame)) is not None:
-            return lookup
-        if first == '"':
-            return Token("text", text[at:frame], at, frame)
-    if number := _NUMBER.match(text, at):
-        return Token("number", number[1], at, number.end(), number[2])
-    if name := _NAME.match(text, at):
-        column = re.compile(_COLUMN).match(text, name.end()) if name[0] == "row" else None
-        if column is not None:
-            return Token("column", text[at : column.end()], at, column.end())
-        return Token("name", name[0], at, name.end())
-    if first in _OPERATORS:
-        return Token("op", first, at, at + 1)
-    if strange := odd_characters(first):
-        raise CalcError(f"unexpected {strange}", at)
-    raise CalcError(f"unexpected {shown(first)}" + (f"; {HINTS[first]}" if first in HINTS else ""), at)
-
-
-def _behind_frame(text: str, at: int) -> int:
-    """Return the end of the frame's name at a position; the position itself if there is none.
-
-    Anything in quotes; else letters, digits and _ / : . -, but a dash before an arrow is not part of the name.
-    """
-    found = _FRAME.match(text, at)
+    if before == "in" and (frame := re.compile(_FRAME).match(text, at)):
+        return Token("frame", frame[0], at, frame.end())
+    found = _TOKEN.match(text, at)
     if found is None:
-        return at
-    name = found[1]
-    if name is None:
-        return found.end()
-    if not (name[0].isalpha() or name[0] == "_"):
-        return at
-    dashes = len(name) - len(name.rstrip("-")) if text[found.end() : found.end() + 1] in ("<", ">") else 0
-    return found.end() - dashes
-
-
-def _lookup(text: str, begin: int, end: int) -> Token | None:
-    """Read a look-up whose target was found."""
-    arrow = _behind_blanks(text, end)
-    if not text.startswith(ARROW, arrow):
-        return None
-    second = _behind_blanks(text, arrow + len(ARROW))
-    last = _behind_frame(text, second)
-    if last == second:
-        raise CalcError("a frame is missing after <-: TARGET<-SOURCE", second)
-    frames = tuple(each[1:-1] if each.startswith('"') else each for each in (text[begin:end], text[second:last]))
-    return Token("lookup", text[begin:last], begin, last, frames=frames)
+        if strange := odd_characters(first):
+            raise CalcError(f"unexpected {strange}", at)
+        raise CalcError(f"unexpected {shown(first)}" + (f"; {HINTS[first]}" if first in HINTS else ""), at)
+    frames = tuple(each.strip('"') for each in (found["target"], found["source"]) if each)
+    return Token(found.lastgroup or "", found["digits"] or found[0], at, found.end(), found["unit"] or "", frames)
 
 
 def closing_brace(text: str, at: int) -> int:
@@ -175,8 +130,8 @@ def frame_text(name: str | None) -> str:
     """Format a frame's name for an expression; an unknown name is `?`."""
     if name is None:
         return "?"
-    plain = name and not name.startswith(('"', "/", "-")) and not name.endswith("-")
-    return name if plain and _behind_frame(name, 0) == len(name) else f'"{name}"'
+    plain = re.fullmatch(_FRAME, name) and not name.startswith(('"', "/")) and not name.endswith("-")
+    return name if plain else f'"{name}"'
 
 
 class Branch(NamedTuple):
@@ -291,9 +246,7 @@ class _Parser:
             return f"; write a unit directly after its number: {before.text}{token.text}"
         if token.kind in ("lookup", "name", "pose", "column"):
             return "; poses are joined by *"
-        if token.text == "=":
-            return "; write a single name before =: NAME = expression"
-        return "; a time belongs to a look-up: map<-base @ 2.5s" if token.text == "@" else ""
+        return ""
 
     def _deeper(self, at: int) -> None:
         self.depth += 1
@@ -422,16 +375,13 @@ class _Parser:
         token = self.take()
         if token.kind == "name" and token.text in ("latest", "row") and not sign:
             return token.text, token.end
-        if token.kind != "number" or token.unit not in TIME_UNITS:
-            found = "" if token.kind == "end" else f", found {shown(token.text + token.unit)}"
+        if token.kind != "number" or not token.unit:
+            found = "" if token.kind == "end" else f", found {shown(token.text)}"
             expected = "expected a time with its unit, 2.5s or 2500000000ns, or latest or row"
             raise CalcError(f"{expected}{found}", token.start)
-        from frametool.frames.stamps import parse_stamp, whole_stamp
+        from frametool.frames.stamps import parse_time
 
-        written = TIME_UNITS[token.unit]
-        if "e" in token.text.lower() and written.startswith("e"):
-            raise CalcError(f"{shown(token.text + token.unit)}: write a time with an exponent in s", token.start)
         try:
-            return whole_stamp(parse_stamp(f"{sign}{token.text}{written}")), token.end
+            return parse_time(f"{sign}{token.text}{token.unit}"), token.end
         except ValueInvalid as error:
             raise CalcError(str(error), token.start) from None
