@@ -11,6 +11,7 @@ vector or a twist in the notation of results.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 from frametool.calc import rules
@@ -99,10 +100,8 @@ class Scope:
 
     def with_row(self, row: Type) -> Scope:
         """Return a copy of the scope for rows of a type."""
-        scope = Scope(
-            tree=self.tree, names=dict(self.names), row=row, degrees=self.degrees, normalize=self.normalize
-        )  # fmt: skip
-        scope.warned, scope.earth = self.warned, self.earth
+        scope = copy(self)
+        scope.names, scope.row, scope.seen = dict(self.names), row, {None}
         return scope
 
     def reading(self, source: Source) -> Reading:
@@ -282,7 +281,7 @@ class _Walk:
 
     def _sign(self, branch: Branch) -> Term:
         below = self._value(branch.parts[0])
-        return rules.negated(below) if branch.value == "-" else rules.unsigned(below)
+        return rules.negated(below) if branch.value == "-" else below
 
     def _power(self, branch: Branch) -> Term:
         return rules.power(*map(self._value, branch.parts))

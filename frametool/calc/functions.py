@@ -5,6 +5,7 @@ Functions of numbers: trigonometry, roots; angles in degrees keep right angles e
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.calc import rules
@@ -42,22 +43,24 @@ def trigonometric(pick: Callable[[Number, Number], Number]) -> Rule:
     """Return the rule of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
 
     def rule(name: str, terms: Sequence[Term]) -> Term:
-        angle = rules.scalar(rules.wanted(terms[0]), f"{name}()", angle=True)
+        angle = rules.scalar(terms[0], f"{name}()", angle=True)
         halved = floats.half_sincos_deg if angle.type.degrees else floats.half_sincos
         return made(PLAIN_NUMBER, lambda value, xp: (pick(*halved(2.0 * value, xp)),), angle)
 
     return rule
 
 
-def arc(kernel: Callable[..., Number], bound: float | None) -> Rule:
-    """Return the rule of a function whose value is an angle; `bound` is the largest argument."""
+def of_number(
+    type_: Type, kernel: Callable[..., Number], takes: str = "", allowed: Callable[[float], bool] = lambda _: True
+) -> Rule:
+    """Return the rule of a function of a plain number; takes: the numbers that are allowed, in words."""
 
     def rule(name: str, terms: Sequence[Term]) -> Term:
         def check(value: float) -> str:
-            return f"{name}() takes -1 .. 1, found {value:g}" if bound is not None and abs(value) > bound else ""
+            return "" if allowed(value) else f"{name}() takes {takes}, found {value:g}"
 
-        number = rules.scalar(rules.wanted(terms[0]), f"{name}()")
-        return made(ANGLE, lambda value, xp: (kernel(value, xp),), number, check=check)
+        number = rules.scalar(terms[0], f"{name}()")
+        return made(type_, lambda value, xp: (kernel(value, xp),), number, check=check)
 
     return rule
 
@@ -78,16 +81,6 @@ def arctangent(value: Number, xp: Namespace) -> Number:
     small = xp.where(steep, 1.0 / xp.where(steep, value, 1.0), value)
     angle = xp.doubled_arctan(small / (1.0 + xp.sqrt(1.0 + small * small)))
     return xp.where(steep, xp.copysign(floats.RIGHT_ANGLE, value) - angle, angle)
-
-
-def sqrt(name: str, terms: Sequence[Term]) -> Term:
-    """Return the square root of a plain number."""
-
-    def check(value: float) -> str:
-        return f"{name}() takes what is not negative, found {value:g}" if value < 0.0 else ""
-
-    number = rules.scalar(rules.wanted(terms[0]), f"{name}()")
-    return made(PLAIN_NUMBER, lambda value, xp: (xp.sqrt(value),), number, check=check)
 
 
 class Builtin(NamedTuple):
@@ -244,6 +237,10 @@ def _inv(name: str, terms: Sequence[Term]) -> Term:
     return rules.inverse(rules.need(terms[0], (POSE,), name))
 
 
+def _is_sine(value: float) -> bool:
+    return abs(value) <= 1.0
+
+
 _POSE = (POSE,)
 _trans = of_one(_POSE, lambda pose: Type(POINT, pose.target), lambda *pose: pose[:3])
 _rot = of_one(_POSE, lambda pose: pose, lambda *pose: (*(0.0 * part for part in pose[:3]), *pose[3:7]))
@@ -272,11 +269,12 @@ FUNCTIONS = {
     "sin": Builtin(1, 1, "angle", "sine", trigonometric(lambda sine, _: sine)),
     "cos": Builtin(1, 1, "angle", "cosine", trigonometric(lambda _, cosine: cosine)),
     "tan": Builtin(1, 1, "angle", "tangent", trigonometric(lambda sine, cosine: sine / cosine)),
-    "asin": Builtin(1, 1, "number", "angle of a sine", arc(arcsine, 1.0)),
-    "acos": Builtin(1, 1, "number", "angle of a cosine", arc(arccosine, 1.0)),
-    "atan": Builtin(1, 1, "number", "angle of a tangent", arc(arctangent, None)),
-    "sqrt": Builtin(1, 1, "number", "square root", sqrt),
-}
+    "asin": Builtin(1, 1, "number", "angle of a sine", of_number(ANGLE, arcsine, "-1 .. 1", _is_sine)),
+    "acos": Builtin(1, 1, "number", "angle of a cosine", of_number(ANGLE, arccosine, "-1 .. 1", _is_sine)),
+    "atan": Builtin(1, 1, "number", "angle of a tangent", of_number(ANGLE, arctangent)),
+    "sqrt": Builtin(1, 1, "number", "square root", of_number(
+        PLAIN_NUMBER, lambda value, xp: xp.sqrt(value), "what is not negative", lambda value: value >= 0.0)),
+}  # fmt: skip
 
 
 BETWEEN_WORDS = " \t()[]{},*^@+="
@@ -290,17 +288,16 @@ class Completer:
         """Store the scope, and readline, which knows the line."""
         self.scope = scope
         self.line = line
-        self.found: list[str] = []
 
     def __call__(self, text: str, state: int) -> str | None:
         """Return one completion after another."""
-        if state == 0:
-            self.found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
-        return self.found[state] if state < len(self.found) else None
+        found = self.completions(text, self.line.get_line_buffer()[: self.line.get_begidx()])
+        return found[state] if state < len(found) else None
 
     def completions(self, text: str, before: str) -> list[str]:
         """Return all completions of a word after the rest of a line."""
-        asked = self._tree_before(before)
+        opened = re.search(r"(\w+) *\[$", before)  # the bracket of a named tree
+        asked = self.scope.names[opened[1]].tree if opened and opened[1] in self.scope.names else None
         tree = asked or self.scope.tree
         frames = sorted(map(frame_text, tree.frames)) if tree else []
         head, arrow, tail = text.partition("<-")
@@ -308,9 +305,3 @@ class Completer:
             return [f"{head}<-{frame}" for frame in frames if frame.startswith(tail)]
         words = () if asked else (*self.scope.names, *(f"{name}(" for name in FUNCTIONS), *WORDS)
         return [word for word in (*words, *(f"{frame}<-" for frame in frames)) if word.startswith(text)]
-
-    def _tree_before(self, before: str) -> Any:
-        """Return the tree whose bracket was opened right before a word."""
-        name = before[:-1].rstrip().rpartition(" ")[2] if before.endswith("[") else ""
-        term = self.scope.names.get(name.lstrip("()[]{},*^@+=-/"))
-        return None if term is None else term.tree

@@ -118,6 +118,19 @@ def _no_division(*parts: float) -> str:
     return "division by zero" if parts[-1] == 0.0 else ""
 
 
+REMEDIES = {
+    POSE: "poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point",
+    POINT: "a direction is vector([x, y, z])",
+}
+
+
+def refused(verb: str, *terms: Term, by: str = "and") -> CalcError:
+    """Return the error that something cannot be done with values, and what to write instead."""
+    what, kinds = f" {by} ".join(each.type.named for each in terms), [each.type.kind for each in terms]
+    remedy = next((f"; {text}" for kind, text in REMEDIES.items() if kind in kinds), "")
+    return CalcError(f"cannot {verb} {what}{remedy}")
+
+
 # --- products ---
 
 
@@ -137,13 +150,7 @@ def times(left: Term, right: Term) -> Term:
         number, vector = (left, right) if a == NUMBER else (right, left)
         _require_scale(number)
         return arithmetic(vector.type, lambda factor, *parts: tuple(factor * part for part in parts), number, vector)
-    if POSE in (a, b) and NUMBER in (a, b):
-        raise CalcError("a pose cannot be multiplied by a number; its part is pose ^ 0.5")
-    if b == POSE and a in PLACED:
-        raise CalcError(f"the pose must be on the left: {right.type} * {a}")
-    if {a, b} == {NUMBER, POINT}:
-        raise CalcError("a point cannot be multiplied by a number; a direction is vector([x, y, z])")
-    raise CalcError(f"cannot multiply {left.type.named} by {right.type.named}")
+    raise refused("multiply", left, right, by="by")
 
 
 def _composed(left: Term, right: Term) -> Term:
@@ -169,21 +176,16 @@ def _require_scale(number: Term) -> None:
 def over(left: Term, right: Term) -> Term:
     """Divide by a number."""
     a, b = left.type, right.type
-    if b.kind != NUMBER:
-        raise CalcError(f"cannot divide by {b.named}")
-    if a.kind == NUMBER:
-        if b.unit not in (PLAIN, a.unit):
-            raise CalcError(f"cannot divide {a.named} by {b.named}")
+    if a.kind == b.kind == NUMBER and b.unit in (PLAIN, a.unit):
         if b.unit == PLAIN:
             return arithmetic(a, _OVER, left, right, check=_no_division)
         if a.degrees != b.degrees:
             left, right = in_radians(left), in_radians(right)
         return arithmetic(Type(NUMBER), _OVER, left, right, check=_no_division)
-    if a.kind == VECTOR:
+    if a.kind == VECTOR and b.kind == NUMBER:
         _require_scale(right)
         return arithmetic(a, lambda x, y, z, n: (x / n, y / n, z / n), left, right, check=_no_division)
-    hint = "; its part is pose ^ 0.5" if a.kind == POSE else "; a direction is vector([x, y, z])" * (a.kind == POINT)
-    raise CalcError(f"cannot divide {a.named} by a number{hint}")
+    raise refused("divide", left, right, by="by")
 
 
 # --- sums ---
@@ -192,19 +194,15 @@ def over(left: Term, right: Term) -> Term:
 def _sum(left: Term, right: Term, *, adding: bool) -> Term:
     """Add or subtract values that can be added."""
     a, b = left.type, right.type
-    verb, sign, kernel = ("add", "+", _PLUS) if adding else ("subtract", "-", _MINUS)
-    if a.kind == b.kind == NUMBER:
-        if a.unit != b.unit:
-            raise CalcError(f"cannot {verb} {a.named} and {b.named}")
+    kernel = _PLUS if adding else _MINUS
+    if a.kind == b.kind == NUMBER and a.unit == b.unit:
         if a.degrees and b.degrees:
             return arithmetic(a, kernel, left, right)
         return arithmetic(a._replace(degrees=False), kernel, in_radians(left), in_radians(right))
     if (a.kind in PLACED and b.kind in PLACED) or a.kind == b.kind == TWIST:
         frame = common(left, right)
         return arithmetic(Type(_kind_of_sum(a, b, adding=adding), frame), kernel, left, right)
-    if POSE in (a.kind, b.kind):
-        raise CalcError(f"poses are composed with *, not {sign}; the difference of two is inv(a) * b")
-    raise CalcError(f"cannot {verb} {a.named} and {b.named}")
+    raise refused("add" if adding else "subtract", left, right)
 
 
 def _kind_of_sum(a: Type, b: Type, *, adding: bool) -> str:
@@ -228,21 +226,9 @@ OPERATORS: dict[str, Callable[[Term, Term], Term]] = {
 
 def negated(term: Term) -> Term:
     """Return the negative of a number, a vector or a twist."""
-    kind = term.type.kind
-    if kind == POSE:
-        raise CalcError("a pose has no negative; inv(..) is its inverse")
-    if kind == POINT and term.type.target is not None:
-        raise CalcError("a point in a frame has no negative; a direction is vector(..)")
-    if kind not in (NUMBER, VECTOR, TWIST, POINT):
-        raise CalcError(f"{term.type.named} has no negative")
+    if term.type.kind not in (NUMBER, VECTOR, TWIST) and term.type != Type(POINT):
+        raise refused("negate", term)
     return arithmetic(term.type, lambda *parts: tuple(0.0 - part for part in parts), term)
-
-
-def unsigned(term: Term) -> Term:
-    """Return the operand of a plus sign."""
-    if term.type.kind == POSE:
-        raise CalcError("a pose has no sign; remove the +")
-    return term
 
 
 # --- powers and frames ---

@@ -154,16 +154,16 @@ frametool: map<-lidar takes points in 'lidar', found one in 'camera_optical'
 frametool: map<-lidar takes points in 'lidar', found one in 'map'
   (map<-lidar) * trans(map<-tool)
                ^
-frametool: the pose must be on the left: map<-lidar * point
+frametool: cannot multiply a point by the pose map<-lidar; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
   [1, 2, 3] * (map<-lidar)
             ^
-frametool: poses are composed with *, not -; the difference of two is inv(a) * b
+frametool: cannot subtract the pose map<-tool and the pose map<-lidar; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
   (map<-tool) - (map<-lidar)
               ^
-frametool: a pose cannot be multiplied by a number; its part is pose ^ 0.5
+frametool: cannot multiply a number by the pose map<-tool; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
   2 * (map<-tool)
     ^
-frametool: a pose has no negative; inv(..) is its inverse
+frametool: cannot negate the pose map<-tool; poses have a * b, inv(a), inv(a) * b, a ^ 0.5 and a * point
   -(map<-tool)
   ^
 frametool: unknown name 'map'; a frame is asked for as TARGET<-SOURCE
