@@ -378,23 +378,12 @@ def test_joints_move_over_time_where_a_file_of_values_has_stamps(run: Callable[.
     assert json.loads(done.out)["stamp_ns"] == 1_000_000_000
 
 
-def test_what_builds_on_an_included_model_is_left_out_with_it_and_all_that_builds_on_that(tmp_path: Path) -> None:
-    body = (
-        '\n<include><uri>model://create</uri></include>\n<include merge="{}"><uri>model://rack/model.sdf</uri></include><link name="L"/>'
-        '\n<joint name="j" type="fixed"><parent>create::base</parent><child>L</child></joint>'
-        '\n<frame name="f" attached_to="j"/>\n<model name="n"><pose relative_to="f"/><link name="a"/></model>\n<frame name="g" attached_to="n::a"/>'
-    )
-    tree, said = read(tmp_path, model(body.format("false")))
-    assert set(tree.frames) == {"m", "m::L"}
-    assert said[2:] == [
-        "a.sdf:6: joint 'm::j' is left out: no frame 'create::base' in model 'm'",
-        "a.sdf:7: frame 'm::f' is left out: no frame 'j' in model 'm'",
-        "a.sdf:8: model 'm::n' is left out: no frame 'f' in model 'm'",
-        "a.sdf:9: frame 'm::g' is left out: no frame 'n::a' in model 'm'",
-    ]
-    with pytest.raises(FormatError, match="no frame 'creat::base' in model 'm'"):
-        read(tmp_path, model(body.format("false").replace("create::base", "creat::base")))
-    assert len(read(tmp_path, model(body.format("true").replace("create::base", "creat::base")))[1]) == 6
+@pytest.mark.parametrize("missing", ["create::base", "base"])
+def test_what_builds_on_an_included_model_needs_the_whole_file(tmp_path: Path, missing: str) -> None:
+    joint = f'<joint name="j" type="fixed"><parent>{missing}</parent><child>L</child></joint>'
+    include = "<include><uri>model://create</uri></include>"
+    with pytest.raises(FormatError, match=f"no frame '{missing}' in model 'm'; those of <include> need other files: gz sdf -p"):
+        read(tmp_path, model(f'{include}<link name="L"/>{joint}'))
 
 
 def test_a_joint_without_an_axis_takes_no_value_and_one_that_screws_neither(tmp_path: Path) -> None:
@@ -440,7 +429,7 @@ def test_joints_in_a_circle_of_links_leave_one_out(tmp_path: Path) -> None:
         (A_AND_B + JOINT.format("fixed", "").replace("<child>b</child>", ""), "joint 'j' has no <child>"),
         (A_AND_B + JOINT.format("fixed", "").replace("<child>b", "<child>c"), "no frame 'c' in model 'm'"),
         (A_AND_B + JOINT.format("fixed", "").replace("<child>b", "<child>a"), "joint 'j' does not connect two links"),
-('<include><uri>model://x</uri></include><link name="a"/><frame name="f" attached_to="b"/>', "no frame 'b' in model 'm'; frames: a"),
+('<include><uri>model://x</uri></include><link name="a"/><frame name="f" attached_to="b"/>', "no frame 'b' in model 'm'; those of <include> need other files"),
         ("<model name='n'><link name='a'><pose relative_to='b'/></link></model><link name='b'/>", "no frame 'b' in model 'm::n'"),
         ("", "a.sdf"),
         ("<link name='a'>", "a.sdf:3:"),

@@ -155,8 +155,8 @@ WRONG = {
     "axis 0 0 0": (robot(joint(parts='<axis xyz="0 0 0"/>')), r"r\.urdf:2:\d+: joint 'j' has the axis 0 0 0"),
     "no rotation": (robot(joint(parts='<origin quat_xyzw="0 0 0 2"/>')), r"r\.urdf:2:\d+: quaternion 0 0 0 2"),
     "limit": (robot(joint(parts='<limit lower="a" upper="1"/>')), r"r\.urdf:2:\d+: lower: 'a' is not a number"),
-    "mimic of none": (robot(joint(parts='<mimic joint="k"/>')), r"r\.urdf:2:1: joint 'j' mimics 'k', which is no joint"),
-    "mimic of itself": (robot(joint(parts='<mimic joint="j"/>')), r"r\.urdf:2:1: joints mimic each other in a circle: 'j' -> 'j'"),
+    "mimic of none": (robot(joint(parts='<mimic joint="k"/>')), r"r\.urdf:2: joint 'j' mimics 'k', which is no joint"),
+    "mimic of itself": (robot(joint(parts='<mimic joint="j"/>')), r"r\.urdf:2: joints mimic each other in a circle: 'j' -> 'j'"),
     "mimics in a circle": (
         robot(joint(parts='<mimic joint="k"/>'), joint("k", "b", "c", parts='<mimic joint="j"/>')),
         r"circle: 'j' -> 'k' -> 'j'",

@@ -347,8 +347,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         raise Unanswered(message, source=file.name, line=rows[0].line, column=1)
     frames = options.answers.names(*(f"link{number}" for number in range(len(rows) + 1)))
     links = [_link(row, parent, child, options) for row, parent, child in zip(rows, frames, frames[1:], strict=False)]
-    posture = JointState.of(links, options)
-    yield from posture.edges(links)
+    yield from JointState.of(links, options, file.name).edges(links)
 
 
 def _link(row: DhRow, parent: str, child: str, options: Options) -> Link:

@@ -15,6 +15,7 @@ import os
 import re
 from bisect import bisect_left
 from functools import partial
+from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -39,7 +40,7 @@ from frametool.formats.trees.tree_reader import read_time
 from frametool.frames.stamps import SUFFIXES, format_stamp, parse_stamp
 from frametool.geometry import floats, rigid
 from frametool.grammar.edges import Diagnostics, Edge, Options
-from frametool.grammar.readers import Misfit, as_mapping, kind
+from frametool.grammar.readers import Misfit, as_mapping
 from frametool.ros import messages
 from frametool.ros.message_stream import TextMessage, line_texts, read_messages
 from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
@@ -47,7 +48,7 @@ from frametool.text.numbers import ANGLES, BRACKETS, LENGTHS, parse_number
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
-    from frametool.formats.robots.model import Fail, Value
+    from frametool.formats.robots.model import Value
     from frametool.geometry.types import Rigid
     from frametool.grammar.readers import Path
 
@@ -66,12 +67,12 @@ class JointState:
 
     """
 
-    def __init__(self, joints: Iterable[Joint], options: Options, fail: Fail, *, fixed: Collection[str] = ()) -> None:
+    def __init__(self, joints: Iterable[Joint], options: Options, file: str, *, fixed: Collection[str] = ()) -> None:
         """Read the values in options and files.
 
         joints: those that move, each name once
         options: `answers` has the values; `tally` collects unknown names, and warnings
-        fail: returns the error for the place of a joint
+        file: name of the file of the robot
         fixed: names of joints that do not move
         Raises FormatError: an invalid value, a mimic of itself or of a missing joint.
         """
@@ -81,21 +82,21 @@ class JointState:
         self._times: dict[str, list[int]] = {}
         self._options = options
         self._fixed = frozenset(fixed)
+        self._file = file
         self._take_files()
         self._take_options()
         self._tell_limits()
         self.named = frozenset((*self.still, *self.moving))
         self.known = set(self.named)
-        self._follow(fail)
+        self._follow()
         options.tally.robot = self.still, [], [name for name in self.joints if name not in self.known]
         options.tally.assumed = options.tally.assumed or self._about()
 
     @classmethod
-    def of(cls, links: Collection[Link], options: Options, fail: Fail | None = None) -> JointState:
+    def of(cls, links: Collection[Link], options: Options, file: str) -> JointState:
         """Return the joint values for the joints of some links."""
         joints = (joint for link in links for joint in link.joints)
-        fail = fail or (lambda joint, problem: FormatError(problem, line=joint.line))
-        return cls(joints, options, fail, fixed=[link.fixed for link in links if link.fixed])
+        return cls(joints, options, file, fixed=[link.fixed for link in links if link.fixed])
 
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
         """Yield one edge per link: static, or a sample at each time at which one of its joints has a value."""
@@ -143,7 +144,7 @@ class JointState:
         for path in self._options.answers.joint_files:
             found: dict[str, list[tuple[int | None, Value]]] = {}
             setting = None
-            for setting in JointFile(path, self.joints).settings():
+            for setting in read_joint_file(path, self.joints):
                 if setting.joint in self.joints:
                     found.setdefault(setting.joint, []).append((setting.stamp_ns, self._read(setting)))
                 else:
@@ -189,22 +190,17 @@ class JointState:
                 raise BadAnswer(f"--joint {shown(name)}: {error}") from None
             self._take(name, [(None, value)])
 
-    def _follow(self, fail: Fail) -> None:
+    def _follow(self) -> None:
         """Set each joint without a value: from its leader, along chains of any length, or at rest."""
-        for name in self.joints:
-            chain = {name: None}
-            last = name
-            while (leader := self._leader(last, fail)) is not None:
-                if leader in chain:
-                    circle = [*chain][[*chain].index(leader) :][:8]
-                    drawn = " -> ".join(map(shown, [*circle, leader]))
-                    raise fail(self.joints[leader], f"joints mimic each other in a circle: {drawn}")
-                chain[leader] = None
-                last = leader
-            for follower in reversed(chain):
-                self._settle(self.joints[follower])
+        leaders = {name: [leader] for name in self.joints if (leader := self._leader(name)) is not None}
+        try:
+            for name in TopologicalSorter({name: leaders.get(name, ()) for name in self.joints}).static_order():
+                self._settle(self.joints[name])
+        except CycleError as error:
+            circle = " -> ".join(map(shown, reversed(error.args[1][-8:])))
+            raise self._error(error.args[1][0], f"joints mimic each other in a circle: {circle}") from None
 
-    def _leader(self, name: str, fail: Fail) -> str | None:
+    def _leader(self, name: str) -> str | None:
         """Return the joint that determines one without a value."""
         mimic = self.joints[name].mimic
         if name in self.still or name in self.moving or mimic is None or mimic.joint in self._fixed:
@@ -212,8 +208,11 @@ class JointState:
         leader = self.joints.get(mimic.joint)
         if leader is None or leader.posed:
             which = "no joint" if leader is None else leader.kind
-            raise fail(self.joints[name], f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {which}")
+            raise self._error(name, f"joint {shown(name)} mimics {shown(mimic.joint)}, which is {which}")
         return mimic.joint
+
+    def _error(self, joint: str, problem: str) -> FormatError:
+        return FormatError(problem, source=self._file, line=self.joints[joint].line)
 
     def _settle(self, joint: Joint) -> None:
         """Compute the value of a joint whose leader has one."""
@@ -237,9 +236,11 @@ class JointState:
             series = self.moving.get(name) or {0: self.still[name]}
             values = [value.plain for value in series.values() if isinstance(value, JointValue)]
             if joint.lower is not None and joint.upper is not None and joint.lower <= joint.upper:
-                beyond = [value for value in values if not joint.lower - SLACK <= value <= joint.upper + SLACK]
-                if beyond:
-                    tally.note(_about_limits(joint, beyond, len(values)), joint.line, "limit")
+                lower, upper = joint.lower - SLACK, joint.upper + SLACK
+                if beyond := [value for value in values if not lower <= value <= upper]:
+                    limits = f"{joint.lower:g} .. {joint.upper:g} {'rad' if joint.kind in TURNING else 'm'}"
+                    message = f"joint {shown(name)} is beyond its limits {limits}, {beyond[0]:g}"
+                    tally.note(message, joint.line, "limit")
             steps = zip(series, values, values[1:], strict=False) if joint.kind == "revolute" else ()
             if wide := next((at for at, one, two in steps if abs(two - one) >= HALF_TURN), None):
                 far = f"joint {shown(name)} turns by half a turn or more in the step from {format_stamp(wide)}"
@@ -253,14 +254,6 @@ class JointState:
         at_zero = all(joint.posed or self.still[joint.name] == JointValue(0.0) for joint in free)
         many = f"{len(free)} joint{'s' * (len(free) > 1)}"
         return f"{many} at {'0' if at_zero else 'rest'} ({STATES})"
-
-
-def _about_limits(joint: Joint, beyond: Sequence[float], count: int) -> str:
-    """Return the warning that values of a joint are beyond its limits."""
-    unit = "rad" if joint.kind in TURNING else "m"
-    limits = f"its limits {joint.lower:g} .. {joint.upper:g} {unit}"
-    samples = f" in {len(beyond)} of {count} samples, first" if count > 1 else ","
-    return f"joint {shown(joint.name)} is beyond {limits}{samples} {beyond[0]:g}"
 
 
 def _between(one: Value, two: Value, fraction: float) -> Value:
@@ -339,16 +332,6 @@ def stamp_column(names: Sequence[str], joints: Mapping[str, Joint]) -> tuple[int
     return None if place is None else (place, SUFFIXES.get(known.in_nanoseconds(names[place].strip()), ""))
 
 
-def misspelt(names: Sequence[str], joints: Mapping[str, Joint]) -> str:
-    """Return the error for the first column whose name resembles a joint that no other column has."""
-    held = {column.joint for column in find_joint_columns(names, joints)}
-    for name in names:
-        bare_name = _with_unit(name.strip(), joints)[0]
-        if bare_name not in joints and (near := did_you_mean(bare_name, [*joints.keys() - held], cutoff=0.8)):
-            return f"column {shown(name)} is not a joint{near}"
-    return ""
-
-
 DELIMITERS = {"tsv": "\t", "semicolon": ";"}  # of tables other than CSV
 
 
@@ -362,164 +345,140 @@ class JointSample(NamedTuple):
     source: Source
 
 
-class JointFile:
-    """One file of joint values, and the joints that it may contain."""
+def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSample]:
+    """Yield the values in a file, in its order; `path` may be FILE:STATE for a named state.
 
-    def __init__(self, path: str, joints: Mapping[str, Joint]) -> None:
-        """Open a file, or FILE:STATE for a named state; raises FileProblem."""
-        file, colon, state = path.rpartition(":")
-        has_state = colon and file and not os.path.exists(path) and os.path.exists(file)
-        self.path, self.state = (file, state) if has_state else (path, "")
-        self.joints = joints
-        self.tally = Diagnostics()
-        self.file = InputFile(self.path)
-
-    def settings(self) -> Iterator[JointSample]:
-        """Yield the values in the order of the file, and close it.
-
-        Raises FormatError.
-        """
-        try:
-            yield from self._settings()
-        finally:
-            self.file.close()
-        for note in self.tally.findings():
-            warn(f"{self.file.name}:{note.line}: {note.message}")
-
-    def _settings(self) -> Iterator[JointSample]:
-        head = self.file.head()
-        name = self.file.name
-        fmt = detect(head, "joints", "records", "rows", name=self.path, otherwise="yaml")[0]
-        if "joints" in FORMATS[fmt].reads:
-            yield from import_module(FORMATS[fmt].reader).read_joints(self.file, self.state)
-        elif self.state:
-            having = " and ".join(readers("joints"))
-            raise FormatError(f"has no states with names; {having} files do", source=name)
-        elif head.lstrip().startswith(b"<"):
-            raise FormatError("this XML has no values of joints; maps, JointState messages, CSV have", source=name)
-        elif "rows" in FORMATS[fmt].reads:
-            yield from self._table(fmt, head.decode("utf-8", "replace"))
-        else:
-            yield from self._messages(read_messages(self.file.stream, name, "echo", self.tally))
-
-    def _messages(
-        self, messages: Iterable[TextMessage | FormatError], state_of: Callable[[Any], Any] | None = None
-    ) -> Iterator[JointSample]:
-        """Yield the values in documents or rows; `state_of` makes a JointState of a row."""
-        for message in messages:
-            if isinstance(message, FormatError):
-                raise message
-            try:
-                yield from self._values(state_of(message.value) if state_of else message.value, (), message)
-            except Misfit as misfit:
-                raise message.error(misfit) from None
-
-    def _values(self, value: Any, path: Path, message: TextMessage) -> Iterator[JointSample]:
-        """Yield the values in a plain value: a JointState, a map, or a list of either."""
-        if type(value) is list:
-            for index, each in enumerate(value):
-                yield from self._values(each, (*path, index), message)
-        elif type(value) is dict and messages.is_envelope(value):
-            yield from self._values(value["msg"], (*path, "msg"), message)
-        else:
-            try:
-                mapping = as_mapping(value, "a map of joints, or a JointState")
-                if not messages.is_joint_state(mapping):
-                    yield from self._map(mapping, path, message)
-                    return
-                stamp_ns = messages.stamp_of_state(mapping)
-                for joint, position, place in messages.positions(mapping):
-                    refuse = partial(_refused, message, (*path, *place))
-                    yield JointSample(joint, _finite(position, place), stamp_ns, refuse, message.source)
-            except Misfit as misfit:
-                raise misfit.below(*path) from None
-
-    def _map(self, mapping: dict[str, Any], path: Path, message: TextMessage) -> Iterator[JointSample]:
-        """Yield the values of a map, or of the only map in it, as under `joints:`."""
-        from frametool.grammar.names import STAMP_KEYS
-
-        times = [key for key in STAMP_KEYS if key in mapping and key not in self.joints]
-        stamp_ns = read_time(mapping, times[0], " like 12.5") if times else None
-        keys = [key for key in mapping if key not in times]
-        if len(keys) == 1 and keys[0] not in self.joints and type(mapping[keys[0]]) is dict:
-            path, mapping = (*path, keys[0]), mapping[keys[0]]
-            keys = list(mapping)
-        for key in keys:
-            yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
-
-    def _table(self, fmt: str, head: str) -> Iterator[JointSample]:
-        """Yield the values of a table: one column per joint, or the output of the echo tools."""
-        first = next((line for line in head.split("\n") if line.strip()), "")
-        name = self.file.name
-        if first.startswith("%time,"):
-            rows = read_messages(self.file.stream, name, "csv1", self.tally)
-            yield from self._messages(rows, messages.of_numbered)
-        elif messages.looks_like_row(first):
-            texts = line_texts(self.file.stream, name, self.tally)
-            rows = (TextMessage(text, Source(name, text), line, cells=True) for line, text in texts)
-            yield from self._messages(rows, lambda row: messages.of_row(messages.unquoted(row)))
-        else:
-            yield from self._columns(fmt)
-
-    def _cells(self, fmt: str, line: str) -> list[str]:
-        if fmt == "csv":
-            return [cell.text for cell in split_line(line)]
-        return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(fmt))]
-
-    def _columns(self, fmt: str) -> Iterator[JointSample]:
-        """Yield the values of a table whose header names joints."""
-        rows = line_texts(self.file.stream, self.file.name, self.tally)
-        number, header = next(rows, (1, ""))
-        names = self._cells(fmt, header.strip("\r\ufeff"))
-        try:
-            columns = find_joint_columns(names, self.joints)
-            if not columns:
-                named = first_of(names, 20, quote=bare)
-                raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(self.joints)}")
-            if problem := misspelt(names, self.joints):
-                raise ValueInvalid(problem)
-        except ValueInvalid as error:
-            raise FormatError(str(error), source=self.file.name, line=number) from None
-        stamp = stamp_column(names, self.joints)
-        used = {column.place for column in columns} | {stamp[0] if stamp else -1}
-        if others := [name for place, name in enumerate(names) if place not in used]:
-            warn(f"{self.file.name}:{number}: columns that are no joints were left out: {listing(others)}")
-        source = Source(self.file.name, "")
-        for number, line in rows:
-            if line.lstrip().startswith("#"):
-                continue
-            cells = self._cells(fmt, line.rstrip("\r"))
-
-            def refuse(problem: str, _below: Path, line: int = number) -> FormatError:
-                return FormatError(problem, source=self.file.name, line=line)
-
-            if len(cells) != len(names):
-                raise refuse(f"expected {len(names)} cells, found {len(cells)}", ())
-            at = ""
-            try:
-                if stamp:
-                    at = names[stamp[0]]
-                    stamp_ns = parse_stamp(cells[stamp[0]] + stamp[1])
-                for place, joint, degrees, per_metre in columns:
-                    at = names[place]
-                    value = JointValue(parse_number(cells[place]) / per_metre, degrees)
-                    yield JointSample(joint, value, stamp_ns if stamp else None, refuse, source)
-            except ValueInvalid as error:
-                raise refuse(f"{at}: {error}", ()) from None
-
-
-def _finite(value: Any, path: Path) -> JointValue:
-    """Read a position in a message: radians or metres, without units."""
+    joints: those that the file may contain.
+    Raises FileProblem, FormatError.
+    """
+    whole, colon, state = path.rpartition(":")
+    has_state = colon and whole and not os.path.exists(path) and os.path.exists(whole)
+    path, state = (whole, state) if has_state else (path, "")
+    file, tally = InputFile(path), Diagnostics()
     try:
-        if type(value) is not str:
-            raise ValueInvalid(f"expected a number, found {kind(value)}")
-        return JointValue(parse_number(value))
+        head = file.head()
+        fmt = detect(head, "joints", "records", "rows", name=path, otherwise="yaml")[0]
+        if "joints" in FORMATS[fmt].reads:
+            yield from import_module(FORMATS[fmt].reader).read_joints(file, state)
+        elif state:
+            having = " and ".join(readers("joints"))
+            raise FormatError(f"has no states with names; {having} files do", source=file.name)
+        elif head.lstrip().startswith(b"<"):
+            raise FormatError("this XML has no values of joints; maps, JointState messages, CSV have", source=file.name)
+        elif "rows" in FORMATS[fmt].reads:
+            yield from _of_table(file, fmt, joints, tally)
+        else:
+            for message in read_messages(file.stream, file.name, "echo", tally):
+                if isinstance(message, FormatError):
+                    raise message
+                try:
+                    yield from _of_value(message.value, (), message, joints)
+                except Misfit as misfit:
+                    raise message.error(misfit) from None
+    finally:
+        file.close()
+    for note in tally.findings():
+        warn(f"{file.name}:{note.line}: {note.message}")
+
+
+def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str, Joint]) -> Iterator[JointSample]:
+    """Yield the values in a plain value: a JointState, a map, or a list of either."""
+    if type(value) is list:
+        for index, each in enumerate(value):
+            yield from _of_value(each, (*path, index), message, joints)
+    elif type(value) is dict and messages.is_envelope(value):
+        yield from _of_value(value["msg"], (*path, "msg"), message, joints)
+    else:
+        try:
+            mapping = as_mapping(value, "a map of joints, or a JointState")
+            if not messages.is_joint_state(mapping):
+                yield from _of_map(mapping, path, message, joints)
+                return
+            stamp_ns = messages.stamp_of_state(mapping)
+            for joint, position, place in messages.positions(mapping):
+                refuse = partial(_refused, message, (*path, *place))
+                yield JointSample(joint, position, stamp_ns, refuse, message.source)
+        except Misfit as misfit:
+            raise misfit.below(*path) from None
+
+
+def _of_map(
+    mapping: dict[str, Any], path: Path, message: TextMessage, joints: Mapping[str, Joint]
+) -> Iterator[JointSample]:
+    """Yield the values of a map, or of the only map in it, as under `joints:`."""
+    from frametool.grammar.names import STAMP_KEYS
+
+    times = [key for key in STAMP_KEYS if key in mapping and key not in joints]
+    stamp_ns = read_time(mapping, times[0], " like 12.5") if times else None
+    keys = [key for key in mapping if key not in times]
+    if len(keys) == 1 and keys[0] not in joints and type(mapping[keys[0]]) is dict:
+        path, mapping = (*path, keys[0]), mapping[keys[0]]
+        keys = list(mapping)
+    for key in keys:
+        yield JointSample(key, mapping[key], stamp_ns, partial(_refused, message, (*path, key)), message.source)
+
+
+def _of_table(
+    file: InputFile, fmt: str, joints: Mapping[str, Joint], tally: Diagnostics
+) -> Iterator[JointSample]:
+    """Yield the values of a table whose header names joints."""
+    rows = line_texts(file.stream, file.name, tally)
+    first, header = next(rows, (1, ""))
+    names = _cells(fmt, header.strip("\r\ufeff"))
+    try:
+        columns = _columns_of(names, joints)
     except ValueInvalid as error:
-        raise Misfit(str(error), path, rule=error.rule) from None
+        raise FormatError(str(error), source=file.name, line=first) from None
+    stamp = stamp_column(names, joints)
+    used = {column.place for column in columns} | {stamp[0] if stamp else -1}
+    if others := [name for place, name in enumerate(names) if place not in used]:
+        warn(f"{file.name}:{first}: columns that are no joints were left out: {listing(others)}")
+    source, stamp_ns, at = Source(file.name, ""), None, ""
+    for number, line in rows:
+        if line.lstrip().startswith("#"):
+            continue
+        cells = _cells(fmt, line.rstrip("\r"))
+        refuse = partial(_refused_row, file.name, number)
+        if len(cells) != len(names):
+            raise refuse(f"expected {len(names)} cells, found {len(cells)}")
+        try:
+            if stamp:
+                at = names[stamp[0]]
+                stamp_ns = parse_stamp(cells[stamp[0]] + stamp[1])
+            for place, joint, degrees, per_metre in columns:
+                at = names[place]
+                value = JointValue(parse_number(cells[place]) / per_metre, degrees)
+                yield JointSample(joint, value, stamp_ns, refuse, source)
+        except ValueInvalid as error:
+            raise refuse(f"{at}: {error}") from None
+
+
+def _columns_of(names: Sequence[str], joints: Mapping[str, Joint]) -> list[JointColumn]:
+    """Return the columns of joints; raises ValueInvalid for none, and for a name that resembles a joint without one."""
+    columns = find_joint_columns(names, joints)
+    if not columns:
+        named = first_of(names, 20, quote=bare)
+        raise ValueInvalid(f"no column is a joint; columns: {named}; joints: {listing(joints)}")
+    without = joints.keys() - {column.joint for column in columns}
+    for name in names:
+        own = _with_unit(name.strip(), joints)[0]
+        if own not in joints and (near := did_you_mean(own, [*without], cutoff=0.8)):
+            raise ValueInvalid(f"column {shown(name)} is not a joint{near}")
+    return columns
+
+
+def _cells(fmt: str, line: str) -> list[str]:
+    if fmt == "csv":
+        return [cell.text for cell in split_line(line)]
+    return [cell.strip().strip('"') for cell in line.split(DELIMITERS.get(fmt))]
 
 
 def _refused(message: TextMessage, path: Path, problem: str, below: Path) -> FormatError:
     return message.error(Misfit(problem, (*path, *below)))
+
+
+def _refused_row(name: str, line: int, problem: str, _below: Path = ()) -> FormatError:
+    return FormatError(problem, source=name, line=line)
 
 
 def unknown_joint(joint: str, joints: Mapping[str, Joint], fixed: frozenset[str]) -> str:

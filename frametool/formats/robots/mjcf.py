@@ -196,7 +196,7 @@ SIZES = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others hav
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the edges of a model, with joint values from options, default at their references."""
     model = MjcfModel(read_nodes(XmlFile(file), HELD), options)
-    yield from JointState.of(model.links.values(), options).edges(model.links.values())
+    yield from JointState.of(model.links.values(), options, file.name).edges(model.links.values())
 
 
 def read_joints(file: InputFile, state: str) -> Iterator[JointSample]:

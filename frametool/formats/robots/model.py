@@ -35,7 +35,7 @@ from frametool.text.numbers import parse_angle, parse_length
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from frametool.documents.xml import Element, XmlFile
     from frametool.geometry.types import Components, Condition, Namespace, Number, Numbers, Rigid
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 
     Value: TypeAlias = "JointValue | Rigid"
     Values: TypeAlias = Mapping[str, Value]
-    Fail: TypeAlias = Callable[["Joint", str], FormatError]
 
 TURNING = ("revolute", "continuous")
 POSED = ("planar", "floating", "ball")  # their value is a pose, not a number

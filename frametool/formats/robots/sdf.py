@@ -22,7 +22,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.documents.xml import XmlFile, XmlNode, read_nodes
-from frametool.errors import FormatError, alternatives, shown
+from frametool.errors import alternatives, shown
 from frametool.formats.robots.joints import JointState
 from frametool.formats.robots.model import Joint, Link, Mimic, read_quaternion
 from frametool.frames.lookups import FrameTree
@@ -85,6 +85,7 @@ def read_pose(holder: XmlNode, options: Options) -> tuple[Rigid, str]:
 
 
 WORLD = "world"
+WHOLE = "gz sdf -p FILE > whole.sdf"
 INSIDE = "__model__"
 DEEPEST_MODEL = 100
 TRUE = ("true", "1")
@@ -134,16 +135,15 @@ class SdfFrames:
         self.sensors: list[SdfFrame] = []
         parts = root.attribute("version").split(".")  # other words count as the newest version
         self.version = tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
-        self.missing: FormatError | None = None  # the last error about a name that was omitted
-        self.gone: set[str] = set()
+        self.included = False
         self._take([self.top])
-        while self._read_all():  # until no more names are lost with omitted frames
-            pass
+        frames = [frame for frame in self.all.values() if frame is not self.top]
+        for frame in [*frames, *self.sensors]:
+            self._read(frame)
         self.tree = FrameTree()
         self.seen: dict[str, dict[str, Rigid]] = {}  # frame -> those below it, seen from it: chains cost no square
-        for frame in self.all.values():
-            if frame is not self.top:
-                self._hang(frame)
+        for frame in frames:
+            self._hang(frame)
 
     def _take(self, scopes: list[SdfFrame]) -> None:
         """Register the contents of some scopes, and of those below."""
@@ -153,8 +153,8 @@ class SdfFrames:
             for holder in scope.holder.children:
                 if holder.tag == "include":
                     name = shown(holder.text_of("name") or holder.text_of("uri"))
-                    remedy = "it needs other files; with them: gz sdf -p FILE > whole.sdf"
-                    self.note(holder, f"<include> {name} is left out, {remedy}")
+                    self.note(holder, f"<include> {name} is left out, it needs other files; with them: {WHOLE}")
+                    self.included = True
                 elif holder.tag == "state":
                     self.note(holder, "<state> is left out: every model is at its own pose")
                 elif holder.tag in ("model", "link", "joint", "frame"):
@@ -189,27 +189,6 @@ class SdfFrames:
             raise holder.error(f"{holder.tag} {shown(frame.name)} twice; {first}", "name")
         self.all[frame.name] = frame
         return frame
-
-    def _read_all(self) -> bool:
-        """Read every frame; return True if some were omitted because they depend on included models."""
-        lost: list[SdfFrame] = []
-        for frame in [*self.all.values(), *self.sensors]:
-            try:
-                if frame is not self.top:
-                    self._read(frame)
-            except FormatError as error:
-                if error is not self.missing:
-                    raise
-                lost.append(frame)
-                self.note(frame.holder, f"{frame.kind} {shown(frame.name)} is left out: {error.message}")
-        self.gone |= {frame.name for frame in lost}
-        self.all = {name: each for name, each in self.all.items() if not self._is_gone(each)}
-        self.sensors = [each for each in self.sensors if not self._is_gone(each)]
-        return bool(lost)
-
-    def _is_gone(self, frame: SdfFrame) -> bool:
-        """Return True if a frame, or an enclosing scope, was omitted."""
-        return any(each.name in self.gone for each in (frame, *frame.below(self.top)))
 
     def _read(self, frame: SdfFrame) -> None:
         """Read the pose of a frame and find its reference frame."""
@@ -249,24 +228,12 @@ class SdfFrames:
             return found
         place = "the world" if scope.kind == WORLD else f"model {shown(scope.name)}"
         message = f"no frame {shown(name)} in {place}"
-        if self._is_left_out(name, full, scope):
-            self.missing = holder.error(message, attribute)
-            raise self.missing
         if name == WORLD:
             raise holder.error(f"{message}; poses in a model are relative to frames of the model", attribute)
+        if self.included:
+            raise holder.error(f"{message}; those of <include> need other files: {WHOLE}", attribute)
         inside = [frame.local for frame in self.all.values() if frame.scope is scope and frame is not scope]
         raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
-
-    def _is_left_out(self, name: str, full: str, scope: SdfFrame) -> bool:
-        """Return True if a name is one that was omitted, or begins with that of an included model."""
-        if any(full == gone or full.startswith(f"{gone}::") for gone in self.gone):
-            return True
-        for include in scope.holder.all("include"):
-            file = include.text_of("uri").rstrip("/").rsplit("/", 1)[-1]
-            names = (include.text_of("name"), file, file.rsplit(".", 1)[0])
-            if name.split("::", maxsplit=1)[0] in names or include.attribute("merge") == "true":
-                return True
-        return False
 
     def _hang(self, frame: SdfFrame) -> None:
         """Put the pose of a frame into the tree; raises FormatError for frames relative to each other in a circle."""
@@ -353,12 +320,7 @@ class SdfJoints:
     def canonical(self, model: SdfFrame) -> SdfFrame | None:
         """Return the link that a model's frame is attached to: the named one, or the first, also of nested models."""
         if name := model.holder.attribute("canonical_link"):
-            try:
-                return self.frames.find(name, model, model.holder, "canonical_link")
-            except FormatError as error:
-                if error is not self.frames.missing:
-                    raise
-                return None
+            return self.frames.find(name, model, model.holder, "canonical_link")
         inside = [frame for frame in self.frames.all.values() if frame.scope is model]
         return next((frame for kind in ("link", "model") for frame in inside if frame.kind == kind), None)
 
@@ -512,10 +474,9 @@ class _SdfTree:
 
     def _posture(self) -> JointState:
         """Return the joint values; their names are those of the joints here: `tip` for `arm::tip`."""
-        places = {motion.name: joint.frame.holder for joint in self.joints.all for motion in joint.motions}
         moving = [motion for joint in self.joints.all for motion in joint.motions]
         fixed = [self.joints.names[joint.frame.name] for joint in self.joints.all if not joint.motions]
         answers = self.options.answers
         values = {self.joints.names.get(name, name): value for name, value in answers.joints.items()}
         options = self.options._replace(answers=answers._replace(joints=values))
-        return JointState(moving, options, lambda joint, problem: places[joint.name].error(problem), fixed=fixed)
+        return JointState(moving, options, self.frames.top.holder.xml.name, fixed=fixed)

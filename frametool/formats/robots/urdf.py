@@ -91,7 +91,7 @@ def describe(file: InputFile, options: Options) -> RobotDescription:
         except FormatError as error:
             options.report(error)
     links = list(reader.connected())
-    robot = RobotDescription(reader.frames, links, JointState.of(links, options, reader.fail))
+    robot = RobotDescription(reader.frames, links, JointState.of(links, options, file.name))
     if not robot.frames:
         raise FormatError("no links in it", source=file.name)
     if len(roots := robot.roots) > 1:
@@ -128,10 +128,6 @@ class _Reader:
             if parts.setdefault(part.tag, part.element) is not part.element:
                 self.options.report(self.xml.error(part.element, f"<{part.tag}> twice in one joint"))
         self._link(node.element, parts)
-
-    def fail(self, joint: Joint, problem: str) -> FormatError:
-        """Return the error for the place of a joint."""
-        return self.xml.error(self.joints[joint.name][1], problem)
 
     def _frame(self, node: XmlNode) -> None:
         for inner in node.children:
