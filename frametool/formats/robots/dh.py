@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Path
 
     Fail = Callable[[str], FormatError]
-    FoundRow = tuple[str, Path, dict[str, tuple[Any, Path]]]
+    # the name of a column or key as written, the value, and the error for its place
+    Item = tuple[str, Any, Fail]
 
 # names of columns in use, without unit and joint number
 COLUMNS = {
@@ -48,11 +49,6 @@ COLUMNS = {
     "type": ("type", "joint_type", "kind", "sigma"),
     "name": ("name", "joint", "joint_name", "link", "i", "j", "id", "#", "no", "frame", "index"),
 }
-# other keys, which are omitted with a note; any unknown key is an error, as it may be misspelt
-OTHERS = (
-    r"q?_?(?:min|max|lim)|lower|upper|limits?|range|home|axis|mass|m|com|inertia|jm|b|tc|g|velocity|effort|parent|child"
-    r"|flip|mdh|convention|comment|note|description|model|robot|color"
-)
 NEEDED = ("d", "a", "alpha")
 UNITS = {
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad",
@@ -119,16 +115,39 @@ def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
     """Return the rows of a table, and note its other contents; raises FormatError with the place."""
     text = file.text
     is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
-    cells = _of_documents(file, tally) if is_document else _of_lines(file, tally)
     rows: dict[str, DhRow] = {}
-    for number, (each, fail, line) in enumerate(cells, 1):
-        row = _row(number, each, fail)
+    others: dict[str, None] = {}
+    for number, (items, fail, line) in enumerate((_of_documents if is_document else _of_lines)(file), 1):
+        row = _row(number, _cells(items, others), fail)
         if row.name in rows:
             raise fail(f"two joints are called {shown(row.name)}: rows {[*rows].index(row.name) + 1} and {number}")
         rows[row.name] = row._replace(line=line)
     if not rows:
         raise FormatError("a table without rows", source=file.name)
+    if others:
+        first = next(iter(rows.values())).line - (not is_document)
+        tally.note_each(f"left out, about something else: {listing(others)}", first)
     return [*rows.values()]
+
+
+def _cells(items: Iterable[Item], others: dict[str, None]) -> dict[str, Cell]:
+    """Return the cells of a row by the names of columns; `others` receives the names of what is not read."""
+    cells: dict[str, Cell] = {}
+    known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
+    for written, value, fail in items:
+        column = column_of(written)
+        if column is None:
+            near = did_you_mean(written.strip().lower(), known, cutoff=0.75)
+            if near or value is None:  # the half of a number with a decimal comma is a key without a value
+                raise fail(f"unknown column {shown(written)}{near}; a row has {', '.join(COLUMNS)}")
+            others[written] = None
+        elif column.name in cells:
+            raise fail(f"two columns for {column.name}; keep one")
+        elif type(value) is not str:
+            raise fail(f"expected a number, found {kind(value)}")
+        else:
+            cells[column.name] = Cell(value, column.unit, fail)
+    return cells
 
 
 def column_of(written: str) -> Column | None:
@@ -206,52 +225,27 @@ def _length(text: str, unit: str) -> Amount:
     return Amount(parse_number(text) / LENGTHS[unit] if is_bare else parse_length(text))
 
 
-def _tell_others(names: Iterable[str], line: int, tally: Diagnostics) -> None:
-    """Note the columns or keys that are not used."""
-    if others := [name for name in dict.fromkeys(names) if column_of(name) is None]:
-        tally.note_each(f"left out, about something else: {listing(others)}", line)
-
-
-def _misspelt(name: str) -> str:
-    """Return a suggestion for an unknown name, as ` did you mean 'x'?`."""
-    known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
-    return did_you_mean(name.strip().lower(), known, cutoff=0.75)
-
-
-def _of_lines(file: InputFile, tally: Diagnostics) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
+def _of_lines(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
     """Yield the rows of a text with one row per line, below a header."""
     lines = [(number, line) for number, line in enumerate(file.text.split("\n"), 1) if line.strip()]
-    begin = next((at for at, (_, line) in enumerate(lines) if _columns(line)), None)
+    begin = next((at for at, (_, line) in enumerate(lines) if _is_header(_split(line))), None)
     if begin is None:
-        raise FormatError(
-            "no header with d, a and alpha above the rows; write theta,d,a,alpha", source=file.name, line=1
-        )
-    number, header = lines[begin]
-    columns = _columns(header)
-    names = [column.name for column in columns.values()]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise line_error(file, number, 1, f"two columns for {twice}; keep one")
-    for at, word in enumerate(_split(header)):
-        if at not in columns and (near := _misspelt(word.text)):
-            raise line_error(file, number, word.column, f"unknown column {shown(word.text)}{near}")
-    _tell_others((word.text for word in _split(header)), number, tally)
+        message = "no header with d, a and alpha above the rows; write theta,d,a,alpha"
+        raise FormatError(message, source=file.name, line=1)
+    header = [word.text for word in _split(lines[begin][1])]
     for number, line in lines[begin + 1 :]:
         if line.lstrip().startswith("#"):
             continue
         words = _split(line)
-        if len(words) != len(_split(header)):
-            raise line_error(file, number, 1, f"expected {len(_split(header))} cells, found {len(words)}")
-        cells = {
-            column.name: Cell(words[at].text, column.unit, partial(line_error, file, number, words[at].column))
-            for at, column in columns.items()
-        }
-        yield cells, partial(line_error, file, number, 1), number
+        fail = partial(line_error, file, number, 1)
+        if len(words) != len(header):
+            raise fail(f"expected {len(header)} cells, found {len(words)}")
+        places = (partial(line_error, file, number, word.column) for word in words)
+        yield [(name, word.text, place) for name, word, place in zip(header, words, places, strict=True)], fail, number
 
 
-def _columns(line: str) -> dict[int, Column]:
-    """Return the columns of a header, by their positions; empty for a line that is not a header."""
-    found = {at: column for at, word in enumerate(_split(line)) if (column := column_of(word.text))}
-    return found if {"a", "alpha"} <= {column.name for column in found.values()} else {}
+def _is_header(words: Iterable[LineCell]) -> bool:
+    return _is_row({word.text: "" for word in words})
 
 
 def _split(line: str) -> list[LineCell]:
@@ -265,41 +259,27 @@ def _split(line: str) -> list[LineCell]:
     return found[:: 2 if mark and line.count(mark) + 1 < len(found) else 1]
 
 
-def _of_documents(file: InputFile, tally: Diagnostics) -> Iterator[tuple[dict[str, Cell], Fail, int]]:
+def _of_documents(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
     """Yield the rows of YAML or JSON."""
     source = file.source
     for document in parse_documents(source.text, source.name):
 
-        def fail(message: str, *path: str | int, key: bool = False, index: int = document.index) -> FormatError:
-            return format_error(source, (index, *path), message, key=key)
+        def fail(path: Path, message: str, index: int = document.index) -> FormatError:
+            return format_error(source, (index, *path), message)
 
         tables = list(_tables(document.value, (), fail))
         if len(tables) != 1:
             expected = "expected a list of {theta, d, a, alpha}, a map of them, or a list a column"
-            raise fail(f"{len(tables)} tables in it; keep one" if tables else f"no table in it: {expected}")
+            raise fail((), f"{len(tables)} tables in it; keep one" if tables else f"no table in it: {expected}")
         (rows,) = tables
-        lines = locate_many(source.text, [(document.index, *path) for _, path, _ in rows])
-        _tell_others((key for _, _, row in rows for key in row), lines[0][0], tally)
-        for (name, path, row), (line, _) in zip(rows, lines, strict=True):
-            cells: dict[str, Cell] = {}
-            for key, (value, place) in row.items():
-                if re.fullmatch(OTHERS, key.lower()):
-                    continue
-                if (column := column_of(key)) is None:
-                    message = f"unknown key {shown(key)}{_misspelt(key)}; a row has {', '.join(COLUMNS)}"
-                    raise fail(message, *place, key=True)
-                if column.name in cells:
-                    raise fail(f"two keys for {column.name}; keep one", *place, key=True)
-                if type(value) is not str:
-                    raise fail(f"expected a number, found {kind(value)}", *place)
-                cells[column.name] = Cell(value, column.unit, partial(format_error, source, (document.index, *place)))
-            if name and "name" not in cells:
-                cells["name"] = Cell(name, "", partial(format_error, source, (document.index, *path)))
-            yield cells, partial(format_error, source, (document.index, *path)), line
+        lines = locate_many(source.text, [(document.index, *path) for path, _ in rows])
+        for (path, items), (line, _) in zip(rows, lines, strict=True):
+            found: list[Item] = [(key, value, partial(fail, (*path, *place))) for key, value, place in items]
+            yield found, partial(fail, path), line
 
 
-def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterator[list[FoundRow]]:
-    """Yield each table as its rows: name, place, and key -> value and its place; raises the error made by `fail`."""
+def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterator[list[tuple[Path, list[Any]]]]:
+    """Yield each table as its rows, with their paths; each row as keys, values and the paths of these below it."""
     if len(path) > 4 or type(value) not in (dict, list) or not value:
         return
     items = list(value.items() if type(value) is dict else enumerate(value))
@@ -307,26 +287,27 @@ def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterato
         rows = []
         for name, row in items:
             if type(row) is dict:
-                cells = {key: (cell, (*path, name, key)) for key, cell in row.items()}
-                rows.append((name if type(value) is dict else "", (*path, name), cells))
+                named = [("name", name, ())] if type(value) is dict and not _has_name(row) else []
+                rows.append(((*path, name), [*((key, cell, (key,)) for key, cell in row.items()), *named]))
             elif type(value) is list:
-                raise fail(f"expected a row {{theta, d, a, alpha}}, found {kind(row)}", *path, name)
+                raise fail((*path, name), f"expected a row {{theta, d, a, alpha}}, found {kind(row)}")
         yield rows
     elif _is_row(value):  # a map of columns, or of the numbers of one row
-        columns = {key: each if type(each) is list else [each] for key, each in items}
+        columns = {key: each if type(each) is list else [each] for key, each in items if column_of(key) is not None}
         size = max(map(len, columns.values()))
-        for key, each in columns.items():
-            if len(each) != size and column_of(key) not in (None, NAME):
-                raise fail(f"{key}: expected {size} numbers, as another has, found {len(each)}", *path, key)
-        # a single name next to the columns is that of the robot
-        kept = {key: each or [None] for key, each in columns.items() if len(each) == size or column_of(key) != NAME}
-        yield [
-            ("", path, {key: ((each[at:] or each)[0], (*path, key, at)) for key, each in kept.items()})
-            for at in range(size)
-        ]
+        for key, each in [*columns.items()]:
+            if len(each) != size and column_of(key) == NAME:  # the name of the robot
+                del columns[key]
+            elif len(each) != size:
+                raise fail((*path, key), f"{key}: expected {size} numbers, as another has, found {len(each)}")
+        yield [(path, [(key, each[at], (key, at)) for key, each in columns.items()]) for at in range(size)]
     else:
         for key, each in items:
             yield from _tables(each, (*path, key), fail)
+
+
+def _has_name(row: dict[str, Any]) -> bool:
+    return any(column_of(key) == NAME for key in row)
 
 
 def _is_row(value: Any) -> bool:
