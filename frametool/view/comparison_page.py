@@ -22,6 +22,7 @@ from frametool.view.pictures import (
     PictureDot,
     PictureLine,
     PictureWords,
+    filled,
     shade_of,
     svg_element,
     write_html,
@@ -79,14 +80,11 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
         for column in columns
     )
     hints = dict.fromkeys(hint for each in numbers for hint in each["hints"])
-    body = (
-        f"<main>\n<header><h1>{escape(title)}</h1>\n"
-        f"<p>{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, frametool {__version__}</p>\n"
-        f"<pre><code>$ {escape(printable(command))}</code></pre>\n"
-        f"{''.join(f'<p class=hint>{escape(hint)}</p>' for hint in hints)}</header>\n"
-        f"<noscript><pre>{escape(_text(numbers))}</pre></noscript>\n"
-        f'<div id="figures">\n{drawn}</div>\n</main>\n<output id="tip" hidden></output>\n'
-    )
+    body = filled(
+        "report.html", title=escape(title), made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, frametool {__version__}",
+        command=escape(printable(command)), hints="".join(f"<p class=hint>{escape(hint)}</p>" for hint in hints),
+        text=escape(_text(numbers)), figures=drawn,
+    )  # fmt: skip
     samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0][0]) for each in curves]}
     held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
     return write_html(title, body, script="tables.js report.js", data=held)

@@ -13,6 +13,7 @@ from base64 import b64encode
 from functools import partial
 from hashlib import sha256
 from itertools import groupby
+from string import Template
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
@@ -178,22 +179,10 @@ def write_html(
     digests = (f"{kind}-src '{_digest(text)}'; " if text else "" for kind, text in texts.items())
     policy = f"default-src 'none'; img-src data:; {''.join(digests)}base-uri 'none'; form-action 'none'"
     held = {name: text.translate(HARMLESS) for name, text in (data or {}).items()}
-    return f"""\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<title>{_text(title)}</title>
-<style>{texts["style"]}</style>
-</head>
-<body>
-{body}{"".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held.items())}
-{f'<script type="module">{texts["script"]}</script>' if script else ""}
-</body>
-</html>
-"""
+    scripts = "".join(f'<script type="application/json" id="{name}">{text}</script>' for name, text in held.items())
+    if script:
+        texts["script"] = f'<script type="module">{texts["script"]}</script>'
+    return filled("shell.html", policy=policy, title=_text(title), body=body, data=scripts, **texts)
 
 
 HARMLESS = {ord(letter): f"\\u{ord(letter):04x}" for letter in "<>&"}  # JSON that no name in it can end
@@ -203,6 +192,11 @@ def page_file(name: str) -> str:
     """Return the text of a file in the folder `page`."""
     with open(os.path.join(os.path.dirname(__file__), "page", name), encoding="utf-8") as stream:
         return stream.read()
+
+
+def filled(name: str, **texts: str) -> str:
+    """Return the text of a file in the folder `page` with texts in their places."""
+    return Template(page_file(name)).substitute(texts)
 
 
 def _digest(text: str) -> str:

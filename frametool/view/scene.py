@@ -51,12 +51,9 @@ class Trail(NamedTuple):
 
 
 def _expression(text: str) -> re.Pattern[str]:
-    """Compile a regular expression without Python's warnings."""
-    import warnings
-
+    """Compile a regular expression."""
     try:
-        with warnings.catch_warnings(action="ignore", category=FutureWarning):
-            return re.compile(text)
+        return re.compile(text)
     except (re.error, OverflowError, RecursionError) as error:
         raise ValueInvalid(f"{shown(text)} is not a regular expression: {error}") from None
 

@@ -15,6 +15,7 @@ from frametool.errors import cells, printable
 from frametool.frames.stamps import BILLION, format_stamp
 from frametool.sim.turtle import SIZE
 from frametool.view.progress import coloured_console
+from frametool.view.run_plot import colours_of
 from frametool.view.scene import SLANTED, Flat, Labels, Projection, Size, nice, words_of
 
 if TYPE_CHECKING:
@@ -247,23 +248,15 @@ class Screen:
         self._last.update((command.turtle, command) for command in step.commands)
         if not step.is_tick:
             return
-        self._mark(step)
-        if monotonic() - self._drawn >= SCREEN_FRAME:
-            self._live.update(self._picture(), refresh=True)
-            self._drawn = monotonic()
-
-    def _mark(self, step: SimulationStep) -> None:
-        """Set the dots of a tick."""
         if step.clears != self._tick.clears:
             self._canvas.clear()
-        if step.states.keys() != self._tick.states.keys():
-            from frametool.view.run_plot import colours_of
-
-            self._colours = colours_of(step.states)
-        self._tick = step
+        self._tick, self._colours = step, colours_of(step.states)
         for name, state in step.states.items():
             if not step.pens[name].off:
                 self._canvas.dot(state.x / SIZE, state.y / SIZE, self._colours[name])
+        if monotonic() - self._drawn >= SCREEN_FRAME:
+            self._live.update(self._picture(), refresh=True)
+            self._drawn = monotonic()
 
     def _picture(self) -> Panel:
         """Return the whole picture."""
