@@ -290,8 +290,11 @@ def write_png(picture: Picture) -> bytes:
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.axis("off")
     for order, (kind, run) in enumerate(groupby(picture.shapes, key=type)):
-        paint = {PictureDot: _paint_dots, PictureImage: _paint_images}.get(kind, _paint)
-        paint(axes, run, order)
+        if kind is PictureDot:
+            _paint_dots(axes, run, order)
+        else:
+            for shape in run:
+                _paint(axes, shape, order)
     left, top = picture.corner
     axes.set(xlim=(left, left + picture.width), ylim=(top + picture.height, top), aspect="auto")
     stream = io.BytesIO()
@@ -308,30 +311,22 @@ def _paint_dots(axes: Any, dots: Iterable[Any], order: int) -> None:
     axes.scatter(xs, ys, s=sizes, c=colours, linewidths=0.0, zorder=order)
 
 
-def _paint_images(axes: Any, images: Iterable[Any], order: int) -> None:
-    """Paint images; gray ones stay gray."""
-    from matplotlib.image import imread
-
-    for x, y, width, height, kind, data in images:
-        pixels = imread(io.BytesIO(data), format=kind)
-        white = 1.0 if pixels.dtype.kind == "f" else 255.0
-        ends = (x, x + width, y + height, y)
-        axes.imshow(pixels, extent=ends, interpolation="none", cmap="gray", vmin=0.0, vmax=white, zorder=order)
-
-
 def _plain(colour: str) -> str:
     return NAMED.get(colour, (colour,))[0]
 
 
-def _paint(axes: Any, shapes: Iterable[Any], order: int) -> None:
-    """Paint a run of shapes of one kind."""
-    for shape in shapes:
-        _paint_shape(axes, shape, order)
-
-
-def _paint_shape(axes: Any, shape: Any, order: int) -> None:
-    look = {"color": _plain(shape.colour), "zorder": order}
+def _paint(axes: Any, shape: Any, order: int) -> None:
+    """Paint a shape; gray images stay gray."""
+    look: dict[str, Any] = {"zorder": order}
+    if not isinstance(shape, PictureImage):
+        look["color"] = _plain(shape.colour)
     match shape:
+        case PictureImage(x, y, width, height, kind, data):
+            from matplotlib.image import imread
+
+            pixels = imread(io.BytesIO(data), format=kind)
+            white, ends = 1.0 if pixels.dtype.kind == "f" else 255.0, (x, x + width, y + height, y)
+            axes.imshow(pixels, extent=ends, interpolation="none", cmap="gray", vmin=0.0, vmax=white, **look)
         case PictureLine(points, _, width, alpha, dashes):
             xs, ys = zip(*points, strict=True)
             style = (0, [each * POINTS for each in dashes]) if dashes else "solid"
@@ -371,7 +366,7 @@ def still_picture(
     for link in flat.links:
         points = [flat.origins[name][:2] for name in link]
         shapes.append(PictureLine(points, "soft", alpha=0.7, dashes=(4.0, 3.0)))
-    for frame, stretches in flat.trails:
+    for frame, stretches in flat.trails.items():
         shapes += _trail(frame, [[flat.at(point)[:2] for point in stretch] for stretch in stretches])
     for name, pose in other.poses().items() if other else ():
         if name in flat.poses:
@@ -390,8 +385,7 @@ def still_picture(
 def _frame(flat: Projection, name: str) -> Iterator[Shape]:
     """Draw the axes of a frame, the nearest last."""
     x, y, _ = flat.origins[name]
-    tips = flat.tips(name)
-    yield from (PictureLine([(x, y), tips[axis][:2]], AXES[axis], 2.0, title=name) for axis in flat.axis_order(name))
+    yield from (PictureLine([(x, y), tip[:2]], AXES[axis], 2.0, title=name) for axis, tip in flat.axes(name))
     yield PictureDot(x, y, 2.2, "ink", name)
 
 

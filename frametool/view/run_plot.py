@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # where pens have all one colour, curves and turtles still differ: one colour a turtle, in the order of their names
 COLOURS = ("#f4d35e", "#ee964b", "#7bdff2", "#b2f7ef", "#f7a1c4", "#c3f584", "#d0bdf4", "#ffffff")
 
-SHORT = 0.02  # metres: a pixel
+SHORT = 0.05  # metres: two pixels
 
 
 class Stroke(NamedTuple):

@@ -43,13 +43,6 @@ STILL = 1e-9  # metres: a frame that stays within has no trail
 MOST_STAMPS = 4000  # of a trail; of more, every second, third, .. is taken
 
 
-class Trail(NamedTuple):
-    """The path of a frame in metres: stretches of points, cut where its parent changes or data are missing."""
-
-    frame: str
-    stretches: list[list[Point]]
-
-
 def _expression(text: str) -> re.Pattern[str]:
     """Compile a regular expression."""
     try:
@@ -181,10 +174,13 @@ class FrameScene:
         return self.chosen is None or name in self.chosen
 
     @cached_property
-    def trails(self) -> list[Trail]:
-        """Return the trail in `fixed` of each chosen frame that moves."""
-        chosen = ((name, self._stretches(name)) for name in self.tracks if self._is_chosen(name))
-        return [Trail(name, stretches) for name, stretches in chosen if stretches]
+    def trails(self) -> dict[str, list[list[Point]]]:
+        """Return the path in `fixed` of each chosen frame that moves, in metres.
+
+        It is cut into stretches where its parent changes or data are missing.
+        """
+        chosen = {name: self._stretches(name) for name in self.tracks if self._is_chosen(name)}
+        return {name: stretches for name, stretches in chosen.items() if stretches}
 
     def _stretches(self, name: str) -> list[list[Point]]:
         """Look a frame up at, and between, the stamps of all moving frames on its path."""
@@ -351,9 +347,7 @@ class Projection:
     def _points(self) -> Iterator[Point]:
         for x, y, z, *_ in self.poses.values():
             yield x, y, z
-        for trail in self.trails:
-            for stretch in trail.stretches:
-                yield from stretch
+        yield from (point for stretches in self.trails.values() for stretch in stretches for point in stretch)
 
     def _together(self) -> list[Point]:
         """Return the positions of the frames in the densest cluster; all points if no frame is far away."""
@@ -390,10 +384,9 @@ class Projection:
         """Return the frames from the farthest to the nearest."""
         return sorted(self.poses, key=lambda name: self.origins[name].depth)
 
-    def axis_order(self, name: str) -> list[int]:
-        """Return the axes 0, 1, 2 of a frame from the farthest to the nearest."""
-        tips = self.tips(name)
-        return sorted(range(3), key=lambda axis: tips[axis].depth)
+    def axes(self, name: str) -> list[tuple[int, Flat]]:
+        """Return the axes 0, 1, 2 of a frame with their tips, from the farthest to the nearest."""
+        return sorted(enumerate(self.tips(name)), key=lambda each: each[1].depth)
 
     def groups(self, near: float) -> list[tuple[Flat, list[str]]]:
         """Group the frames within some pixels of each other, nearest first."""

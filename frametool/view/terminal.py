@@ -129,15 +129,12 @@ class TerminalPicture:
         flat = self._flat
         for parent, name in flat.links:
             self._line(flat.origins[parent], flat.origins[name], "bright_black", LINK, 3)
-        for trail in flat.trails:
-            for stretch in trail.stretches:
-                places = [flat.at(point) for point in stretch]
-                for begin, end in pairwise(places):
-                    self._line(begin, end, "magenta", TRAIL, 2)
+        for stretch in (stretch for stretches in flat.trails.values() for stretch in stretches):
+            for begin, end in pairwise(map(flat.at, stretch)):
+                self._line(begin, end, "magenta", TRAIL, 2)
         for name in flat.nearest_last():
-            tips = flat.tips(name)
-            for axis in flat.axis_order(name):
-                self._line(flat.origins[name], tips[axis], AXES[axis], AXIS)
+            for axis, tip in flat.axes(name):
+                self._line(flat.origins[name], tip, AXES[axis], AXIS)
 
     def _line(self, begin: Flat, end: Flat, colour: str, rank: int, gap: int = 1) -> None:
         """Set every dot, or every second, third, .. of a line; a line that leaves the picture is cut."""

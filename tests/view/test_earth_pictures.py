@@ -36,7 +36,7 @@ def test_what_is_drawn_lies_on_the_ground_at_the_first_frame_that_stands(tree: A
     assert {*poses} == {"car", "map", "mast"}
     assert poses["map"][:3] == (0.0, 0.0, 0.0)
     assert poses["car"][:3] == pytest.approx((0.0, 11.1201, 0.0), abs=1e-4)
-    assert max(abs(part) for trail in scene.trails for piece in trail.stretches for point in piece for part in point) < 25
+    assert max(abs(part) for trail in scene.trails.values() for piece in trail for point in piece for part in point) < 25
 
 
 @pytest.mark.parametrize("name", ["ecef", "earth"])

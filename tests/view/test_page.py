@@ -159,10 +159,10 @@ def test_below_takes_what_hangs_there_at_the_time() -> None:
 
 
 def test_a_trail_breaks_where_the_parent_changes_and_nowhere_else() -> None:
-    trails = {trail.frame: trail for trail in FrameScene(frametool.load(ROOT / "examples" / "drive.yaml")).trails}
-    assert {name: len(trail.stretches) for name, trail in trails.items()} == {"base_link": 1, "box": 2}
-    assert trails["base_link"].stretches[0][-1] == pytest.approx((2.0, 2.0, 0.0))
-    assert len(trails["base_link"].stretches[0]) == 4 * 8 + 1
+    trails = FrameScene(frametool.load(ROOT / "examples" / "drive.yaml")).trails
+    assert {name: len(trail) for name, trail in trails.items()} == {"base_link": 1, "box": 2}
+    assert trails["base_link"][0][-1] == pytest.approx((2.0, 2.0, 0.0))
+    assert len(trails["base_link"][0]) == 4 * 8 + 1
 
 
 def test_a_trail_below_a_moving_parent_is_taken_at_the_parents_stamps_too() -> None:
@@ -172,6 +172,6 @@ def test_a_trail_below_a_moving_parent_is_taken_at_the_parents_stamps_too() -> N
         buffer.insert("map", "arm", Transform.of(0, 0, 0, 0, 0, math.sin(half), math.cos(half)), second * 10**9)
     for second in (0, 3):
         buffer.insert("arm", "hand", Transform.of(1.0, 0.0, 0.0, 0, 0, 0, 1), second * 10**9)
-    (trail,) = (each for each in FrameScene(buffer).trails if each.frame == "hand")
-    assert len(trail.stretches[0]) == 3 * 8 + 1
-    assert {round(math.hypot(*point), 9) for point in trail.stretches[0]} == {1.0}
+    trail = FrameScene(buffer).trails["hand"]
+    assert len(trail[0]) == 3 * 8 + 1
+    assert {round(math.hypot(*point), 9) for point in trail[0]} == {1.0}
