@@ -158,7 +158,7 @@ def check(
     others: other files are allowed; a file without any sign of frames only gets the finding that it has none
     """
     findings: list[Finding] = []
-    everything = _of_one_earth(_statements(files, findings, normalize=normalize, others=others), findings.append)
+    everything = _of_one_earth(_statements(files, findings, normalize=normalize, others=others))
     if tree is not None:
         everything, again = tee(everything)
         _stand(tree, again)
@@ -167,20 +167,14 @@ def check(
     return sorted(findings, key=lambda each: (order.get(each.source, 0), each.line, each.column))
 
 
-def _of_one_earth(everything: Iterable[Statement], find: Find) -> Iterator[Statement]:
-    """Rename the Earth's frame to the first of its names; report edges between the two."""
+def _of_one_earth(everything: Iterable[Statement]) -> Iterator[Statement]:
+    """Rename the Earth's frame to the first of its names; the identity between the two is no edge."""
     earth = ""
     for each in everything:
-        names = [name for name in each[:2] if name in EARTH_FRAMES]
-        if not names:
-            yield each
-        elif names in ([*EARTH_FRAMES], [*reversed(EARTH_FRAMES)]):
-            rule = "self" if any(each.components[:6]) else "odd"
-            find(each.finding(rule, "'earth' and 'ecef' are one frame, this is an edge between them"))
-        else:
-            earth = earth or names[0]
-            parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
-            yield each._replace(parent=parent, child=child)
+        earth = earth or next((name for name in each[:2] if name in EARTH_FRAMES), "")
+        parent, child = (earth if name in EARTH_FRAMES else name for name in each[:2])
+        if parent != child or each.parent == each.child or any(each.components[:6]):
+            yield each if (parent, child) == each[:2] else each._replace(parent=parent, child=child)
 
 
 def _stand(tree: FrameTree, everything: Iterator[Statement]) -> None:
