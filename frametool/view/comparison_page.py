@@ -13,10 +13,12 @@ import numpy as np
 from frametool import __version__
 from frametool.documents.json import dump
 from frametool.errors import printable
-from frametool.view.charts import Area, Chart, ChartLine
 from frametool.view.fit_text import write_comparison, write_table
 from frametool.view.pictures import (
     SERIES,
+    Area,
+    Chart,
+    ChartLine,
     Picture,
     PictureBox,
     PictureDot,

@@ -1,12 +1,13 @@
 """Static pictures of lines, dots, boxes, text and images, in pixels with y down, written as SVG, HTML or PNG.
 
 A colour is `#rrggbb` or a name in PALETTE, which has light and dark values.  Only PNG needs a library, matplotlib.
-Also here: the HTML shell of all pages, and the static picture of frames.
+Also here: charts, the HTML shell of all pages, the static picture of frames, and the HTML of values for notebooks.
 """
 
 from __future__ import annotations
 
 import io
+import math
 import os
 import warnings
 from base64 import b64encode
@@ -18,13 +19,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.sax.saxutils import escape
 
 from frametool.errors import FileProblem, printable
-from frametool.view.scene import SLANTED, Labels, Projection, Size, axis_tips, nice, text_width
+from frametool.frames.lookups import Frames
+from frametool.view.scene import SLANTED, FrameScene, Labels, Projection, Size, axis_tips, nice, text_width
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from frametool.geometry.types import Rigid
-    from frametool.view.scene import FrameScene, Label
+    from frametool.view.scene import Label
+
+    Range = tuple[float, float]
+    Point = tuple[float, float]
 
 # name -> light, dark
 PALETTE = {
@@ -261,6 +266,103 @@ def _number(value: float, decimals: int = 1) -> str:
     return f"{round(value, decimals) + 0.0:.{5 + decimals}g}" if abs(value) < 1e4 else f"{value:.0f}"
 
 
+LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; what is beyond is drawn at its end
+
+
+class Area(NamedTuple):
+    """The plot area of a chart in pixels, without its labels."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+
+class ChartLine(NamedTuple):
+    """A line in data coordinates; a line without a name is not in the legend."""
+
+    name: str
+    colour: str
+    points: Sequence[Point]
+    width: float = 1.5
+    dashes: tuple[float, ...] = ()
+    dots: bool = False
+
+
+class Chart:
+    """Two axes in a plot area, and the mapping from data to pixels."""
+
+    def __init__(self, area: Area, x: Range, y: Range, names: tuple[str, str], *, equal: bool = False) -> None:
+        """Choose the limits of both axes.
+
+        names: titles of the x and the y axis, with units.  equal: use one scale for both axes.
+        """
+        self.area, self.names = area, names
+        if equal:
+            pixels = min(size / max(end - begin, 1e-9) for size, (begin, end) in zip(area[2:], (x, y), strict=True))
+            x, y = (((begin + end - size / pixels) / 2.0, (begin + end + size / pixels) / 2.0)
+                    for size, (begin, end) in zip(area[2:], (x, y), strict=True))  # fmt: skip
+        limits = [(max(begin, -FURTHEST), min(end, FURTHEST)) for begin, end in (x, y)]
+        self.ticks = [ticks(*each) for each in limits]
+        self.x, self.y = ((each[0], each[-1]) for each in self.ticks)
+        if x[1] - x[0] > LEAST_SPAN:  # ends where the values do
+            self.x = limits[0]
+        if equal:
+            self.y = limits[1]
+        self.ticks = [[at for at in each if begin <= at <= end]
+                      for each, (begin, end) in zip(self.ticks, (self.x, self.y), strict=True)]  # fmt: skip
+
+    def place(self, x: float, y: float) -> Point:
+        """Return the pixels of a point; values beyond the y axis are clamped to its ends."""
+        left, top, width, height = self.area
+        inside = min(max(y, self.y[0]), self.y[1])
+        across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
+        return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
+
+    def drawn(self, lines: Sequence[ChartLine] = ()) -> Iterator[Shape]:
+        """Draw axes, lines and the legend."""
+        left, top, width, height = self.area
+        right, bottom = left + width, top + height
+        yield PictureWords(left, top - 14.0, self.names[1], "soft")
+        if self.names[0]:
+            yield PictureWords(right, bottom + 30.0, self.names[0], "soft", "end")
+        for tick in self.ticks[0]:
+            across = self.place(tick, 0.0)[0]
+            yield PictureLine([(across, top), (across, bottom)], "faint")
+            yield PictureWords(across, bottom + 13.0, f"{tick:g}", "soft", "middle", 11.0)
+        for tick in self.ticks[1]:
+            down = self.place(0.0, tick)[1]
+            yield PictureLine([(left, down), (right, down)], "faint" if tick else "zero")
+            yield PictureWords(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0)
+        for line in lines:
+            points = [self.place(*point) for point in line.points]
+            if points:
+                yield PictureLine(points, line.colour, line.width, dashes=line.dashes, title=line.name)
+            yield from (PictureDot(x, y, 3.0, line.colour) for x, y in points if line.dots)
+        yield from legend(lines, left + text_width(self.names[1]), right, top - 14.0)
+
+
+def legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:
+    """Draw a right-aligned legend on one line, each name after its line; of a long one only dashed lines."""
+    named = [line for line in lines if line.name]
+    if sum(text_width(line.name) + 33.0 for line in named) > right - left:
+        named = [line for line in named if line.dashes]
+    for line in reversed(named):
+        yield PictureWords(right, y, line.name, "ink", "end", 11.0)
+        right -= text_width(line.name) + 5.0
+        yield PictureLine([(right - 16.0, y), (right, y)], line.colour, max(line.width, 2.0), dashes=line.dashes)
+        right -= 28.0
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Return 2 to 10 round numbers that enclose two values, spaced 1, 2 or 5 times a power of ten."""
+    span = high - low if high - low > LEAST_SPAN else 1.0
+    step = 10.0 ** math.floor(math.log10(span / 4.0))
+    step *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if span / (step * factor) <= 6.0)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [count * step for count in range(first, max(last, first + 1) + 1)]
+
+
 POINTS = 72 / 100  # of a pixel at 100 dots an inch
 ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
@@ -434,3 +536,29 @@ def _scale(flat: Projection, step: float) -> Iterator[Shape]:
     yield PictureLine([(left, base - 6.0), (left, base), (right, base), (right, base - 6.0)], "soft")
     yield PictureWords((left + right) / 2.0, base - 10.0, f"{metres:g} m", "soft", "middle", 11.0)
     yield PictureWords(right, HEIGHT - 46.0, f"in {flat.scene.fixed[:40]}, grid {step:g} m", "soft", "end", 11.0)
+
+
+def html_of(value: Any) -> str | None:
+    """Return the HTML of a transform, rotation, tree, trajectory or comparison; None if its repr is all there is."""
+    if isinstance(value, Frames) and value.frames:
+        # a picture of its own, for the style of an SVG element would count in the whole notebook
+        svg = b64encode(write_svg(still_picture(FrameScene(value), title=value.name)).encode()).decode()
+        return f'<img alt="frames of {escape(value.name)}" src="data:image/svg+xml;base64,{svg}">'
+    if hasattr(value, "as_dict"):
+        from frametool.view.fit_text import write_comparison
+
+        return f"<pre>{escape(write_comparison(value.as_dict()))}</pre>"
+    if hasattr(value, "stamps_ns"):
+        from frametool.frames.trajectory import way
+
+        path = f"{way(value.xyz)[-1]:.3f} m of path" if value.size else "empty"
+        return f"<pre>{value.size} poses of {escape(value.body)} in {escape(value.world)}, {path}</pre>"
+    if isinstance(value, Frames) or value.shape:
+        return None
+    from frametool.grammar.pose import Pose
+    from frametool.grammar.result import Result, Style
+    from frametool.view.pose_text import write_poses
+
+    parts = value.components
+    pose = Pose.of(parts) if len(parts) > len("xyzw") else Pose(rotation=parts)
+    return f"<pre>{escape(write_poses([Result(pose)], Style('text')))}</pre>"

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.frames.stamps import BILLION
 from frametool.sim.turtle import SIZE
-from frametool.view.charts import Area, Chart, ChartLine
-from frametool.view.pictures import Picture, PictureBox, PictureDot, PictureLine, PictureWords
+from frametool.view.pictures import Area, Chart, ChartLine, Picture, PictureBox, PictureDot, PictureLine, PictureWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

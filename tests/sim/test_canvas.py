@@ -9,8 +9,7 @@ from rich.console import Console
 
 from frametool.sim.scene import tutorial
 from frametool.sim.simulate import simulate
-from frametool.view.charts import ticks
-from frametool.view.pictures import write_svg
+from frametool.view.pictures import ticks, write_svg
 from frametool.view.run_plot import Drawing, run_picture
 from frametool.view.terminal import Canvas, Screen
 

@@ -17,7 +17,7 @@ from frametool.sim.scene_file import read_scene
 from frametool.sim.simulate import simulate
 from frametool.sim.step_writer import FORMS, StepWriter
 from frametool.sim.turtle import FASTEST_TURN, Turtle, Twist, World
-from frametool.view.charts import ticks
+from frametool.view.pictures import ticks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
