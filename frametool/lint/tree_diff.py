@@ -66,23 +66,19 @@ def parse_tolerance(text: str, otherwise: Tolerance = Tolerance()) -> Tolerance:
     otherwise: defaults for a missing one
     Raises ValueInvalid.
     """
-    parts: dict[str, str] = {}
-    cells = [cell.strip() for cell in text.split(",")]
-    for index, cell in enumerate(cells):
-        is_angle = re.search("deg|rad|°|pi|π", cell) or (index == 1 and not cell.endswith("m"))
-        parts["radians" if is_angle else "metres"] = cell
+    parts: dict[str, float] = {}
     try:
-        if len(parts) != len(cells):
-            raise ValueInvalid(f"{shown(text)} is not one length and one angle")
-        found = otherwise._replace(**{
-            name: parse_length(cell) if name == "metres" else read_number_or_angle(cell, degrees=False)
-            for name, cell in parts.items()
-        })  # fmt: skip
-        if negative := [cell for name, cell in parts.items() if getattr(found, name) < 0.0]:
-            raise ValueInvalid(f"{shown(negative[0])} is less than 0")
+        for index, cell in enumerate(map(str.strip, text.split(","))):
+            is_angle = re.search("deg|rad|°|pi|π", cell) or (index == 1 and not cell.endswith("m"))
+            name = "radians" if is_angle else "metres"
+            if name in parts:
+                raise ValueInvalid(f"{shown(text)} is not one length and one angle")
+            parts[name] = read_number_or_angle(cell, degrees=False) if is_angle else parse_length(cell)
+            if parts[name] < 0.0:
+                raise ValueInvalid(f"{shown(cell)} is less than 0")
     except ValueInvalid as error:
         raise ValueInvalid(f"{error}; write a length, an angle or both: 1mm,0.1deg") from None
-    return found
+    return otherwise._replace(**parts)
 
 
 class Apart(NamedTuple):

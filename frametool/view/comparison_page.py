@@ -71,8 +71,9 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
     unit = "pair" if found[0].pairs.ref.stamps_ns is None else "s"
     map_chart, seen = _map(curves)
     charts = _over_time(curves, "pair" if unit == "pair" else "time (s)")
+    errors = _figure(charts[-1].area.top + HIGH - TOP, [shape for chart in charts for shape in chart.drawn()])
     figures = [{"distribution": _distribution(curves)}, _by_length(curves, numbers)][:: 1 if len(curves) == 1 else -1]
-    columns = ({"path": _path(curves, map_chart, seen), **figures[0]}, {"errors": _stacked(charts), **figures[1]})
+    columns = ({"path": _path(curves, map_chart, seen), **figures[0]}, {"errors": errors, **figures[1]})
     what = curves[0].name if len(curves) == 1 else f"{len(curves)} estimates"
     title = f"{what} against {printable(found[0].names[0])}"
     if fmt == "svg":
@@ -87,7 +88,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
         command=escape(printable(command)), hints="".join(f"<p class=hint>{escape(hint)}</p>" for hint in hints),
         text=escape(_text(numbers)), figures=drawn,
     )  # fmt: skip
-    samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0][0]) for each in curves]}
+    samples = {"unit": unit, "curves": [_samples(each, map_chart, seen, charts[0]) for each in curves]}
     held = {"numbers": f"[{', '.join(map(dump, numbers))}]", "samples": json.dumps(samples)}
     return write_html(title, body, script="tables.js report.js", data=held)
 
@@ -133,7 +134,7 @@ def _map(curves: Sequence[Curve]) -> tuple[Chart, Any]:
     names = [f"{'xyz'[axis]}{f' - {at:.0f}' if at else ''} (m)" for axis, at in zip(axes, base, strict=True)]
     tall = WIDE * min(max((high[1] - low[1]) / max(high[0] - low[0], 1e-9), 0.5), 1.0)
     ends = [(begin - 0.03 * span, end + 0.03 * span) for begin, end in zip(low.tolist(), high.tolist(), strict=True)]
-    chart = Chart(Area(LEFT, TOP, WIDE, float(tall)), ends[0], ends[1], (names[0], names[1]), equal=True)
+    chart = Chart(Area(LEFT, TOP, WIDE, float(tall)), (names[0], names[1]), ends=(ends[0], ends[1]), equal=True)
     return chart, lambda xyz: (xyz[:, axes] - base).tolist()
 
 
@@ -147,8 +148,9 @@ def _path(curves: Sequence[Curve], chart: Chart, seen: Any) -> Picture:
         shapes = _coloured(first, [chart.place(*point) for point in seen(first.found.moved.xyz[first.chosen])], chart)
     else:
         lines += [ChartLine(each.name, each.colour, seen(each.found.moved.xyz[each.chosen])) for each in curves]
+    chart.lines = lines
     start = PictureDot(*chart.place(*seen(first.found.moved.xyz[:1])[0]), 4.0, "ink", "start")
-    return _figure(chart.area.height, [*chart.drawn(lines), *shapes, start])
+    return _figure(chart.area.height, [*chart.drawn(), *shapes, start])
 
 
 def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart) -> list[Shape]:
@@ -168,7 +170,7 @@ def _coloured(curve: Curve, placed: Sequence[tuple[float, float]], chart: Chart)
     return shapes + [PictureBox(LEFT + at * 7.0, low, 7.5, 9.0, shade) for at, shade in enumerate(shades)]
 
 
-def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[ChartLine]]]:
+def _over_time(curves: Sequence[Curve], along: str) -> list[Chart]:
     """Return the charts over time: errors in position, in rotation, and for one estimate along and across its path."""
     end, ate, one = max(each.times[-1] for each in curves), curves[0].found.ate, len(curves) == 1
     kinds = {"error in position (m)": [(each.name * (not one), each.colour, each.found.ate.m, each) for each in curves]}
@@ -183,16 +185,9 @@ def _over_time(curves: Sequence[Curve], along: str) -> list[tuple[Chart, list[Ch
         if one and at == 0:
             rmse = float(np.sqrt((ate.m**2).mean()))
             lines.append(ChartLine(f"rmse {rmse:.3g} m", "soft", [(0.0, rmse), (end, rmse)], 1.0, (4.0, 3.0)))
-        low, high = min(0.0, *(each[2].min() for each in drawn)), max(each[2].max() for each in drawn)
         area = Area(LEFT, TOP + at * (HIGH + TOP + BOTTOM - 14.0), WIDE, HIGH)
-        ends = (float(low), float(high))
-        charts.append((Chart(area, (0.0, end), ends, (along * (at == len(kinds) - 1), name)), lines))
+        charts.append(Chart(area, (along * (at == len(kinds) - 1), name), lines))
     return charts
-
-
-def _stacked(charts: Sequence[tuple[Chart, list[ChartLine]]]) -> Picture:
-    last = charts[-1][0].area
-    return _figure(last.top + HIGH - TOP, [shape for chart, lines in charts for shape in chart.drawn(lines)])
 
 
 def _distribution(curves: Sequence[Curve]) -> Picture:
@@ -202,11 +197,10 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
     if len(curves) == 1:
         counts, edges = np.histogram(errors[0], BINS, ends)
         steps = [*zip(np.repeat(edges, 2)[1:-1].tolist(), np.repeat(counts, 2).tolist(), strict=True)]
-        names = ("error in position (m)", "poses")
-        chart = Chart(Area(LEFT, TOP, WIDE, HIGH), ends, (0.0, float(counts.max())), names)
-        return _figure(HIGH, [*chart.drawn([ChartLine("", curves[0].colour, steps)])])
+        lines = [ChartLine("", curves[0].colour, steps)]
+        return _figure(HIGH, [*Chart(Area(LEFT, TOP, WIDE, HIGH), ("error in position (m)", "poses"), lines).drawn()])
     names = ("error in position (m)", "boxes: half of the poses; lines: 5 to 95 %; dots: median, maximum")
-    chart = Chart(Area(LEFT, TOP, WIDE, ROW * len(curves)), ends, (0.0, 1.0), names)
+    chart = Chart(Area(LEFT, TOP, WIDE, ROW * len(curves)), names, ends=(ends, (0.0, 1.0)))
     chart.ticks[1] = []
     shapes = [*chart.drawn()]
     for at, (each, values) in enumerate(zip(curves, errors, strict=True)):
@@ -232,9 +226,8 @@ def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> di
     lines = [line for line in lines if len(line.points) >= LEAST_LENGTHS]
     if not lines:
         return {}
-    far, most = (max(point[axis] for line in lines for point in line.points) for axis in (0, 1))
-    chart = Chart(Area(LEFT, TOP, WIDE, HIGH), (0.0, far), (0.0, most), ("length (m)", "relative error (%)"))
-    return {"lengths": _figure(HIGH, [*chart.drawn(lines)])}
+    chart = Chart(Area(LEFT, TOP, WIDE, HIGH), ("length (m)", "relative error (%)"), lines)
+    return {"lengths": _figure(HIGH, [*chart.drawn()])}
 
 
 def _samples(curve: Curve, map_chart: Chart, seen: Any, time_chart: Chart) -> dict[str, Any]:

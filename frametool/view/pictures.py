@@ -292,12 +292,18 @@ class ChartLine(NamedTuple):
 class Chart:
     """Two axes in a plot area, and the mapping from data to pixels."""
 
-    def __init__(self, area: Area, x: Range, y: Range, names: tuple[str, str], *, equal: bool = False) -> None:
+    def __init__(
+        self, area: Area, names: tuple[str, str], lines: Sequence[ChartLine] = (), *,
+        ends: tuple[Range, Range] | None = None, equal: bool = False,
+    ) -> None:  # fmt: skip
         """Choose the limits of both axes.
 
-        names: titles of the x and the y axis, with units.  equal: use one scale for both axes.
+        names: titles of the x and the y axis, with units.  ends: least and greatest x and y; by default 0 and those of
+        the lines.  equal: use one scale for both axes.
         """
-        self.area, self.names = area, names
+        self.area, self.names, self.lines = area, names, lines
+        columns = [(0.0, *column) for column in zip(*(point for line in lines for point in line.points), strict=True)]
+        x, y = ends or [(min(column), max(column)) for column in columns] or [(0.0, 0.0)] * 2
         if equal:
             pixels = min(size / max(end - begin, 1e-9) for size, (begin, end) in zip(area[2:], (x, y), strict=True))
             x, y = (((begin + end - size / pixels) / 2.0, (begin + end + size / pixels) / 2.0)
@@ -319,7 +325,7 @@ class Chart:
         across = left + width * (x - self.x[0]) / (self.x[1] - self.x[0])
         return across, top + height * (self.y[1] - inside) / (self.y[1] - self.y[0])
 
-    def drawn(self, lines: Sequence[ChartLine] = ()) -> Iterator[Shape]:
+    def drawn(self) -> Iterator[Shape]:
         """Draw axes, lines and the legend."""
         left, top, width, height = self.area
         right, bottom = left + width, top + height
@@ -334,12 +340,12 @@ class Chart:
             down = self.place(0.0, tick)[1]
             yield PictureLine([(left, down), (right, down)], "faint" if tick else "zero")
             yield PictureWords(left - 7.0, down, f"{tick:g}", "soft", "end", 11.0)
-        for line in lines:
+        for line in self.lines:
             points = [self.place(*point) for point in line.points]
             if points:
                 yield PictureLine(points, line.colour, line.width, dashes=line.dashes, title=line.name)
             yield from (PictureDot(x, y, 3.0, line.colour) for x, y in points if line.dots)
-        yield from legend(lines, left + text_width(self.names[1]), right, top - 14.0)
+        yield from legend(self.lines, left + text_width(self.names[1]), right, top - 14.0)
 
 
 def legend(lines: Sequence[ChartLine], left: float, right: float, y: float) -> Iterator[Shape]:

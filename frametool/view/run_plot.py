@@ -115,15 +115,13 @@ def run_picture(drawing: Drawing) -> Picture:
     followed = {name: curve for name, curve in drawing.curves.items() if curve.times}
     shapes = list(_window(drawing))
     colours = drawing.colours()
-    end = max((each.times[-1] for each in followed.values()), default=0.0)
     height = (WINDOW - 2.0 * PANEL_GAP) / 3.0
     for index, title in enumerate(PANELS if followed else ()):
         curves = [ChartLine(name, DARKENED[colours[name]], [*zip(each.times, each[index + 1], strict=True)])
                   for name, each in followed.items()]  # fmt: skip
-        known = [0.0, *(value for curve in curves for _, value in curve.points)]
         area = Area(LEFT, MARGIN + index * (height + PANEL_GAP), PANEL_WIDTH, height)
         names = ("time (s)" * (title == PANELS[-1]), title)
-        shapes += Chart(area, (0.0, end), (min(known), max(known)), names).drawn(curves)
+        shapes += Chart(area, names, curves).drawn()
     return Picture(LEFT + PANEL_WIDTH + MARGIN if followed else HEIGHT, HEIGHT, shapes, "turtles")
 
 
