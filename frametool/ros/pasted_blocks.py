@@ -16,6 +16,7 @@ its angles and its matrix are the same with as few digits.
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.json import dump, looks_like_json, parse_json
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 MOST_PASTED = 1 << 16  # characters
 _LIST = rf"\[\s*({NUMBER}(?:\s*,\s*{NUMBER})*)\s*\]"
-_TRANSLATION = re.compile(r"(?m)^[ \t]*+(?:-\s+)?Translation:")  # a selection may begin after the dash
-_TIME = re.compile(rf"(?m)^[ \t]*+At time ({NUMBER})")
+_TRANSLATION = re.compile(r"(?m)^(?=[ \t]*+(?:-\s+)?Translation:)")  # a selection may begin after the dash
+_TIME = re.compile(r"(?m)^[ \t]*+At time (\d{1,10}(?:\.\d{1,9})?)(?![\d.])")
 _HEADING = re.compile(r"(?m)^(\S+) seen from (\S+)\s+\(maps points")  # frametool's own block
 _ROTATIONS = (
     ("xyzw", re.compile(r"in Quaternion(?: \(xyzw\))?")),
@@ -117,28 +118,24 @@ def _size(value: Any) -> tuple[int, int]:
 
 def _blocks(text: str) -> list[Any]:
     """Read all blocks printed by tf2_echo; a block may lack its position or its time."""
-    begins = [match.start() for match in _TRANSLATION.finditer(text)]
-    if not begins:
+    parts = _TRANSLATION.split(text)
+    if len(parts) == 1:
         return [value] if (value := _block(text)) else []
-    ends = [*begins[1:], len(text)]
     names = _HEADING.search(text)
-    values, before = [], 0
-    for begin, end in zip(begins, ends, strict=True):
-        value = _block(text[begin:end])
-        times = _TIME.findall(text[before:begin])
-        before = begin
-        stamp = _stamp(times[-1]) if times else None
-        known = {"name": names[1], "parent": names[2]} if names else {}
-        values.append({**known, **({} if not stamp else {"stamp_ns": Verbatim(stamp)}), **value})
+    known = {"name": names[1], "parent": names[2]} if names else {}
+    values = []
+    for before, part in pairwise(parts):
+        times = _TIME.findall(before)
+        stamp = parse_stamp(times[-1]) if times else 0  # 0 is that of a static one
+        values.append({**known, **({"stamp_ns": Verbatim(stamp)} if stamp else {}), **_block(part)})
     return values
 
 
 def _block(text: str) -> dict[str, Any]:
     """Read position and rotation of one block; of several notations the first."""
     turned = next(((key, found) for key, heading in _ROTATIONS if (found := heading.search(text))), None)
-    moved = _TRANSLATION.search(text)
     value: dict[str, Any] = {}
-    for key, heading in (("xyz", moved), *((turned,) if turned else ())):
+    for key, heading in filter(None, (("xyz", re.search(r"(?:-\s+)?Translation:", text)), turned)):
         if heading:
             numbers = re.compile(rf"\s*{_LIST}").match(text, heading.end())
             if not numbers:
@@ -146,14 +143,6 @@ def _block(text: str) -> dict[str, Any]:
                 raise ValueInvalid(f"expected a list of numbers, found {shown(line)}")
             value[key] = numbers[1].replace(",", " ").split()
     return value
-
-
-def _stamp(seconds: str) -> int | None:
-    """Return the time of a block; 0 is that of a static one, and one with too many digits is omitted."""
-    try:
-        return parse_stamp(seconds)
-    except ValueInvalid:
-        return None
 
 
 def _gazebo(text: str) -> list[Any]:
