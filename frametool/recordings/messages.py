@@ -102,11 +102,8 @@ def _cloud(message: Any, number: int, topic: str, tally: Diagnostics) -> PointCl
 
 def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
     """Return the columns of a point, and its type: each value of a field is a column."""
-    order = ">" if message.is_bigendian else "<"
-    step = int(message.point_step)
-    names: list[str] = []
-    formats: list[str] = []
-    offsets: list[int] = []
+    order, step = ">" if message.is_bigendian else "<", int(message.point_step)
+    columns: dict[str, tuple[str, int]] = {}
     for field in message.fields:
         code = DATATYPES.get(int(field.datatype))
         if code is None:
@@ -115,25 +112,23 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
         end = offset + count * size
         if end > step:
             raise ValueInvalid(f"field {shown(field.name)} ends at byte {end}, a point has {step} (point_step)")
-        if len(names) + count > _MOST_VALUES:
+        if len(columns) + count > _MOST_VALUES:
             raise ValueInvalid(f"a point has more than {_MOST_VALUES} values")
-        names += [field.name] if count == 1 else [f"{field.name}_{place}" for place in range(count)]
-        formats += [order + code] * count
-        offsets += range(offset, end, size)
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ValueInvalid(f"field {shown(twice[0])} appears twice")
-    if missing := [name for name in "xyz" if name not in names]:
-        raise ValueInvalid(f"no field {', '.join(missing)}; fields: {listing(names) or 'none'}")
-    places = [f"{place}" for place in range(len(names))]
-    return tuple(names), np.dtype({"names": places, "formats": formats, "offsets": offsets, "itemsize": step})
+        names = [field.name] if count == 1 else [f"{field.name}_{place}" for place in range(count)]
+        if twice := columns.keys() & {*names}:
+            raise ValueInvalid(f"field {shown(min(twice))} appears twice")
+        columns |= {name: (order + code, at) for name, at in zip(names, range(offset, end, size), strict=True)}
+    if missing := [name for name in "xyz" if name not in columns]:
+        raise ValueInvalid(f"no field {', '.join(missing)}; fields: {listing(columns) or 'none'}")
+    formats, offsets = zip(*columns.values(), strict=True)
+    places = [f"{place}" for place in range(len(columns))]
+    return tuple(columns), np.dtype({"names": places, "formats": formats, "offsets": offsets, "itemsize": step})
 
 
 def _rows(message: Any, kind: np.dtype[Any], width: int, height: int) -> NDArray[Any]:
     """Return the points; the rows of a grid may be padded."""
     data = np.asarray(message.data, np.uint8)
-    step, row = kind.itemsize, int(message.row_step)
-    if height == 1 or not row:
-        row = max(row, width * step) if height == 1 else width * step
+    step, row = kind.itemsize, int(message.row_step) or width * kind.itemsize
     if height > 1 and row < width * step:
         raise ValueInvalid(f"a row of {width} points of {step} bytes has {row} bytes (row_step)")
     needed = (height - 1) * row + width * step if width and height else 0
@@ -141,7 +136,7 @@ def _rows(message: Any, kind: np.dtype[Any], width: int, height: int) -> NDArray
         raise ValueInvalid(f"{width} x {height} points need {needed} bytes, the message has {len(data)}")
     if not needed:
         return np.empty(0, kind)
-    grid: NDArray[Any] = np.ndarray((height, width), kind, data, 0, (row, step))
+    grid: NDArray[Any] = np.ndarray((height, width), kind, data, 0, (max(row, width * step), step))
     return grid.reshape(-1)
 
 

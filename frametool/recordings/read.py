@@ -103,12 +103,8 @@ class McapFile:
         if summary and said and said.channel_count == len(summary.channels):
             self._register(*summary.schemas.values(), *summary.channels.values())
         else:
-            for _ in self._found(None):
+            for _ in self.found(set()):
                 pass
-
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
-        """Yield the messages on some channels, or on all."""
-        return _in_order(self._found(wanted))
 
     def others(self) -> Iterator[Any]:
         """Yield its attachments and metadata, as records of mcap."""
@@ -124,40 +120,38 @@ class McapFile:
         self.stream.seek(0)
         yield from StreamReader(self.stream, emit_chunks=True).records
 
-    def _records(self, wanted: Collection[Channel] | None) -> Iterator[Any]:
+    def _records(self, numbers: set[int]) -> Iterator[Any]:
         """Yield the records with messages of some channels: chunk by chunk, or else all records."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Chunk
 
         if not self._chunks:
             yield from self._all()
-        numbers = {number for number, each in self.channels.items() if wanted is None or each in wanted}
         for each in sorted(self._chunks, key=lambda each: each.message_start_time):
             if not numbers.isdisjoint(each.message_index_offsets) or not each.message_index_offsets:
                 self.stream.seek(each.chunk_start_offset + RECORD_HEAD)
                 yield Chunk.read(ReadDataStream(self.stream))
 
-    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
+    def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
         """Yield the messages of each chunk, and those outside of chunks, many together; register what else is there."""
         from mcap import records
 
         found: list[Recorded] = []
-        for each in self._records(wanted):
+        for each in self._records(numbers):
             if isinstance(each, records.Chunk):
-                self._take(_unpacked_chunk(each), wanted, found)
+                self._take(_unpacked_chunk(each), numbers, found)
             elif isinstance(each, records.Message):
                 channel = self.channels[each.channel_id]
-                if wanted is None or channel in wanted:
+                if each.channel_id in numbers:
                     found.append(Recorded(channel, each.log_time, each.data, each.publish_time, each.sequence))
             elif isinstance(each, records.Schema | records.Channel):
                 self._register(each)
-            if found and (isinstance(each, records.Chunk) or len(found) > BLOCK):
+            if isinstance(each, records.Chunk) or len(found) > BLOCK:
                 yield found
                 found = []
-        if found:
-            yield found
+        yield found
 
-    def _take(self, data: bytes, wanted: Collection[Channel] | None, found: list[Recorded]) -> None:
+    def _take(self, data: bytes, numbers: set[int], found: list[Recorded]) -> None:
         """Add the messages on some channels that are in a chunk; register what else is there."""
         from mcap import records
         from mcap.data_stream import ReadDataStream
@@ -172,7 +166,7 @@ class McapFile:
             if code == message:
                 number, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, begin)
                 channel = self.channels[number]
-                if wanted is None or channel in wanted:
+                if number in numbers:
                     found.append(Recorded(channel, log_ns, data[begin + MESSAGE.size : end], publish_ns, sequence))
             elif code in (Opcode.SCHEMA, Opcode.CHANNEL):
                 kind = records.Schema if code == Opcode.SCHEMA else records.Channel
@@ -239,20 +233,18 @@ class DatabaseFile:
         has = "SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'"
         listed = rows.execute("SELECT * FROM message_definitions").fetchall() if rows.execute(has).fetchone() else []
         defined = {each["topic_type"]: (each["encoding"], each["encoded_message_definition"]) for each in listed}
-        topics = map(dict, rows.execute("SELECT * FROM topics ORDER BY id").fetchall())
-        self.channels = {each["id"]: self._channel(each, defined.get(each["type"])) for each in topics}
+        self.channels = {}
+        for topic in map(dict, rows.execute("SELECT * FROM topics ORDER BY id").fetchall()):
+            kind, digest = topic["type"], topic.get("type_description_hash") or ""
+            said = {QOS: topic.get(QOS) or ""} | ({HASH: digest} if digest else {})
+            schema = (kind, defined[kind][0], defined[kind][1].encode()) if kind in defined else None
+            made = Channel(topic["name"], kind, topic["serialization_format"], schema, said, digest)
+            self.channels[topic["id"]] = made
 
-    @staticmethod
-    def _channel(topic: dict[str, Any], defined: tuple[str, str] | None) -> Channel:
-        kind, digest = topic["type"], topic.get("type_description_hash") or ""
-        said = {QOS: topic.get(QOS) or ""} | ({HASH: digest} if digest else {})
-        schema = (kind, defined[0], defined[1].encode()) if defined else None
-        return Channel(topic["name"], kind, topic["serialization_format"], schema, said, digest)
-
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
-        """Yield the messages on some channels, or on all."""
-        numbers = ",".join(str(number) for number, each in self.channels.items() if wanted is None or each in wanted)
-        some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY timestamp, id"  # noqa: S608 - numbers
+    def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
+        """Yield the messages on some channels."""
+        some = ",".join(map(str, numbers))
+        some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({some}) ORDER BY timestamp, id"  # noqa: S608 - numbers
         rows = self.database.execute(some)
         while block := rows.fetchmany(BLOCK):
             yield [Recorded(self.channels[number], log_ns, data, log_ns) for number, log_ns, data in block]
@@ -272,26 +264,19 @@ class Bag1File:
                 """Leave it unread."""
 
         self.reader: Any = opened.enter_context(Unindexed(path))
-        self.channels = {each.id: self._channel(each) for each in self.reader.connections}
+        self.channels = {}
+        for each in self.reader.connections:
+            known = {name: getattr(each.ext, name) for name in ("callerid", "latching")}
+            about = {name: str(said) for name, said in known.items() if said is not None}
+            schema = each.msgtype, "ros1msg", each.msgdef.data.encode()
+            self.channels[each.id] = Channel(each.topic, each.msgtype, "ros1", schema, about, each.digest)
         self.stated = sum((Counter(each.connection_counts) for each in self.reader.chunk_infos), Counter[int]())
         used = {id(each.decompressor) for each in self.reader.chunks.values()}
         names = [name for name, each in decompressors.items() if id(each) in used]
         self.compression = names[0].removeprefix("none") if names else ""
 
-    @staticmethod
-    def _channel(connection: Any) -> Channel:
-        said = {"callerid": connection.ext.callerid, "latching": connection.ext.latching}
-        said = {name: str(each) for name, each in said.items() if each is not None}
-        schema = connection.msgtype, "ros1msg", connection.msgdef.data.encode()
-        return Channel(connection.topic, connection.msgtype, "ros1", schema, said, connection.digest)
-
-    def messages(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
-        """Yield the messages on some channels, or on all."""
-        return _in_order(filter(None, self._found(wanted)))
-
-    def _found(self, wanted: Collection[Channel] | None) -> Iterator[list[Recorded]]:
-        """Yield the messages of each chunk."""
-        numbers = {number for number, each in self.channels.items() if wanted is None or each in wanted}
+    def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
+        """Yield the messages of each chunk on some channels."""
         for each in sorted(self.reader.chunk_infos, key=attrgetter("start_time")):
             if not numbers.isdisjoint(each.connection_counts):
                 about = self.reader.chunks[each.pos]
@@ -321,7 +306,7 @@ class RecordingReader:
     """An open recording.
 
     channels: equal ones of several files are merged; foreign: those whose messages are not ROS's
-    metadata: of a folder, every value as text; head: profile and library of MCAP
+    metadata: of a folder, every value as text
     """
 
     def __init__(self, path: str, opened: ExitStack, tally: Diagnostics) -> None:
@@ -339,7 +324,9 @@ class RecordingReader:
         known: dict[tuple[Any, ...], Channel] = {}
         for each in self.files:
             each.channels |= {number: known.setdefault(one.key, one) for number, one in each.channels.items()}
-        hashes = {(each["name"], each["type"]): each.get("type_description_hash", "") for each in self._topics()}
+        topics = self.metadata.get("topics_with_message_count") or ()
+        self._topics = [{**each["topic_metadata"], "count": each["message_count"]} for each in topics]
+        hashes = {(each["name"], each["type"]): each.get("type_description_hash", "") for each in self._topics}
         for channel in known.values():
             channel.digest = channel.digest or hashes.get((channel.topic, channel.type)) or ""
         encoding = "ros1" if self.is_ros1 else CDR
@@ -352,10 +339,6 @@ class RecordingReader:
         storage = self.metadata.get("storage_identifier") or file.suffix.removeprefix(".")
         return Bag1File if self.is_ros1 else DatabaseFile if storage in ("sqlite3", "db3") else McapFile
 
-    def _topics(self) -> Iterator[dict[str, Any]]:
-        for each in self.metadata.get("topics_with_message_count") or ():
-            yield {**each["topic_metadata"], "count": each["message_count"]}
-
     def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Recorded]:
         """Yield the messages on some channels, or on all; raises FormatError if any are missing."""
         return chain.from_iterable(self.blocks(wanted))
@@ -364,12 +347,11 @@ class RecordingReader:
         """Yield them in lists of any length."""
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
-            count = 0
-            for block in file.messages(wanted):
+            count, numbers = 0, {number for number, each in file.channels.items() if wanted is None or each in wanted}
+            for block in _in_order(filter(None, file.found(numbers))):
                 yield map(_unpacked, block) if self._is_packed else block
                 count += len(block)
             if file.stated is not None:
-                numbers = [number for number, each in file.channels.items() if wanted is None or each in wanted]
                 self._check(count, sum(file.stated.get(number, 0) for number in numbers), wanted)
             total += count
         self._check(total, self._expected(wanted), wanted)
@@ -380,7 +362,7 @@ class RecordingReader:
             said = self.metadata.get("message_count")
             return None if said is None else int(said)
         named = {(each.topic, each.type) for each in wanted}
-        counts = [int(each["count"]) for each in self._topics() if (each["name"], each["type"]) in named]
+        counts = [int(each["count"]) for each in self._topics if (each["name"], each["type"]) in named]
         return sum(counts) if counts else None
 
     def _check(self, count: int, expected: int | None, wanted: Collection[Channel] | None) -> None:
