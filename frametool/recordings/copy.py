@@ -1,13 +1,11 @@
-"""Copy a recording with changes: messages are bytes, and everything else is preserved.
+"""What changes in the copy of a recording: edges that are added or replaced, and messages in another frame.
 
-The recording is read twice: first to analyse and check it, then to write the copy.  No messages are kept in memory.
-Edges of a tree can be added, and messages of poses and points be transformed to another frame, each at its stamp,
-including covariances; the twist of an Odometry is in its child's frame and is unchanged.
+Poses and points are transformed at their stamps, including covariances; the twist of an Odometry is in its child's
+frame and is unchanged.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,23 +18,17 @@ from frametool.frames.topology import resolve_name, static_and_moving, to_root, 
 from frametool.geometry import floats, quaternion, rigid, uncertainty
 from frametool.grammar.edges import Diagnostics, Names, Topics
 from frametool.recordings.alike import POSE_ARRAY, posed_messages
-from frametool.recordings.made import KINDS, serialised, typestore
 from frametool.recordings.messages import checked_components, numbers_of
-from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
-from frametool.recordings.write import RecordingFile, new_channel
 from frametool.ros.messages import PATH, STAMPS, stamp_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.geometry.types import Rigid
     from frametool.recordings.made import MessageTypes
     from frametool.recordings.messages import RawTransform
-    from frametool.recordings.read import Channel, RecordingReader
-
-    Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
-    Change = Callable[[bytes], bytes | None]  # of a message; None drops it
+    from frametool.recordings.read import Channel
 
 SAME = 1e-12  # metres, for positions of about a metre, and radians: the rounding of composing and writing numbers
 STATIC = "tf_static"
@@ -269,114 +261,3 @@ class MessageMover:
             if any(entries) and entries[0] != uncertainty.UNKNOWN:
                 uncertainty.taken(entries)
                 part.pose.covariance = np.array(uncertainty.rotate_covariance(entries, *mover[3:])) + 0.0
-
-
-TF_STATIC = KINDS["tf_static"]
-STEP = 1 << 10  # messages between two reports
-
-
-class RecordCopy:
-    """The contents of a recording, and the changes of its copy.
-
-    window: the first and the last log time that is copied; static data are always copied
-    change: returns the new messages of a channel; added: the edges that come first, by topic
-    counts: of messages by channel; span: the first and the last log time
-    inside: how many are in the window; outside: how many outside of it are copied; first_ns: the first time of these
-    undefined: types that the recording does not define, and whether ROS 2 Humble does
-    """
-
-    def __init__(self, reader: RecordingReader, window: tuple[int, int] | None = None) -> None:
-        """Store what to copy; nothing is read yet."""
-        self.reader, self.window = reader, window
-        self.change: dict[Channel, Change] = {}
-        self.added: dict[str, list[AddedEdge]] = {}
-        self.counts: Counter[Channel] = Counter()
-        self.span: tuple[int, int] | None = None
-        self.inside = self.outside = 0
-        self.first_ns: int | None = None
-        self.undefined: dict[str, bool] = {}
-
-    def read_all(self, advance: Advance) -> None:
-        """Read everything and pass every message to `see`; raises FormatError if the recording is not complete."""
-        for channel, log_ns, data, *_ in self._messages(advance):
-            self.counts[channel] += 1
-            first, last = self.span or (log_ns, log_ns)
-            self.span = min(first, log_ns), max(last, log_ns)
-            is_inside = self._is_inside(log_ns)
-            if is_inside or channel.is_static:
-                self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
-                self.outside += not is_inside
-            self.inside += is_inside
-            self.see(channel, data)
-
-    def see(self, channel: Channel, data: bytes) -> None:
-        """Look at a message when everything is read."""
-
-    def _messages(self, advance: Advance) -> Iterator[Recorded]:
-        """Yield all messages."""
-        size = 0
-        with broken(self.reader.path):
-            for number, message in enumerate(self.reader.messages(), 1):
-                size += len(message.data)
-                if number % STEP == 0:
-                    advance(STEP, size)
-                    size = 0
-                yield message
-
-    def _is_inside(self, log_ns: int) -> bool:
-        return self.window is None or self.window[0] <= log_ns <= self.window[1]
-
-    def pieces(self, fmt: str, folder: str, stamp_ns: int, advance: Advance) -> Iterator[bytes]:
-        """Yield the bytes of the copy in a format, starting with the added edges; stamp_ns: of these.
-
-        folder: for temporary files while it is written
-        """
-        files = self.reader.files
-        for each in self.reader.all:
-            if each.schema is None and each.type:
-                self._define(each)
-        file = RecordingFile(fmt, folder, files[0].compression, head=files[0].head)
-        for topic, edges in self.added.items():
-            channel = self._latched(topic)
-            file.begin([channel])
-            frames = [(edge.parent, edge.child) for edge in edges]
-            data = serialised(TF_STATIC, fmt, frames, [stamp_ns] * len(edges), [edge.numbers for edge in edges])
-            file.add(Recorded(channel, self.first_ns or 0, data, self.first_ns or 0))
-        file.begin(self.reader.all)
-        for message in self._messages(advance):
-            if self._is_inside(message.log_ns) or message.channel.is_static:
-                change = self.change.get(message.channel)
-                copied = message.data if change is None else change(message.data)
-                if copied is not None:
-                    file.add(message._replace(data=copied))
-        with broken(self.reader.path):
-            said = self._others(file)
-            yield from file.pieces(said or self.reader.metadata, itself=said is not None)
-
-    def _others(self, file: RecordingFile) -> dict[str, Any] | None:
-        """Copy attachments and metadata of MCAP; return the metadata of rosbag2 in them, or None."""
-        said = None
-        for source in self.reader.files:
-            for other in source.others() if hasattr(source, "others") else ():
-                if getattr(other, "metadata", None) is not None and other.name == ITSELF:
-                    said = read_metadata(other.metadata.get(SERIALIZED, ""), self.reader.path)
-                else:
-                    file.add_other(other)
-        return said
-
-    def _define(self, channel: Channel) -> None:
-        """Define a type that the recording does not define as ROS 2 Humble does, if possible."""
-        store = typestore(ros1=False)
-        is_known = channel.type in store.types
-        self.undefined[channel.type] = is_known
-        text = store.generate_msgdef(channel.type, ros_version=2)[0] if is_known else ""
-        channel.schema = channel.type, "ros2msg" if is_known else "", text.encode()
-
-    def _latched(self, topic: str) -> Channel:
-        """Return a channel of static transforms: that of the recording, or a new one.
-
-        In a ROS 1 bag it is always new, because players keep only the last message of each.
-        """
-        ros1 = self.reader.is_ros1
-        same = [each for each in self.reader.channels if (each.topic, each.type) == (topic, TF_STATIC.type)]
-        return same[0] if same and not ros1 else new_channel(TF_STATIC, topic, ros1=ros1, like=self.reader.all)

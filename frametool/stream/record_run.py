@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections import Counter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from frametool.errors import (
     FormatError,
@@ -25,26 +26,31 @@ from frametool.recordings.copy import (
     STATIC,
     EdgePlan,
     MessageMover,
-    RecordCopy,
     RecordedEdges,
     replaced,
 )
-from frametool.recordings.made import SECONDS_ROS2
+from frametool.recordings.made import KINDS, SECONDS_ROS2, serialised, typestore
 from frametool.recordings.messages import TYPES, RawTransform, recorded_edges
+from frametool.recordings.read import ITSELF, SERIALIZED, Recorded, broken, read_metadata
+from frametool.recordings.write import RecordingFile, new_channel
 from frametool.stream.faults import STOP, Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from frametool.frames.lookups import Frames
     from frametool.grammar.edges import EdgeColumns, Report, Samples
-    from frametool.recordings.copy import AddedEdge, Advance, Change
+    from frametool.recordings.copy import AddedEdge
     from frametool.recordings.read import Channel, RecordingReader
     from frametool.stream.faults import BadRows
 
+    Advance = Callable[[int, int], None]  # takes the number of messages and bytes that were read
+    Change = Callable[[bytes], bytes | None]  # of a message; None drops it
+
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
 OTHER_TRANSFORMS = "FrameTransform"  # of Foxglove, and lists of them
-LAST_STAMP = SECONDS_ROS2[1] * BILLION
+TF_STATIC = KINDS["tf_static"]
+STEP = 1 << 10  # messages between two reports
 
 
 class RecordRequest(NamedTuple):
@@ -66,13 +72,26 @@ class RecordRequest(NamedTuple):
     normalize: bool = False
 
 
-class RecordRun(RecordCopy):
-    """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done."""
+class RecordRun:
+    """One copy of a recording: `look` reads it, `pieces` are the bytes of the copy, `summary` says what was done.
+
+    Messages are bytes, and everything that is not changed is preserved.  No messages are kept in memory.
+    change: returns the new messages of a channel; added: the edges that come first, by topic
+    counts: of messages by channel; span: the first and the last log time
+    inside: how many are in the window; outside: how many outside of it are copied; first_ns: the first time of these
+    undefined: types that the recording does not define, and whether ROS 2 Humble does
+    """
 
     def __init__(self, recording: RecordingReader, request: RecordRequest) -> None:
         """Begin with a recording that is not read yet."""
-        super().__init__(recording, request.window)
-        self.request, self.path = request, recording.path
+        self.reader, self.request, self.path = recording, request, recording.path
+        self.change: dict[Channel, Change] = {}
+        self.added: dict[str, list[AddedEdge]] = {}
+        self.counts: Counter[Channel] = Counter()
+        self.span: tuple[int, int] | None = None
+        self.inside = self.outside = 0
+        self.first_ns: int | None = None
+        self.undefined: dict[str, bool] = {}
         self.edges = RecordedEdges(recording.path)
         self.plan = EdgePlan([], [], [])
         self.transform_topics = {topic for topic in request.topics if topic.rpartition("/")[2] in ("tf", STATIC)}
@@ -90,7 +109,7 @@ class RecordRun(RecordCopy):
         that do not fit, LookupFailed for a frame that is not there and a window without messages.
         """
         request, types = self.request, self.reader.types
-        self.read_all(advance)
+        self._read_all(advance)
         self._check_topics()
         if request.window and not self.inside:
             there = f"they are logged from {' to '.join(map(format_stamp, self.span))}" if self.span else "it has none"
@@ -110,7 +129,20 @@ class RecordRun(RecordCopy):
             self.mover = mover = MessageMover(self._frames(), request.into, types, normalize=request.normalize)
             self.change |= {each: self._moving(each, mover) for each in self.named}
 
-    def see(self, channel: Channel, data: bytes) -> None:
+    def _read_all(self, advance: Advance) -> None:
+        """Read everything; raises FormatError if the recording is not complete."""
+        for channel, log_ns, data, *_ in self._messages(advance):
+            self.counts[channel] += 1
+            first, last = self.span or (log_ns, log_ns)
+            self.span = min(first, log_ns), max(last, log_ns)
+            is_inside = self._is_inside(log_ns)
+            if is_inside or channel.is_static:
+                self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
+                self.outside += not is_inside
+            self.inside += is_inside
+            self._see(channel, data)
+
+    def _see(self, channel: Channel, data: bytes) -> None:
         """Collect the edges of a message of transforms."""
         if self.request.tree is not None and channel in self.used:
             try:
@@ -189,10 +221,76 @@ class RecordRun(RecordCopy):
 
         return change
 
-    def copied(self, fmt: str, folder: str, advance: Advance) -> Iterator[bytes]:
-        """Yield the bytes of the copy in a format; folder: where there is room for it while it is written."""
-        first_ns = self.first_ns or 0
-        return self.pieces(fmt, folder, first_ns if first_ns < LAST_STAMP else 0, advance)
+    def _messages(self, advance: Advance) -> Iterator[Recorded]:
+        """Yield all messages."""
+        size = 0
+        with broken(self.path):
+            for number, message in enumerate(self.reader.messages(), 1):
+                size += len(message.data)
+                if number % STEP == 0:
+                    advance(STEP, size)
+                    size = 0
+                yield message
+
+    def _is_inside(self, log_ns: int) -> bool:
+        window = self.request.window
+        return window is None or window[0] <= log_ns <= window[1]
+
+    def pieces(self, fmt: str, folder: str, advance: Advance) -> Iterator[bytes]:
+        """Yield the bytes of the copy in a format, starting with the added edges.
+
+        folder: for temporary files while it is written
+        """
+        files, first_ns = self.reader.files, self.first_ns or 0
+        stamp_ns = first_ns if first_ns // BILLION <= SECONDS_ROS2[1] else 0
+        for each in self.reader.all:
+            if each.schema is None and each.type:
+                self._define(each)
+        file = RecordingFile(fmt, folder, files[0].compression, head=files[0].head)
+        for topic, edges in self.added.items():
+            channel = self._latched(topic)
+            file.begin([channel])
+            frames = [(edge.parent, edge.child) for edge in edges]
+            data = serialised(TF_STATIC, fmt, frames, [stamp_ns] * len(edges), [edge.numbers for edge in edges])
+            file.add(Recorded(channel, first_ns, data, first_ns))
+        file.begin(self.reader.all)
+        for message in self._messages(advance):
+            if self._is_inside(message.log_ns) or message.channel.is_static:
+                change = self.change.get(message.channel)
+                copied = message.data if change is None else change(message.data)
+                if copied is not None:
+                    file.add(message._replace(data=copied))
+        with broken(self.path):
+            said = self._others(file)
+            yield from file.pieces(said or self.reader.metadata, itself=said is not None)
+
+    def _others(self, file: RecordingFile) -> dict[str, Any] | None:
+        """Copy attachments and metadata of MCAP; return the metadata of rosbag2 in them, or None."""
+        said = None
+        for source in self.reader.files:
+            for other in source.others() if hasattr(source, "others") else ():
+                if getattr(other, "metadata", None) is not None and other.name == ITSELF:
+                    said = read_metadata(other.metadata.get(SERIALIZED, ""), self.path)
+                else:
+                    file.add_other(other)
+        return said
+
+    def _define(self, channel: Channel) -> None:
+        """Define a type that the recording does not define as ROS 2 Humble does, if possible."""
+        store = typestore(ros1=False)
+        is_known = channel.type in store.types
+        self.undefined[channel.type] = is_known
+        text = store.generate_msgdef(channel.type, ros_version=2)[0] if is_known else ""
+        channel.schema = channel.type, "ros2msg" if is_known else "", text.encode()
+
+    def _latched(self, topic: str) -> Channel:
+        """Return a channel of static transforms: that of the recording, or a new one.
+
+        In a ROS 1 bag it is always new, because players keep only the last message of each.
+        """
+        ros1 = self.reader.is_ros1
+        same = [each for each in self.reader.channels if (each.topic, each.type) == (topic, TF_STATIC.type)]
+        return same[0] if same and not ros1 else new_channel(TF_STATIC, topic, ros1=ros1, like=self.reader.all)
 
     def summary(self) -> Iterator[str]:
         """Yield a sentence for each thing that was done or not needed."""

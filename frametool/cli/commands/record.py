@@ -99,7 +99,7 @@ def command(inputs: Inputs) -> int:
         run = RecordRun(opened, request)
         with ProgressBar(None, quiet=quiet, counted="messages") as progress:
             run.look(progress.advance)
-            for piece in run.copied(copy, folder_of(place), progress.advance):
+            for piece in run.pieces(copy, folder_of(place), progress.advance):
                 write(piece)
     moved = run.mover.tally.findings() if run.mover else ()
     for remark in (*tally.findings(), *moved):
