@@ -8,26 +8,27 @@ Also the poses of a table as one list, read like the rows of a stream.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.calc.evaluate import AXES, PLACED, evaluate_line, literal, once_a_block, term_of_pose
 from frametool.calc.parser import RADIAN, CalcError, columns_of, needs_time, reads_row
 from frametool.calc.rules import in_radians
 from frametool.calc.values import ANGLES, LIST, NUMBER, POINT, POSE, TREE, VECTOR, RowValues, Term, Type
 from frametool.documents.source import opened
-from frametool.errors import FormatError, FrametoolError, ValueInvalid
+from frametool.errors import FormatError, FrametoolError
 from frametool.geometry.floats import RADIAN as DEGREES
 from frametool.geometry.representations import notation
+from frametool.grammar.edges import Answers
 from frametool.grammar.names import may_be_on_earth
 from frametool.grammar.pose import COVARIANCE_KEYS
 from frametool.grammar.readers import Misfit
 from frametool.grammar.readers import tell as tell_notes
+from frametool.grammar.result import Style
 from frametool.ros.messages import LISTS
-from frametool.stream.faults import BadRow
-from frametool.stream.gathering import Gathered
-from frametool.stream.request import Request
+from frametool.stream.as_poses import FormatConverter
+from frametool.stream.request import Operation, Request
 from frametool.stream.row_layout import Target
-from frametool.stream.table_stream import run_table
+from frametool.stream.trajectories import gathered, stop_at_first
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from frametool.calc.parser import Line
     from frametool.documents.source import Source
     from frametool.geometry.types import Components, Namespace, Number
-    from frametool.grammar.result import Style
 
 RESULT = "result"  # the column of a number without a name
 NAMES: dict[str, Sequence[str]] = {ANGLES: ("roll", "pitch", "yaw"), **dict(PLACED.values())}
@@ -177,22 +177,14 @@ def _row_type(row: str, parent: str | None, name: str | None) -> Type:
 
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:
     """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
-    gathered = Gathered()
-    request = Request(gathered=gathered, normalize=normalize, degrees=degrees)
-    line = 1
-    file: Any = opened(path)
-    with file as stream:
-        for outcome in run_table(stream, fmt, request, source=path):
-            if outcome.faults:
-                fault = outcome.faults[0]
-                raise BadRow(fault._replace(line=fault.line + line), fault.reason, source=path)
-            line += outcome.lines
-    try:
-        rows = zip(*(part.tolist() for part in gathered.transforms.components), strict=True)
-    except ValueInvalid:
-        raise FormatError("no rows in it", source=path) from None
-    type_, size = (Type(POSE), 7) if gathered.turned else (Type(POINT), 3)
-    return Term(Type(LIST), (), items=tuple(Term(type_, row[:size]) for row in rows))
+    request = Request(Operation(moves=True), normalize=normalize, degrees=degrees)
+    converter = FormatConverter(fmt, request, Style("json"), path, Answers())
+    with opened(path) as stream:
+        rows = gathered(converter, stream, stop_at_first(path)).numbers.tolist()
+    is_turned = len(rows[0]) > len(AXES)
+    nowhere = [0.0] * (7 - len(rows[0])) if is_turned else []
+    type_ = Type(POSE if is_turned else POINT)
+    return Term(Type(LIST), (), items=tuple(Term(type_, (*nowhere, *row)) for row in rows))
 
 
 def values_of_document(source: Source, scope: Scope) -> Term | None:

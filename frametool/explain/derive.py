@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 METRES, RADIANS, DEGREES = "m", "rad", "deg"
 CLOSE = 1e-12  # radians; and of positions, relative to the largest of them or a metre
-TWO_NAMES = "Half a turn has two names: +180 and -180 deg are the same angle; the result shows the other one."
 REPORT = "this is a mistake in frametool, please report it"
 ANGLE_UNITS = {"distance": METRES, "angle": RADIANS, "angle_deg": DEGREES}
 
@@ -85,7 +84,15 @@ def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, plan: DerivationSty
         degrees, keep_sign = plan.style.in_degrees(each), plan.style.keep_sign
         found = operations.from_quaternion(sheet, derived[3:], each, degrees=degrees, keep_sign=keep_sign)
         check_rotation(sheet, each, found, own, plan)
-    end(sheet, own, plan)
+    pose = own.pose
+    rows: list[Row] = []
+    if pose.position is not None and not any(carries_position(each) for each in plan.notations):
+        rows.append(row("xyz", "xyz", pose.position, METRES))
+    for each in plan.notations:
+        rows += _rotation_rows(own, each, plan.style)
+    rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
+    named = f"{printable(pose.parent)}_from_{printable(pose.name)}" if pose.parent and pose.name else ""
+    sheet.result(named, rows)
 
 
 def check_rotation(
@@ -101,10 +108,6 @@ def check_rotation(
     off = quaternion.distance(*quaternion.normalized(*found, floats), *target, floats) if any(found) else math.inf
     if not off <= CLOSE * sheet.stretch:
         raise DerivationWrong(f"the derivation in {notation.spec} is off by {off:.3g} rad from the result; {REPORT}")
-    final = notation.from_quaternion(*target, floats, degrees=degrees, keep_sign=plan.style.keep_sign)
-    turn = 180.0 if degrees else math.pi
-    if any(abs(numbers[at] - final[at]) > turn for at in notation.representation.angles):
-        sheet.caveat(TWO_NAMES)
     if carries_position(notation) and own.pose.position is not None:
         sheet.say("The 4x4 matrix of the pose: R on the left, the position as the fourth column, 0 0 0 1 below.")
 
@@ -115,19 +118,6 @@ def check_vector(sheet: Sheet, derived: Sequence[float], own: Sequence[float]) -
     off = max(abs(a - b) for a, b in zip(derived, own, strict=True))
     if not off <= CLOSE * sheet.reach * sheet.stretch:
         raise DerivationWrong(f"the derivation is off by {off:.3g} from the result; {REPORT}")
-
-
-def end(sheet: Sheet, own: Result, plan: DerivationStyle) -> None:
-    """End with the command's own result."""
-    pose = own.pose
-    named = f"{printable(pose.parent)}_from_{printable(pose.name)}" if pose.parent and pose.name else ""
-    rows: list[Row] = []
-    if pose.position is not None and not any(carries_position(each) for each in plan.notations):
-        rows.append(row("xyz", "xyz", pose.position, METRES))
-    for each in plan.notations:
-        rows += _rotation_rows(own, each, plan.style)
-    rows += [row(key, [""], [own.extras[key]], unit) for key, unit in ANGLE_UNITS.items() if key in own.extras]
-    sheet.result(named, rows)
 
 
 def row(label: str, names: Sequence[str], numbers: Sequence[float], unit: str = "") -> Row:
@@ -219,8 +209,9 @@ def relative(plan: DerivationStyle, a: WrittenPose, b: WrittenPose) -> Explanati
     def way(sheet: Sheet) -> Rigid:
         one, other = _written(sheet, [a, b], labels)
         pose = operations.relative(sheet, one, other, frames)
-        found = operations.extent(sheet, pose, frames[1])
-        for name, value in zip(pose_algebra.RELATIVE_EXTRAS, found, strict=True):
+        values = sheet.play("extent", operations.posed("", pose), frame=frames[1])
+        for name, found in zip(pose_algebra.RELATIVE_EXTRAS, ("d", "angle", "angle_deg"), strict=True):
+            value = values[found]
             if abs(value - own.extras[name]) > 100.0 * CLOSE * sheet.reach:
                 raise DerivationWrong(f"the derived {name} is {value!r}, not {own.extras[name]!r}; {REPORT}")
         return pose

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from frametool.errors import ValueInvalid, printable, shown
 from frametool.explain.run import ENTRIES
 from frametool.frames.stamps import BILLION, format_stamp
-from frametool.geometry import euler, quaternion
+from frametool.geometry import euler
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar import pose_algebra
 
@@ -143,22 +143,16 @@ def compose(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> R
 
 def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
     """Invert target_from_source."""
-    values = sheet.play("inverse", named("t", pose[:3]) | named("", pose[3:]), target=target, source=source)
+    values = sheet.play("inverse", posed("", pose), target=target, source=source)
     return *vector_of(values, "t"), *quaternion_of(values)
 
 
 def relative(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
     """Compare two poses: `frames` are the reference frame of both, and the two bodies."""
     words = dict(zip(("world", "first", "second"), frames, strict=True))
-    values = sheet.play("relative", named("a", a[:3]) | named("b", b[:3]) | named("A", a[3:]), **words)
-    turns = named("a", quaternion.conjugate(*a[3:])) | named("b", b[3:])
-    return *vector_of(values, "t"), *quaternion_of(sheet.play("product", turns), "c")
-
-
-def extent(sheet: Sheet, pose: Rigid, frame: str) -> tuple[float, float, float]:
-    """Derive the size of a transform: distance, angle in radians and in degrees."""
-    values = sheet.play("extent", named("t", pose[:3]) | named("", pose[3:]), frame=frame)
-    return values["d"], values["angle"], values["angle_deg"]
+    turns = named("A", a[3:]) | named("B", b[3:])
+    values = sheet.play("relative", named("a", a[:3]) | named("b", b[:3]) | turns, **words)
+    return *vector_of(values, "t"), *quaternion_of(values, "c")
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, fraction: float) -> Rigid:

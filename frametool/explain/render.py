@@ -81,23 +81,12 @@ def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
 
 
 def _broken(head: str, formula: str) -> list[str]:
-    """Write a formula; a long one is broken before its plus and minus signs, the outer ones first."""
+    """Write a formula; a long one is broken before its plus and minus signs, or before a product."""
     lines = [head + formula]
-    for glued in (*(_glued(formula, deepest) for deepest in range(4)), formula.replace("·", f"{CUT}·")):
-        if max(map(len, lines)) <= WIDTH:
-            break
-        lines = _wrapped(glued, head, " " * len(head))
+    for glued in (re.sub(r" (?![+-] )", GLUE, formula), formula.replace("·", f"{CUT}·")):
+        if max(map(len, lines)) > WIDTH:
+            lines = _wrapped(glued, head, " " * len(head))
     return [line.replace(GLUE, " ").replace(CUT, "") for line in lines]
-
-
-def _glued(formula: str, deepest: int) -> str:
-    """Protect the terms between plus and minus signs at most this deep in parentheses from line breaks."""
-    depth, letters = 0, []
-    for letter, after in zip(formula, formula[1:] + " ", strict=True):
-        depth += (letter == "(") - (letter == ")")
-        is_cut = after in "+-" and depth <= deepest
-        letters.append(GLUE if letter == " " and not is_cut else letter)
-    return "".join(letters)
 
 
 def _grid(grid: MatrixLine) -> list[str]:

@@ -126,13 +126,13 @@ def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: b
     for each in columns:
         request = Request(Operation(moves=True), columns=(each,), normalize=normalize)
         converter = FormatConverter(fmt, request, Style("json"), file.name, Answers())
-        blocks = gathered(converter, BufferedReader(BytesIO(text)), stop_at_first(file.name))
-        numbers = np.concatenate([poses.numbers for poses, _ in blocks] or [np.empty((0, 7))])
+        poses = gathered(converter, BufferedReader(BytesIO(text)), stop_at_first(file.name))
+        numbers = poses.numbers
         if numbers.shape[1] not in (4, 7):
             raise FormatError(f"no rotation among the columns {each}", source=file.name, line=1)
         placed |= numbers.shape[1] == 7
         sides.append(Transform.of(*np.pad(numbers, ((0, 0), (7 - numbers.shape[1], 0))).T.copy()))
-        places = [f"{file.name}:{line}" for _, at in blocks for line in at.tolist()]
+        places = [f"{file.name}:{line}" for line in poses.lines.tolist()]
     return HandEyeSamples(sides[0], sides[1], places, (None,) * 4, (file.name,), placed=placed)
 
 
@@ -233,24 +233,17 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows) -> Point
     if {"rows", "arrays"}.isdisjoint(FORMATS[fmt].reads):
         raise FormatError(f"no points in it: {FORMATS[fmt].summary}", source=file.name)
     converter = FormatConverter(fmt, Request(Operation(moves=True)), Style("json"), file.name, answers)
-    extra: dict[str, list[Any]] = {key: [] for key in (*IDS, WEIGHT)}
-    blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
-    if not blocks:
-        raise FormatError("no points in it", source=file.name)
-    if blocks[0][0].numbers.shape[1] < 3 or not converter.placed:
+    poses = gathered(converter, cast("BufferedReader", file.stream), bad, (*IDS, WEIGHT))
+    if poses.numbers.shape[1] < 3 or not converter.placed:
         raise FormatError("no positions in it: rotations alone are no points", source=file.name)
-    for poses, _ in blocks:
-        size = len(poses.numbers)
-        named = {key: plain_cells(cells) for key, cells in poses.extras.items() if key in extra}
-        if poses.names[0] is not None:
-            named[IDS[1]] = [*poses.for_each(poses.names)]
-        for key, cells in extra.items():
-            cells.extend(named.get(key, [None] * size))
+    extra: dict[str, list[Any]] = dict.fromkeys((*IDS, WEIGHT), [None] * len(poses.numbers))
+    extra |= {key: plain_cells(cells) for key, cells in poses.extras.items()}
+    if poses.names[0] is not None:
+        extra[IDS[1]] = [*poses.names]
     on_lines = "arrays" not in FORMATS[fmt].reads
-    lines = np.concatenate([each for _, each in blocks]).tolist()
-    places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in enumerate(lines, 1)]
-    numbers = np.concatenate([poses.numbers[:, :3] for poses, _ in blocks])
-    return _points(file.name, numbers, extra, places, {name for poses, _ in blocks for name in poses.parents})
+    lines = enumerate(poses.lines.tolist(), 1)
+    places = [f"{file.name}:{line}" if on_lines else f"{file.name} row {at}" for at, line in lines]
+    return _points(file.name, poses.numbers[:, :3], extra, places, {*poses.parents})
 
 
 def _of_documents(file: InputFile) -> Points:

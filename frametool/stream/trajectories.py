@@ -32,7 +32,7 @@ from frametool.stream.faults import BadRows, Outcome, run
 from frametool.stream.header import listed
 from frametool.stream.record_results import stream_rows
 from frametool.stream.request import Operation, Request
-from frametool.stream.row_poses import RowPoses, block_of
+from frametool.stream.row_poses import RowPoses, block_of, objects, plain_cells
 from frametool.stream.table import open_table
 from frametool.text.cells import without_quotes
 
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from frametool.frames.buffer import TransformBuffer
     from frametool.grammar.edges import Report
     from frametool.text.lines import ByteStream
-    from frametool.text.spans import Ints
 
 POSITION = 3  # numbers
 RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
@@ -211,20 +210,42 @@ def _stamps_of_tree(path: str, topics: Sequence[str] = (), *, fmt: str | None = 
     return sorted(found)
 
 
-def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows) -> list[tuple[RowPoses, Ints]]:
-    """Return the results of all blocks that have some, and the lines of their rows; bad rows go to `bad`."""
-    found: list[tuple[RowPoses, Ints]] = []
+def gathered(converter: FormatConverter, stream: BufferedReader, bad: BadRows, columns: Sequence[str] = ()) -> RowPoses:
+    """Return all results of a stream as one block with their lines from 1, and some of its other columns as values.
+
+    Bad rows go to `bad`.  Raises FormatError if no row is left.
+    """
+    found: list[RowPoses] = []
 
     def outcomes() -> Iterator[Outcome]:
         line = int(converter.is_table)  # what lists poses says itself where they are
         for poses, outcome in converter.steps(stream):
             if len(poses.numbers):
-                found.append((poses, poses.lines + line))
+                found.append(poses._replace(lines=poses.lines + line))
             line += outcome.lines
             yield outcome
 
     run(outcomes(), lambda _: None, bad, lambda *_: None)
-    return found
+    return _joined(found, converter.source, columns)
+
+
+def _joined(blocks: Sequence[RowPoses], source: str, columns: Sequence[str] = ()) -> RowPoses:
+    """Return blocks of poses as one."""
+    if not blocks:
+        raise FormatError("no poses or points in it", source=source)
+    stamps = [each.stamps_ns for each in blocks if each.stamps_ns is not None]
+    if len(stamps) not in (0, len(blocks)):
+        raise FormatError("some poses have a stamp and some have none", source=source)
+    parents = [*chain.from_iterable(each.for_each(each.parents) for each in blocks)]
+    names = [*chain.from_iterable(each.for_each(each.names) for each in blocks)]
+    extras = {
+        name: objects(chain.from_iterable(plain_cells(each.extras[name]) for each in blocks))
+        for name in columns if all(name in each.extras for each in blocks)
+    }  # fmt: skip
+    return RowPoses(
+        np.concatenate([each.numbers for each in blocks]), np.concatenate(stamps) if stamps else None,
+        np.concatenate([each.lines for each in blocks]), parents, names, extras,
+    )  # fmt: skip
 
 
 def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: Request) -> Trajectory:
@@ -234,30 +255,23 @@ def _of_rows(file: InputFile, fmt: str, answers: Answers, bad: BadRows, asked: R
     own = answers if counts or fmt == "csv" else answers._replace(stamps="")
     request = asked._replace(operation=Operation(moves=True), rename=lambda parent, name: (parent, name))
     converter = FormatConverter(fmt, request, Style("tum"), file.name, own)
-    blocks = gathered(converter, cast("BufferedReader", file.stream), bad)
-    if not blocks:
-        raise FormatError("no poses in it", source=file.name)
-    named = {
-        pair for each, _ in blocks for pair in zip(each.for_each(each.parents), each.for_each(each.names), strict=True)
-    }
+    poses = gathered(converter, cast("BufferedReader", file.stream), bad)
+    named = {*zip(poses.parents, poses.names, strict=True)}
     if len(named) > 1:
         some = ", ".join(f"{parent}:{name}" for parent, name in sorted(named, key=str)[:3])
         raise ValueInvalid(f"{file.name}: poses of several frames ({some} ..); name one: {file.name}:TARGET:SOURCE")
-    columns = np.concatenate([poses.numbers for poses, _ in blocks])
-    if columns.shape[1] not in (POSITION, 7):
+    width = poses.numbers.shape[1]
+    if width not in (POSITION, 7):
         raise FormatError("rotations without positions are no trajectory", source=file.name)
-    world, body = own.names(WORLD, BODY)
-    parent, name = named.pop()
-    stamps: Any = [poses.stamps_ns for poses, _ in blocks]
-    times = None if stamps[0] is None or (counts and not own.stamps) else np.concatenate(stamps)
-    turns = columns[:, POSITION:] if columns.shape[1] > POSITION else None
-    at = None if "arrays" in FORMATS[fmt].reads else np.concatenate([lines for _, lines in blocks])
-    return Trajectory(times, columns[:, :POSITION], turns, parent or world, name or body, at)
+    if counts and not own.stamps:
+        poses = poses._replace(stamps_ns=None)
+    found = _trajectory(poses, *own.names(WORLD, BODY), turned=width > POSITION)
+    return found if "arrays" in FORMATS[fmt].reads else found._replace(lines=poses.lines)
 
 
 def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: str = BODY) -> Trajectory:
     """Gather records: poses, or points, with their stamps."""
-    blocks, named, turned = list[RowPoses](), set[tuple[str | None, str | None]](), True
+    blocks, turned = list[RowPoses](), True
     for rows in stream_rows(cast("ByteStream", file.stream), fmt, asked, Style("tum"), bad):
         found = rows.posed()
         if found is None:
@@ -269,17 +283,16 @@ def _of_records(file: InputFile, fmt: str, bad: BadRows, asked: Request, body: s
             found = block_of([*whole]) if results else None
         if found is not None:
             blocks.append(found)
-            named |= {*zip(found.for_each(found.parents), found.for_each(found.names), strict=True)}
-    if not blocks:
-        raise FormatError("no poses in it", source=file.name)
-    stamps = [each.stamps_ns for each in blocks if each.stamps_ns is not None]
-    if len(stamps) not in (0, len(blocks)):
-        raise FormatError("some poses have a stamp and some have none", source=file.name)
-    columns = np.concatenate([each.numbers for each in blocks])
+    made = _trajectory(_joined(blocks, file.name), WORLD, body, turned=turned)
+    return made._replace(world=Names().bare(made.world))
+
+
+def _trajectory(poses: RowPoses, world: str, body: str, *, turned: bool) -> Trajectory:
+    """Return poses as a trajectory; world, body: the names where they have none, or several."""
+    named = {*zip(poses.parents, poses.names, strict=True)}
     parent, name = named.pop() if len(named) == 1 else (None, None)
-    times: Any = np.concatenate(stamps) if stamps else None
-    turns = columns[:, POSITION:] if turned else None
-    return Trajectory(times, columns[:, :POSITION], turns, Names().bare(parent or WORLD), name or body)
+    turns = poses.numbers[:, POSITION:] if turned else None
+    return Trajectory(poses.stamps_ns, poses.numbers[:, :POSITION], turns, parent or world, name or body)
 
 
 def _of_tree(

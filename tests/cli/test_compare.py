@@ -103,7 +103,7 @@ REFUSED = {
     (*DRONE, "--fail", "atee>1"): (2, "no number is called 'atee'; did you mean 'ate'?"),
     (*DRONE, "--fail", "kitti>1"): (2, "kitti>1: drone-est.tum has no such number; -f json shows those there are"),
     ("drone-ref.tum", "none.tum"): (5, "none.tum: no such file or directory"),
-    ("-", "-"): (2, "standard input can be read once; only one trajectory may be -"),
+    ("-", "-"): (2, "standard input can be read once; only one argument may be -"),
     (*DRONE, "--start", "+20s"): (1, "no pair from 1700000020.505976832 to 1700000008.455779072 s; there are some in 1700000000.505 .. 1700000008.455 s"),
 }  # fmt: skip
 
