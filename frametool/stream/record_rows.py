@@ -14,7 +14,7 @@ import numpy as np
 
 from frametool import sizes
 from frametool.documents.document import Node, parse_nodes
-from frametool.errors import FrametoolError, ValueInvalid
+from frametool.errors import FrametoolError
 from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.names import in_nanoseconds
@@ -24,7 +24,6 @@ from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import DEGREES
 from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
 from frametool.stream.record_values import (
-    MESSAGES,
     ROUNDED,
     SPELLED,
     plain,
@@ -233,11 +232,11 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
     stamp = None if record.stamp_ns is None else STAMP_NS
     shown = entry._replace(parent=parent, name=name, record=record._replace(stamp_ns=stamp))
     probe = Answer(shown, parts, mended=False)
-    own_style = style if style.format in MESSAGES else style.with_format("csv")
+    own_style = style if style.format in SPELLED else style.with_format("csv")
     try:
         root = Node(0, len(text), parse_nodes(text))
         unit = unit_of(record, root.at(record.path[:1]).value)
-        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style, _unmarked)
+        (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style)
     except (FrametoolError, ValueError):
         return None
     numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
@@ -265,11 +264,6 @@ def _stamped(value: Value, numbers: Mapping[str, int], *, is_spelled: bool) -> M
         del extras[key]
     extras["stamp_ns"] = STAMP_NS
     return None if leaf is None else Marked(value, numbers, (int(leaf[1]), in_nanoseconds(key)))
-
-
-def _unmarked(_path: object) -> Any:
-    """Stand for the text of a record with results in it, which shows no marks."""
-    raise ValueInvalid("written in its own text")
 
 
 def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, Iterable[int]]:

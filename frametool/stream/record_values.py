@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from functools import cached_property, partial
-from itertools import count, islice
+from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from frametool.documents.document import NOTHING, Aliased, Node, parse_nodes, refuse_alias
-from frametool.documents.json import JSON_NUMBER, parse_json
+from frametool.documents.document import NOTHING, Aliased, Node, refuse_alias
+from frametool.documents.json import JSON_NUMBER
 from frametool.documents.source import Source, Verbatim
 from frametool.errors import Finding, FormatError, ValueInvalid, shown, warn
-from frametool.formats.table import has_no_text, is_recording
+from frametool.formats.table import is_recording
 from frametool.geometry import floats
 from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
@@ -26,11 +26,11 @@ from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.record_text import RecordText
 from frametool.stream.request import Memory, Request
 from frametool.stream.row_layout import AS_READ, PARTS, POSE, ROTATION, VECTOR, checked_rotation
-from frametool.stream.splice import refuse_member, target_of
+from frametool.stream.splice import refuse_member
 from frametool.stream.stamp_source import read_stamp
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
@@ -38,9 +38,7 @@ if TYPE_CHECKING:
     from frametool.stream.record import Record
 
     Value = Result | dict[str, Any]
-    WrittenBack = Callable[[Path], Any]
 
-MESSAGES = ("yaml", "json", "ros1", "ros2")  # formats that can hold a message with all its fields
 SPELLED = ("yaml", "json", "csv")  # formats in which other keys keep their names
 NOT_PLAIN = frozenset((*STALE, "angles", "inverse"))
 ROUNDED = "rounded"  # rule of the warning about rotations that were normalised
@@ -163,12 +161,11 @@ def values_of_text(known: RecordText, style: Style, memory: Memory, own: Teller)
     for each in made:
         record = each.entry.record
         units.setdefault(unit_of(record, value_at(known.values, record.path[:1])), []).append(each)
-    written_back = _WrittenBack(known, made).at
     for unit, ours in units.items():
         alone = all(_says_no_more(each.entry.record, known.values, unit) for each in ours)
         node = NOTHING if alone else known.root.at(unit)
         try:
-            yield from values_of_unit(node, unit, ours, known.request, style, written_back)
+            yield from values_of_unit(node, unit, ours, known.request, style)
         except Aliased as error:
             raise error.in_text(known.text) from None
     if not known.values:
@@ -200,71 +197,19 @@ def _answer(known: RecordText, entry: Entry, memory: Memory, own: Teller) -> Ans
     return found
 
 
-class _WrittenBack:
-    """The text with the results in the place of what they come from, read again: records as streams write them."""
-
-    def __init__(self, known: RecordText, answers: Sequence[Answer]) -> None:
-        """Keep what is needed; nothing is done before something is asked for."""
-        self.known, self.answers = known, answers
-
-    def at(self, path: Path) -> Any:
-        """Return what is at a path as a plain value, its numbers as floats."""
-        root, numbers, mark = self._read
-        return plain(root.at(path), lambda text: numbers[int(text[: -len(mark)])] if text.endswith(mark) else None)
-
-    @cached_property
-    def _read(self) -> tuple[Node, list[float], str]:
-        """Return the text, read again, our numbers, and the mark behind the place of each among them in the text."""
-        known, request = self.known, self.known.request
-        known.json = known.json or parse_json(known.source) is not None
-        if [each.spec for each in request.notations] == ["quaternion"]:  # the usual one
-            request = request._replace(notations=())
-        entries = [each._replace(target=target_of(each.record, request)) for each in known.entries]
-        made = {each.entry.record.numbers: each for each in self.answers}
-        mark = next(mark for mark in map("e{}".format, count(999_000)) if mark not in known.text)
-        numbers: list[float] = []
-        for entry in entries:
-            size = request.result_size(entry.record.shape, entry.target)
-            each = made.get(entry.record.numbers)
-            numbers += [0.0] * size if each is None else written(each._replace(entry=entry))
-        marked = [f"{at}{mark}" for at in range(len(numbers))]
-        text = known.with_numbers(known.edits_for(entries, request), marked, numbers)
-        return Node(0, len(text), parse_nodes(text)), numbers, mark
-
-
-def values_of_unit(
-    node: Node, unit: Path, answers: list[Answer], request: Request, style: Style, written_back: WrittenBack
-) -> Iterator[Value]:
-    """Yield what one document or item becomes: itself with new numbers, or a pose for each record in it."""
-    inside = any(type(step) is str for each in answers for step in each.entry.record.path[len(unit) :])
-    keeps = not request.notations or (inside and [each.spec for each in style.notations] == ["quaternion"])
-    is_list = type(node.value) is list
+def values_of_unit(node: Node, unit: Path, answers: list[Answer], request: Request, style: Style) -> Iterator[Value]:
+    """Yield what one document or item becomes: a pose, or a mapping, for each record in it."""
     is_one = len({each.entry.record.path for each in answers}) < len(answers)  # of several things, as an Imu
-    moves = request.operation.moves
-    as_read = (inside and style.format in MESSAGES) or (not is_list and style.format in MESSAGES[:2])
-    if moves and request.poses and ((as_read and (keeps or is_one)) or (is_one and style.format == "text")):
-        yield written_back(unit)
-        return
-    if moves and is_one:
-        yield _flat_message(node, unit, answers, written_back)
+    if request.operation.moves and is_one:
+        yield _of_several(node, unit, answers, request)
         return
     for each in answers:
-        kind = each.entry.record.shape.kind
         if request.operation.formula is not None:
             yield _formula_result(node, unit, each, request, style.format)
-        elif kind in (POSE, ROTATION):
+        elif each.entry.record.shape.kind in (POSE, ROTATION):
             yield _pose_result(node, unit, each, request, style)
-        elif is_list or not _stays(node, kind, style):
-            yield _flat(node, unit, each, request, style.format)
         else:
-            yield written_back(unit)
-
-
-def _stays(node: Node, kind: str, style: Style) -> bool:
-    """Return True if what is not a pose is written unchanged: in no table, and as a message only if it is one."""
-    if style.format == "csv" or has_no_text(style.format) or kind in PARTS:
-        return kind in PARTS and style.format != "csv" and not has_no_text(style.format)
-    return style.format != "text" and (style.format not in ("ros1", "ros2") or "header" in (node.value or ()))
+            yield _flat(node, unit, each, request, style.format)
 
 
 def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt: str) -> Value:
@@ -421,15 +366,17 @@ def _place_as_read(node: Node, record: Record) -> list[float]:
     return [*place.lla(numbers)]
 
 
-def _flat_message(node: Node, unit: Path, answers: list[Answer], written_back: WrittenBack) -> dict[str, Any]:
+def _of_several(node: Node, unit: Path, answers: list[Answer], request: Request) -> dict[str, Any]:
     """Return a message of several things as a mapping without levels, a key for each of their numbers."""
-    first = answers[0].entry
-    found = {"frame": first.parent} | _header_stamp(first.record) | _rest(node, unit, first.record)
-    for key, value in written_back(first.record.path).items():
-        if key != "header":
-            found.pop(key, None)
-            parts = value.items() if isinstance(value, dict) else [("", value)]
-            found |= {f"{key}_{axis}".rstrip("_"): each for axis, each in parts}
+    last = answers[-1].entry  # of the first, an orientation, nothing may be known: then it stays
+    found = {"frame": last.parent} | _header_stamp(last.record) | _rest(node, unit, last.record)
+    for each in answers:
+        record, numbers = each.entry.record, written(each)[: each.entry.target.size]
+        field = record.key or record.rotation
+        if numbers:
+            found.pop(field, None)
+        found |= {f"{field}_{axis}": number for axis, number in zip("xyzw", numbers, strict=False)}
+        found |= _extras(each, request, len(each.parts) - sum(record.shape.covariance))
     return found
 
 
@@ -444,15 +391,13 @@ def _extras(made: Answer, request: Request, own: int) -> dict[str, Any]:
     return extras
 
 
-def plain(node: Node, number: Callable[[str], float | None] = lambda _: None) -> Any:
-    """Return a node as a plain value; numbers and truth values keep their text, unless they are a `number`."""
+def plain(node: Node) -> Any:
+    """Return a node as a plain value; numbers and truth values keep their text."""
     if type(node.value) is dict:
-        return {key: plain(value, number) for key, (_, value) in node.value.items()}
+        return {key: plain(value) for key, (_, value) in node.value.items()}
     if type(node.value) is list:
-        return [plain(item, number) for item in node.value]
+        return [plain(item) for item in node.value]
     refuse_alias(node)
-    if node.value is not None and (found := number(node.value)) is not None:
-        return found
     if node.quote or node.value is None:
         return node.value
     return plain_scalar(node.value)
