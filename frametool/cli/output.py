@@ -212,10 +212,11 @@ class Output:
     def rows(self, blocks: Iterator[BlockResults]) -> None:
         """Write the results of a stream of records as they come, up to a bad one that ends the stream."""
         good = self._before_a_fault(blocks)
-        if self.style.format == "csv":
-            from frametool.stream.record_results import CsvTable
+        if self.style.format in ("csv", "json", "yaml"):
+            from frametool.stream.record_results import CsvTable, documents
 
-            self.pieces(CsvTable(self.style).pieces(good))
+            is_table = self.style.format == "csv"
+            self.pieces(CsvTable(self.style).pieces(good) if is_table else documents(good, self.style))
             return
         in_blocks = self._in_blocks
         values: Iterator[Any] = chain.from_iterable(_in_blocks(each) if in_blocks else each.in_order() for each in good)
@@ -225,8 +226,6 @@ class Output:
         if in_blocks:
             self._refuse_place()
             self.pieces(self._blocks(chain(first, values)))
-        elif self.style.format in ("yaml", "json"):
-            self.pieces(self._documents(chain(first, values)))
         else:
             self.values(chain(first, values))
 
@@ -236,15 +235,6 @@ class Output:
             yield from blocks
         except FrametoolError as error:
             self._fault = error
-
-    def _documents(self, values: Iterator[Result | dict[str, Any]]) -> Iterator[str]:
-        """Yield results as documents of YAML, or lines of JSON, some at a time."""
-        between = ""
-        write, parting = self._module("").write_points, "---\n" if self.style.format == "yaml" else ""
-        while batch := list(islice(values, BATCH)):
-            found = [each.mapping(self.style) if isinstance(each, Result) else each for each in batch]
-            yield between + write(found, self.style)
-            between = parting
 
     def tree(self, tree: FrameTree | TransformBuffer, color: str = "auto") -> None:
         """Write a tree; on a terminal in colour, or as `color` says; in a format made of poses with every sample."""

@@ -86,6 +86,12 @@ class Style:
         style.put_at(self.place)
         return style
 
+    def exact(self) -> Style:
+        """Return the same style with all digits of numbers."""
+        style = self.with_format(self.format)
+        style.precision, style.screen = None, False
+        return style
+
     def put_at(self, place: Place | None) -> None:
         """Write positions as positions on the Earth; tables have no columns for convergence and scale of UTM."""
         self.place = place and place.with_grid(gridded=self.format in ("text", "yaml", "json"))

@@ -125,7 +125,7 @@ class Run:
         self.lone: int | None = None
         self.columns = list(np.ascontiguousarray(numbers.T))
         with np.errstate(all="ignore"):
-            moved = self._compute(self.columns, movers, state)
+            self.moved = moved = self._compute(self.columns, movers, state)
             self._doubt_turns(moved)
             self.results, self.locked = self._results(moved)
         self.rows = np.arange(self.count)

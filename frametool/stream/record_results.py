@@ -12,10 +12,11 @@ from frametool import sizes
 from frametool.documents.document import parse_nodes
 from frametool.errors import FormatError, FrametoolError
 from frametool.formats.rows.csv import cells_of, row
+from frametool.formats.trees.written_poses import write_poses
 from frametool.grammar.pose import Pose
 from frametool.grammar.result import NoResult
 from frametool.stream.faults import NULL, STOP, Fault, tell_of_rounding
-from frametool.stream.record_text import attempt, fault_at, nulled
+from frametool.stream.record_text import RecordText, attempt, fault_at, nulled
 from frametool.stream.record_values import ROUNDED, Teller, plain, values_of_text
 from frametool.stream.request import Memory
 from frametool.stream.splitter import ARRAY, NO_END, Splitter
@@ -62,30 +63,33 @@ def stream_rows(stream: ByteStream, fmt: str, request: Request, style: Style, ba
     """Yield the results of a stream of records, block by block; bad ones are reported as rows are."""
     splitter = Splitter(fmt)
     operation, request = request.operation, request._replace(canonical=True)
-    depends = operation.formula is not None or operation.velocity or request.in_order or request.place
+    singly = operation.shown is not None or request.place is not None
     alike: RecordRows | None = None
     line, rows = 1, 0
     memory, teller = Memory(), Teller(most=1)
     for block in read_blocks(stream, whole=splitter.whole):
         at = 0
         batches: Sequence[RecordBatch] = ()
-        alone, mended = splitter.parts(block).parts if depends or len(block) < sizes.SMALL else [], 0
-        if not depends and not 0 < len(alone) <= sizes.FEW:
+        few = splitter.parts(block).parts if singly or (len(block) < sizes.SMALL and not request.in_order) else []
+        alone: Iterable[tuple[Any, Any, Any]] = ((part, None, None) for part in few)
+        mended = 0
+        if not singly and not 0 < len(few) <= sizes.FEW:
             from frametool.stream.record_rows import RecordRows
 
             alike = alike or RecordRows(splitter, fmt, request, style, bad.source)
             batches, alone, mended = alike.of_block(block, teller.counts)
         values: list[tuple[int, Value]] = []
         rows += len({*chain.from_iterable(each.cut.starts[:, 0].tolist() for each in batches)})
-        for part in alone:
+        for part, parts, reason in alone:
             rows += 1
             line, at = line + block.count(b"\n", at, part.start), part.start
             before = bad.count
             known = attempt(block, part, fmt, request, bad.source, line - 1, teller.tell)
-            fault = known if isinstance(known, Fault) else None
-            if not isinstance(known, Fault):
+            fault = known if isinstance(known, Fault) else reason and Fault.of(line - 1, *reason)
+            if isinstance(known, RecordText) and not fault:
                 try:
-                    values += zip(count(part.start), values_of_text(known, style, memory, teller), strict=False)
+                    found = values_of_text(known, style, memory, teller, parts)
+                    values += zip(count(part.start), found, strict=False)
                 except FormatError as error:
                     fault = fault_at(known.source, error)
                 except FrametoolError as error:
@@ -125,6 +129,33 @@ def _says(value: Any) -> bool:
 LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
 
 
+def text_of(singles: Sequence[tuple[int, str]], batches: Sequence[RecordBatch], rows: Sequence[Any]) -> bytes:
+    """Return single results and the rows of batches in the order of their places."""
+    lines = [(place, text.encode()) for place, text in singles]
+    if not batches:
+        return b"".join(text for _, text in lines)
+    from frametool.stream.rows import texts_as_rows, written
+
+    groups = [(batch.places, spans) for batch, spans in zip(batches, rows, strict=True)]
+    return written([*groups, texts_as_rows(lines)] if lines else groups)
+
+
+def documents(blocks: Iterable[BlockResults], style: Style) -> Iterator[bytes]:
+    """Yield results as lines of JSON or as documents of YAML."""
+    parting, begun = "---\n" if style.format == "yaml" else "", False
+    exact = style.exact()
+    for block in blocks:
+        singles = [(place, parting + write_poses([value], style)) for place, value in block.values]
+        rows = []
+        for batch in block.batches:
+            from frametool.stream.text_rows import document_rows
+
+            rows.append(document_rows(batch, parting + write_poses([batch.marked.value], exact), style))
+        text = text_of(singles, block.batches, rows)
+        yield text if begun else text[len(parting) :]
+        begun = begun or bool(text)
+
+
 class CsvTable:
     """Put results together as one table."""
 
@@ -152,20 +183,16 @@ class CsvTable:
     def _add(self, block: BlockResults) -> None:
         """Add the rows of a block."""
         singles = [(place, cells_of(value, self.style)) for place, value in block.values]
-        found: list[tuple[int, Iterable[str]]] = list(singles)
         marked = [cells_of(batch.marked.value, self.style) for batch in block.batches]
-        found += [(int(batch.places[0]), cells) for batch, cells in zip(block.batches, marked, strict=True)]
-        for _, names in sorted(found, key=itemgetter(0)):
+        firsts = [(int(batch.places[0]), cells) for batch, cells in zip(block.batches, marked, strict=True)]
+        for _, names in sorted([*singles, *firsts], key=itemgetter(0)):
             self.columns |= dict.fromkeys(names)
-        lines = [
-            (place, row([cells.get(name, "") for name in self.columns], self.style).encode())
-            for place, cells in singles
-        ]
-        if block.batches:
-            from frametool.stream.csv_rows import merged
+        lines = [(place, row([cells.get(name, "") for name in self.columns], self.style)) for place, cells in singles]
+        rows = []
+        for batch, cells in zip(block.batches, marked, strict=True):
+            from frametool.stream.text_rows import table_rows
 
-            text = merged(lines, block.batches, marked, [*self.columns], self.style)
-        else:
-            text = b"".join(line for _, line in lines)
+            rows.append(table_rows(batch, cells, self.columns, self.style))
+        text = text_of(lines, block.batches, rows)
         self.waiting.write(text)
         self.sizes.append((len(self.columns), len(text)))

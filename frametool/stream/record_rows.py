@@ -7,7 +7,6 @@ what is invalid, or worth telling, takes that way itself.
 from __future__ import annotations
 
 import re
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from frametool import sizes
 from frametool.documents.document import Node, parse_nodes
 from frametool.errors import FrametoolError
+from frametool.formats.rows.csv import cells_of
 from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.names import in_nanoseconds
@@ -23,6 +23,7 @@ from frametool.stream.answers import Answer
 from frametool.stream.evaluate import Run, State
 from frametool.stream.faults import DEGREES
 from frametool.stream.record_cuts import Cut, RecordCutter, block_of, names_of, plan_of
+from frametool.stream.record_cuts import in_order as in_cut_order
 from frametool.stream.record_values import (
     ROUNDED,
     SPELLED,
@@ -32,7 +33,7 @@ from frametool.stream.record_values import (
     unit_of,
     values_of_unit,
 )
-from frametool.stream.row_layout import AS_READ, POSE, ROTATION, Target
+from frametool.stream.row_layout import AS_READ, POINT, POSE, ROTATION, VECTOR, Target
 from frametool.stream.row_poses import RowPoses, objects
 from frametool.stream.splitter import Part
 from frametool.stream.stamp_columns import read_stamps
@@ -41,6 +42,7 @@ from frametool.text.spans import MARGIN, Spans, framed
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from frametool.geometry.types import Components
     from frametool.grammar.result import Style
     from frametool.stream.evaluate import Plan
     from frametool.stream.record_values import Value
@@ -61,12 +63,13 @@ LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quo
 class Marked(NamedTuple):
     """The result of one of the records of a template, with marks in the place of what differs.
 
-    value: the result; numbers: which column of results stands for a number of it, by its text
+    value: the result; numbers: which column of results stands for a number of it, by its text; size: the columns
     stamp: which scalar is its stamp, if it has no header, and whether it counts nanoseconds
     """
 
     value: Value
     numbers: Mapping[str, int]
+    size: int
     stamp: tuple[int, int] | None = None
 
 
@@ -100,6 +103,14 @@ class RecordBatch(NamedTuple):
         return RecordBatch(self.marked, cut, self.data, self.places[rows], self.results[rows], parents, names, stamps)
 
 
+class Alone(NamedTuple):
+    """A record that is no row of a batch: what became of it as a row, or why it has no result, if that is known."""
+
+    part: Part
+    parts: Sequence[Components] | None = None
+    reason: tuple[str, str | FrametoolError] | None = None
+
+
 class RecordRows:
     """Make rows of one block of records after the other, of those that are written alike."""
 
@@ -110,52 +121,54 @@ class RecordRows:
         self.cutter = RecordCutter(splitter, fmt, self.request, source)
         self.is_yaml = fmt == "yaml"
         self.left = sizes.LEARNED  # where no records are alike, learning is lost time
-        self._plans: dict[Template, tuple[Plan, list[Marked]] | None] = {}
+        self.state = State()
+        self._plans: dict[Template, tuple[Plan, list[Marked]]] = {}
 
-    def of_block(self, text: bytes, reported: Mapping[str, int]) -> tuple[list[RecordBatch], list[Part], int]:
+    def of_block(self, text: bytes, reported: Mapping[str, int]) -> tuple[list[RecordBatch], list[Alone], int]:
         """Return the rows of a block, the records that are none, and how many rotations of rows were normalised.
 
         reported: how often things were reported, by their rules
         """
         records, rest = self.cutter.cut(text)
-        alone: list[Part] = []
+        in_order = self.request.in_order
+        alone: list[Alone] = []
         for start, end in rest:
             for part, known in self.cutter.singly(text, start, end):
                 hit = known
-                if hit is None and self.left and not part.problem:
-                    self.left -= 1
+                if hit is None and (self.left or in_order) and not part.problem:
+                    self.left -= not in_order
                     hit = self.cutter.learned(self.cutter.read(text, part), text, part)
                 if hit is None:
-                    alone.append(part)
+                    alone.append(Alone(part))
                 else:
                     records.add(part, *hit)
         data = framed(text)
         batches: list[RecordBatch] = []
         mended = 0
-        for cut in records.by_template():
-            made, rows, count = self._of_cut(cut, data, text, reported)
+        cuts = records.by_template()
+        for cut in in_cut_order(cuts) if in_order else cuts:
+            made, others, count = self._of_cut(cut, data, text, reported)
             batches += made
+            alone += others
             mended += count
-            begins, ends = cut.starts[rows, 0].tolist(), cut.ends[rows, -3].tolist()
-            alone += [Part(start, start, end, end) for start, end in zip(begins, ends, strict=True)]
-        return batches, sorted(alone, key=itemgetter(1)), mended
+        return batches, sorted(alone, key=lambda each: each.part.start), mended
 
     def _of_cut(
         self, cut: Cut, data: Bytes, text: bytes, reported: Mapping[str, int]
-    ) -> tuple[list[RecordBatch], Sequence[int], int]:
+    ) -> tuple[list[RecordBatch], list[Alone], int]:
         """Return the rows of one template; those that are unclear, and the first that tells something, stay alone."""
         template = cut.template
         is_new = template not in self._plans
         if is_new:
             self._plans[template] = self._plan(template)
-        if (planned := self._plans[template]) is None:
-            return [], range(len(cut.starts)), 0
-        plan, marked = planned
-        run = Run(plan, block_of(cut, data, text), State())
+        plan, marked = self._plans[template]
+        run = Run(plan, block_of(cut, data, text), self.state)
         tells = template.notes or template.own_notes or any(map(self.request.operation.carried, template.shapes))
         left = {*([0] if is_new and tells else []), *(row for row, _, _ in run.doubted[:1] if not reported[DEGREES])}
         left |= {*run.mended[:1]} if not reported[ROUNDED] else set()
-        left |= {*run.reasons, *run.rows[run.locked != 0].tolist()}
+        left |= {*run.rows[run.locked != 0].tolist()} if marked else {*run.rows.tolist()}
+        if self.style.format == "yaml":  # in which a null has lines of its own
+            left |= {row for at, node in template.leaves if not node.quote for row in _nulls(cut, at, data)}
         stamps = []
         for at, each in enumerate(marked):
             times, late = _stamps(cut, at, each, data)
@@ -164,12 +177,10 @@ class RecordRows:
         good = np.array([row not in left for row in run.rows.tolist()], np.bool_)
         rows = run.rows[good]
         own = Cut(template, cut.starts[rows], cut.ends[rows])
-        if not len(rows):
-            return [], sorted(left), 0
         batches: list[RecordBatch] = []
         first = 0
-        for at, each in enumerate(marked):
-            last = first + len(each.numbers)
+        for at, each in enumerate(marked if len(rows) else ()):
+            last = first + each.size
             becomes = [named.names for pair in names_of(own, at, text) if (named := template.named(at, pair))]
             parents, names = ([pair[role] for pair in becomes] for role in (0, 1))
             times = stamps[at]
@@ -179,27 +190,41 @@ class RecordRows:
             )  # fmt: skip
             batches.append(batch)
             first = last
-        return batches, sorted(left), len({*run.mended} - left)
+        alone = [self._alone(cut, row, run) for row in sorted({*run.reasons, *left.intersection(run.rows.tolist())})]
+        return batches, alone, len({*run.mended} - left)
 
-    def _plan(self, template: Template) -> tuple[Plan, list[Marked]] | None:
-        """Plan the records of a template; None where they are not simple."""
-        if len(template.entries) > MOST_ENTRIES:
-            return None
-        if not template.regular or len({entry.record.path for entry in template.entries}) < len(template.entries):
-            return None
+    def _alone(self, cut: Cut, row: int, run: Run) -> Alone:
+        """Return a record as it is taken alone: where rows depend on those before, with what became of this one."""
+        start, end = int(cut.starts[row, 0]), int(cut.ends[row, -3])
+        part = Part(start, start, end, end)
+        if not self.request.in_order:
+            return Alone(part)
+        columns = [[np.broadcast_to(part, run.count) for part in parts] for parts in run.moved]
+        parts = [tuple(float(column[row]) for column in each) for each in columns]
+        return Alone(part, parts, run.reasons.get(row))
+
+    def _plan(self, template: Template) -> tuple[Plan, list[Marked]]:
+        """Plan the records of a template; without marks where they are not simple."""
+        plan = plan_of(template, self.request, yaml=self.is_yaml)
         targets, found = [], []
-        for at, entry in enumerate(template.entries):
-            shape = entry.record.shape
-            if shape.multiple or shape.place or entry.record.placed or entry.target.place or entry.target.scaled:
-                return None
-            target = self._target(entry.target, shape.kind)
+        for at, entry in enumerate(template.entries if self._is_simple(template) else ()):
+            target = self._target(entry.target, self.request.operation.result_kind(entry.record.shape.kind))
             made = marked(template, at, self.request, self.style, target)
             if made is None:
-                return None
+                return plan._replace(pieces=()), []
             targets.append(target)
             found.append(made)
-        plan = plan_of(template, self.request, yaml=self.is_yaml)
-        return plan._replace(pieces=(), targets=tuple(targets)), found
+        return plan._replace(pieces=(), targets=tuple(targets) or plan.targets), found
+
+    def _is_simple(self, template: Template) -> bool:
+        """Return True if results are made of what may be marked: few plain numbers, and no place on the Earth."""
+        entries = template.entries
+        is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
+        return is_plain and not any(
+            entry.record.shape.multiple or entry.record.shape.place or entry.record.placed or entry.target.place
+            or entry.target.scaled
+            for entry in entries
+        )  # fmt: skip
 
     def _target(self, own: Target, kind: str) -> Target:
         """Choose which numbers of a result are written."""
@@ -209,7 +234,7 @@ class RecordRows:
             return Target(1.0, ())
         placed = own.unit is not None or own.whole
         target = tuple((each, self.style.in_degrees(each)) for each in self.style.notations)
-        if self.style.format != "csv" or not target:
+        if self.style.format not in SPELLED or not target:
             return Target(1.0, QUATERNIONS, keep_sign=True)
         whole = placed and any(each.representation.whole for each, _ in target)
         return Target(1.0 if placed and not whole else None, target, self.style.keep_sign, whole and len(target) == 1)
@@ -224,9 +249,12 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
         start, end = template.stretches[stretch]
         text, begin = f"{text}{template.text[begin:start]}73105857{number:07d}", end
     text += template.text[begin:]
-    own = 7 if record.shape.kind in (POSE, ROTATION) else len(NUMBERS[: record.shape.own_size])
-    extra = request.operation.extras(record.shape)
-    size = own + len(extra) + sum(record.shape.covariance)
+    operation, shape = request.operation, record.shape
+    if operation.formula is None:
+        own, carried = 7 if shape.kind in (POSE, ROTATION) else len(NUMBERS[: shape.own_size]), sum(shape.covariance)
+    else:  # of numbers alone, what was the row's own counts for nothing
+        own, carried = 3 if operation.result_kind(shape.kind) in (POINT, VECTOR) else 7, 0
+    size = own + len(operation.extras(shape)) + carried
     parts = (*NUMBERS[:own], *(0.7310585786300049 + at for at in range(size - own)))
     parent, name = entry.parent and PARENT, entry.name and NAME
     stamp = None if record.stamp_ns is None else STAMP_NS
@@ -239,31 +267,43 @@ def marked(template: Template, at: int, request: Request, style: Style, target: 
         (value,) = values_of_unit(root.at(unit), unit, [probe], request, own_style)
     except (FrametoolError, ValueError):
         return None
-    numbers = {repr(number + 0.0): column for column, number in enumerate(target.written(parts, floats))}
-    found = _stamped(value, numbers, is_spelled=style.format in SPELLED)
-    if found is None or style.format != "csv":
+    written = target.written(parts, floats)
+    numbers = {repr(number + 0.0): column for column, number in enumerate(written)}
+    found = _with_stamp(Marked(value, numbers, len(written)), is_spelled=style.format in SPELLED)
+    if found is None or style.format not in SPELLED:
         return found
-    from frametool.formats.rows.csv import cells_of
+    value = found.value
+    if style.format == "csv":
+        value = cells_of(value, style)
+    elif isinstance(value, Result):
+        value = value.mapping(style)
+    return found if all(repr(each) in numbers for each in _floats(value)) else None
 
-    known = all(type(each) is not float or repr(each) in numbers for each in cells_of(value, style).values())
-    return found if known else None
+
+def _floats(value: Any) -> Iterator[float]:
+    """Yield the numbers in a value."""
+    if isinstance(value, float):
+        yield value
+    elif isinstance(value, (dict, list)):
+        for each in value.values() if isinstance(value, dict) else value:
+            yield from _floats(each)
 
 
-def _stamped(value: Value, numbers: Mapping[str, int], *, is_spelled: bool) -> Marked | None:
+def _with_stamp(found: Marked, *, is_spelled: bool) -> Marked | None:
     """Take the scalar that is a stamp for that of the result; None where it is no scalar.
 
     is_spelled: stamps stay as they are written, but those that were read already
     """
-    extras = value.extras if isinstance(value, Result) else value
+    extras = found.value.extras if isinstance(found.value, Result) else found.value
     rest = {key: each for key, each in extras.items() if each != STAMP_NS}
     key = stamp_key(rest)
     if not key or (is_spelled and type(rest[key]) is not int):
-        return Marked(value, numbers)
+        return found
     leaf = LEAF.fullmatch(str(rest[key]))
     if key != "stamp_ns":
         del extras[key]
     extras["stamp_ns"] = STAMP_NS
-    return None if leaf is None else Marked(value, numbers, (int(leaf[1]), in_nanoseconds(key)))
+    return None if leaf is None else found._replace(stamp=(int(leaf[1]), in_nanoseconds(key)))
 
 
 def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, Iterable[int]]:
@@ -275,6 +315,12 @@ def _stamps(cut: Cut, at: int, each: Marked, data: Bytes) -> tuple[Ints | None, 
         return None, ()
     spans = (Spans(data, cut.starts[:, place] + MARGIN, cut.ends[:, place] + MARGIN) for place in places)
     return read_stamps((*spans,), in_ns=each.stamp[1] if each.stamp else 0)
+
+
+def _nulls(cut: Cut, at: int, data: Bytes) -> list[int]:
+    """Return the records with null in a stretch."""
+    found: list[int] = np.flatnonzero(data[cut.starts[:, at] + MARGIN] == ord("n")).tolist()
+    return found
 
 
 def plain_texts(batch: RecordBatch, at: int) -> list[Any]:

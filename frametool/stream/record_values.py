@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from functools import partial
-from itertools import islice
+from itertools import islice, repeat
 from typing import TYPE_CHECKING, Any
 
 from frametool.documents.document import NOTHING, Aliased, Node, refuse_alias
@@ -21,7 +21,7 @@ from frametool.grammar.names import in_nanoseconds, stamp_column
 from frametool.grammar.pose import SCALE, Pose, inverted
 from frametool.grammar.readers import Misfit, NotARotation, Reading, tell
 from frametool.grammar.result import Result, with_entries
-from frametool.stream.answers import Outside, wide_turn, written
+from frametool.stream.answers import Answer, Outside, wide_turn, written
 from frametool.stream.record import STALE, placed, value_at
 from frametool.stream.record_text import RecordText
 from frametool.stream.request import Memory, Request
@@ -32,9 +32,10 @@ from frametool.stream.stamp_source import read_stamp
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from frametool.geometry.types import Components
     from frametool.grammar.readers import Path
     from frametool.grammar.result import Style
-    from frametool.stream.answers import Answer, Entry
+    from frametool.stream.answers import Entry
     from frametool.stream.record import Record
 
     Value = Result | dict[str, Any]
@@ -151,12 +152,17 @@ def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     own.end(source.name)
 
 
-def values_of_text(known: RecordText, style: Style, memory: Memory, own: Teller) -> Iterator[Value]:
+def values_of_text(
+    known: RecordText, style: Style, memory: Memory, own: Teller, parts: Sequence[Components] | None = None
+) -> Iterator[Value]:
     """Yield the results of the records of a text.
 
-    memory: of the records before; own: reports what is invalid.  Raises FormatError for a record without a result.
+    memory: of the records before; own: reports what is invalid; parts: the components of each result, if known
+    Raises FormatError for a record without a result.
     """
-    made = [each for entry in known.entries if (each := _answer(known, entry, memory, own)) is not None]
+    found = parts or repeat(None, len(known.entries))
+    answers = (_answer(known, *each, memory, own) for each in zip(known.entries, found, strict=True))
+    made = [each for each in answers if each is not None]
     units: dict[Path, list[Answer]] = {}
     for each in made:
         record = each.entry.record
@@ -177,14 +183,16 @@ def unit_of(record: Record, document: Any) -> Path:
     return record.path[: 1 + (type(document) is list and len(record.path) > 1)]
 
 
-def _answer(known: RecordText, entry: Entry, memory: Memory, own: Teller) -> Answer | None:
+def _answer(
+    known: RecordText, entry: Entry, parts: Components | None, memory: Memory, own: Teller
+) -> Answer | None:
     """Apply the operation to one record; the first of all has no velocity and so no result."""
     record, source = entry.record, known.source
     own.counts[LOST] += bool(entry.lost)
     if entry.lost and own.counts[LOST] == 1:
         warn(f"{source.name}: frame {shown(entry.lost)} is left out: the frames of the result are not known")
     try:
-        found = known.answer(entry, memory)
+        found = Answer(entry, parts, mended=False) if parts else known.answer(entry, memory)
     except Outside:
         return None
     except Misfit as misfit:

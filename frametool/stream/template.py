@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from functools import cached_property
 from itertools import accumulate, chain, count
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from frametool.documents.json import JSON_NUMBER
@@ -86,7 +87,7 @@ class Template:
     pieces: what the result is made of
     notes: what is worth telling about all of them; own_notes: about the record that was learned alone
     of_places: those of them that hold for all
-    leaves: of what is written anew, the scalars that decide nothing: the stretch of each, and where it was learned
+    leaves: of what is written anew, the scalars that differ: the stretch of each, and where it was learned
     """
 
     def __init__(self, known: RecordText) -> None:
@@ -116,7 +117,7 @@ class Template:
         self.numbers = tuple(map(at.__getitem__, self._numbers))
         self.stamps = tuple(tuple(map(at.__getitem__, spans)) for spans in self._stamps)
         self.frames = [[None if node is None else at[_text_of(node)] for node in nodes] for nodes in self._frame_nodes]
-        self.leaves = tuple((at[span], node) for span, node in self._leaf_nodes)
+        self.leaves = sorted(((at[span], node) for span, node in self._leaf_nodes), key=itemgetter(0))
         self._named: dict[tuple[int, Names], NamedFrames | None] = {}
         self.line = text.count("\n", 0, min(self._numbers, default=(0, 0))[0])
 
@@ -151,7 +152,12 @@ class Template:
             if node is not None:
                 patterns[_text_of(node)] = FRAME[self.json, node.quote]
         cuts.update(patterns)
-        self._leaf_nodes = self._cut_leaves(cuts, patterns) if self._request.canonical else []
+        self._leaf_nodes = []
+        if self._request.canonical and self.regular:
+            own = [root.at(path) for entry in self.entries for path in entry.record.numbers if path is not None]
+            own += [node for node in chain(*self._frame_nodes) if node is not None]
+            known = {_text_of(node): node for node in own}
+            self._leaf_nodes = [*known.items(), *self._cut_leaves(cuts, patterns)]
         cuts.update(patterns)
         return cuts, patterns
 

@@ -20,13 +20,9 @@ if TYPE_CHECKING:
     from frametool.grammar.readers import Quaternion
 
 
-def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one document or line per result."""
-    return write_points((result.mapping(style) for result in results), style)
-
-
-def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return one line per record in JSON, else the records as documents separated by `---`."""
+def write_poses(results: Iterable[Result | dict[str, Any]], style: Style) -> str:
+    """Return one line per result in JSON, else the results as documents separated by `---`."""
+    records = (each.mapping(style) if isinstance(each, Result) else each for each in results)
     if style.format == "json":
         from frametool.documents import json
 
@@ -34,6 +30,9 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
     from frametool.documents import yaml_writer
 
     return "---\n".join(yaml_writer.dump(record, style.number) for record in records)
+
+
+write_points = write_poses
 
 
 def write_tree(tree: Frames, style: Style) -> str:
