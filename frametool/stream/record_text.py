@@ -126,7 +126,7 @@ class RecordText:
         write = number_writer(self.request.precision, yaml=not self.json)
         locked = any(each.entry.target.locked(each.parts) for each in answers)
         text = self.with_numbers(self.edits, [write(number) for number in numbers], numbers, locked=locked)
-        mended, notes = sum(note.rule == "rounded" for note in self.notes), self._notes_at(line, column)
+        mended, notes = sum(note.rule == "rounded" for note in self.notes), self.notes_at(line, column)
         wide = next(filter(None, (wide_turn(each, self.request.operation) for each in answers)), None)
         notes += [RowNote(line + self.line, wide.rule, wide.message)] if wide else []
         if (place := answers[0].entry.target.place if answers else None) is not None:
@@ -144,7 +144,7 @@ class RecordText:
             if not entry.record.values and entry.record.shape.kind:
                 yield RowNote(0, "identity", "neither position nor rotation: taken as the identity")
 
-    def _notes_at(self, line: int, column: int) -> list[RowNote]:
+    def notes_at(self, line: int, column: int) -> list[RowNote]:
         """Return all warnings about the records and their numbers, each with its place."""
         begin = Source("", self.text, line, column)
         places = [begin.place(*each) for each in locate_many(self.text, [note.path for note in self.notes])]

@@ -234,8 +234,8 @@ def _formula_result(node: Node, unit: Path, made: Answer, request: Request, fmt:
         for key in () if operation.shown.replaces else extras:
             refuse_member(key, node.value)
     if operation.only_adds:
-        return plain(node) | extras if type(node.value) is dict else extras
-    rest = _rest(node, unit, entry.record)
+        return with_stamp_ns(plain(node), fmt) | extras if type(node.value) is dict else extras
+    rest = with_stamp_ns(_rest(node, unit, entry.record), fmt)
     if kind == POSE:
         stamp = _header_stamp(entry.record) if not request.poses else {}
         return Result(Pose.of(made.parts[:7], entry.name, entry.parent), stamp | extras | rest)

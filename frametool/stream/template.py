@@ -17,7 +17,6 @@ from frametool.errors import FrametoolError
 from frametool.grammar.names import NAME_KEYS, PARENT_KEYS, may_be_uncertain
 from frametool.grammar.pose import DESCRIPTIVE, POSE_KEYS
 from frametool.grammar.rotation_spelling import AXES_KEY, LISTED_WORDS, ROTATION_KEYS
-from frametool.stream.faults import RowNote
 from frametool.stream.layout import Const, Renamed
 from frametool.stream.record import POINT_KEYS
 from frametool.stream.record_text import cut
@@ -98,7 +97,7 @@ class Template:
         self.json, self.is_long = known.json, known.is_long
         self.notes = list(known.row_notes())
         self.own_notes = known.notes
-        self.of_places = [RowNote(0, each.rule, each.message) for each in known.notes if each.rule in OF_PLACES]
+        self.of_places = [each for each in known.notes_at(0, known.source.first_column) if each.about in OF_PLACES]
         self._root = known.root
         self._request = known.request
         cuts, patterns = self._cuts()
