@@ -9,7 +9,7 @@ from frametool.errors import ValueInvalid, shown, warn
 from frametool.frames import topology
 from frametool.frames.lookups import Frames, taken
 from frametool.frames.stamps import FURTHEST_NS, format_stamp, whole_stamp
-from frametool.frames.track import DEFAULT_AUTHORITY, MovingTrack, StaticTransform
+from frametool.frames.track import MovingTrack, StaticTransform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,11 +43,11 @@ class TransformBuffer(Frames):
 
     def insert(
         self, parent: str, child: str, transform: Transform, stamp_ns: int | None = None, *,
-        static: bool | None = None, authority: str = DEFAULT_AUTHORITY, covariance: Any = None,
+        static: bool | None = None, covariance: Any = None,
     ) -> None:  # fmt: skip
         """Add parent_from_child, the pose of the child in its parent, at a time; without a time the frame is static.
 
-        static: marks a static frame although it has a stamp, which is ignored.  authority: for tf2's listing.
+        static: marks a static frame although it has a stamp, which is ignored.
         covariance: of the edge, the same for all its samples, passed with any of them; None changes nothing.
         A different pose at an existing stamp replaces the old one, with a warning.
         Raises ValueInvalid; BadTopology for two static poses or covariances, a static frame that moves, a cycle.
@@ -58,14 +58,14 @@ class TransformBuffer(Frames):
         parent, child, found = self.resolve_name(parent), self.resolve_name(child), taken(covariance)
         if found and (known := self.covariances.get(child, found)) != found:
             raise topology.two_covariances(parent, child, known, found)
-        if self.insert_components(parent, child, components, stamp_ns, static=static, authority=authority):
+        if self.insert_components(parent, child, components, stamp_ns, static=static):
             warn(f"frame {shown(child)} has two different poses at {format_stamp(stamp_ns or 0)}; the last one holds")
         if found:
             self.covariances[child] = found
 
     def insert_components(
         self, parent: str, child: str, components: Rigid, stamp_ns: int | None = None, *,
-        static: bool | None = None, authority: str = DEFAULT_AUTHORITY,
+        static: bool | None = None,
     ) -> bool:  # fmt: skip
         """Add tx, ty, tz (metres), x, y, z, w (unit quaternion); otherwise as `insert`.
 
@@ -76,23 +76,14 @@ class TransformBuffer(Frames):
             self.keep_ns is None and track is not None and type(stamp_ns) is int and not static and not track.is_static
             and track.parent == parent and -FURTHEST_NS < stamp_ns < FURTHEST_NS
             and -1e300 < sum(components) < 1e300  # finite
+            and (track.last_ns < stamp_ns or not track.has(stamp_ns))
         ):  # fmt: skip
-            if track.last_ns < stamp_ns:
-                track.stamps.append(stamp_ns)
-                track.parents.append(parent)
-                track.samples.append(components)
-                track.last_ns = stamp_ns
-                track.table = None
-                if track.known is not None:
-                    track.known.add(stamp_ns)
-                return False
-            if not track.has(stamp_ns):
-                track.add(stamp_ns, parent, components)
-                return False
+            track.add(stamp_ns, parent, components)
+            return False
         topology.check_edge(parent, child, components)
         static = stamp_ns is None if static is None else static
         stamp = 0 if stamp_ns is None else whole_stamp(stamp_ns)
-        return self._admit(parent, child, components, stamp, static=static, authority=authority)
+        return self._admit(parent, child, components, stamp, static=static)
 
     def insert_many(self, parent: str, child: str, stamps_ns: Sequence[int], components: Sequence[Rigid]) -> None:
         """Add poses of a moving frame in ascending order of time, all later than the samples it already has.
@@ -109,9 +100,7 @@ class TransformBuffer(Frames):
         else:
             track.extend(stamps_ns[1:], components[1:])
 
-    def _admit(
-        self, parent: str, child: str, components: Rigid, stamp_ns: int, *, static: bool, authority: str,
-    ) -> bool:  # fmt: skip
+    def _admit(self, parent: str, child: str, components: Rigid, stamp_ns: int, *, static: bool) -> bool:
         """Add a sample that may be the first of its frame, out of order, or against a rule."""
         track = self._tracks.get(child)
         if track is not None and track.is_static != static:
@@ -119,16 +108,13 @@ class TransformBuffer(Frames):
         replaced = False
         if track is None:
             self._refuse_cycle(parent, child, stamp_ns, static=static)
-            if static:
-                track = self._put(StaticTransform(child, parent, components))
-            else:
-                track = self._put(MovingTrack(child, stamp_ns, parent, components))
+            pose = StaticTransform(child, parent, components)
+            self._put(pose if static else MovingTrack(child, stamp_ns, parent, components))
         elif track.is_static:
             topology.check_same(child, (track.parent, track.components), (parent, components))
         else:
             replaced = self._move(track, parent, components, stamp_ns)
         self._frames[parent] = None
-        track.authority = authority
         return replaced
 
     def _move(self, track: MovingTrack, parent: str, components: Rigid, stamp_ns: int) -> bool:

@@ -196,7 +196,7 @@ class CacheEntry:
     def __init__(self, track: Track) -> None:
         """Count the samples of a track."""
         oldest, newest = (0, 0) if track.is_static else track.span
-        self.child, self.parent, self.authority = track.child, track.parent, track.authority
+        self.child, self.parent = track.child, track.parent
         self.oldest, self.newest = oldest / BILLION, newest / BILLION
         self.length = (newest - oldest) / BILLION
         self.rate = track.count / max(self.length, SHORTEST)

@@ -53,13 +53,10 @@ class Packed:
         self.numbers.extend(chain.from_iterable(poses))
 
 
-DEFAULT_AUTHORITY = "default_authority"
-
-
 class StaticTransform:
     """One pose, valid at all times."""
 
-    __slots__ = ("authority", "child", "components", "parent")
+    __slots__ = ("child", "components", "parent")
     is_static: Literal[True] = True
     varies = False
     count = 1
@@ -69,7 +66,6 @@ class StaticTransform:
         self.child = child
         self.parent = parent
         self.components = components
-        self.authority = DEFAULT_AUTHORITY  # of the last publisher
 
     def covers(self, at_ns: int) -> bool:  # noqa: ARG002 - any time
         """Return True: a static pose is valid at every time."""
@@ -98,14 +94,15 @@ class MovingTrack:
     one sort inserts many.
     """
 
-    __slots__ = ("authority", "begin", "child", "first_ns", "known", "last_ns", "late", "parent", "parents",
-                 "samples", "segments", "stamps", "table", "varies")  # fmt: skip
+    __slots__ = (
+        "begin", "child", "first_ns", "known", "last_ns", "late", "parent", "parents", "samples", "segments", "stamps",
+        "table", "varies",
+    )  # fmt: skip
     is_static: Literal[False] = False
 
     def __init__(self, child: str, stamp_ns: int, parent: str, components: Rigid) -> None:
         """Create a track with one sample."""
         self.child = child
-        self.authority = DEFAULT_AUTHORITY
         self.varies = False
         self.stamps, self.parents = [stamp_ns], [parent]
         self.samples = [components]  # or Packed, which behaves like such a list

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from frametool.geometry.types import Array, Components, Condition, Four, Indices, Kernel, Number, Two
 
-BLOCK = 16384  # rows: amortises the cost of numpy calls, and a kernel's temporaries stay in the cache
-WIDE = 12  # columns in and out: kernels with more have more temporaries and get three quarters of the rows
+BLOCK = 12288  # rows: amortises the cost of numpy calls, and a kernel's temporaries stay in the cache
 SIGN_BIT = np.int64(-(2**63))
 np.empty(2**21)  # allocate and free 16 MiB once: glibc then reuses the memory of blocks instead of mapping it again
 
@@ -210,7 +209,7 @@ def batch_shape(parts: Components) -> tuple[int, ...]:
 def walk(kernel: Kernel, parts: Components, targets: Sequence[Array] | Array, *args: object) -> None:
     """Fill flat targets block by block with the results of a kernel."""
     with np.errstate(all="ignore"):
-        for place, block in cut(parts, len(targets)):
+        for place, block in cut(parts):
             for target, result in zip(targets, kernel(*block, *args), strict=True):
                 target[place] = result
 
@@ -235,11 +234,11 @@ def all_finite(results: Components) -> bool:
     return math.isfinite(np.asarray(results[0]).sum() + np.asarray(results[-1]).sum())
 
 
-def cut(parts: Components, targets: int) -> Iterator[tuple[slice, Components]]:
-    """Cut flat components into blocks of contiguous float64 for a kernel that fills this many targets."""
+def cut(parts: Components) -> Iterator[tuple[slice, Components]]:
+    """Cut flat components into blocks of contiguous float64."""
     shape = batch_shape(parts)
     columns = [_flat(part, shape) if isinstance(part, np.ndarray) else float(part) for part in parts]
-    for start, stop in blocks(int(np.prod(shape)), len(parts) + targets):
+    for start, stop in blocks(int(np.prod(shape))):
         yield slice(start, stop), tuple(_cut(column, start, stop) for column in columns)
 
 
@@ -250,11 +249,10 @@ def _flat(part: Array, shape: tuple[int, ...]) -> Array:
     return part if part.ndim == 1 else part.reshape(-1)
 
 
-def blocks(size: int, columns: int = 0) -> Iterator[tuple[int, int]]:
-    """Cut a length into blocks, shorter ones for a kernel with many columns in and out."""
-    rows = BLOCK if columns <= WIDE else BLOCK * 3 // 4
-    for start in range(0, size, rows):
-        yield start, min(start + rows, size)
+def blocks(size: int) -> Iterator[tuple[int, int]]:
+    """Cut a length into blocks."""
+    for start in range(0, size, BLOCK):
+        yield start, min(start + BLOCK, size)
 
 
 def _cut(column: Number, start: int, stop: int) -> Number:

@@ -71,7 +71,7 @@ def _convert(
     """Fill quaternions (4, n); return the deviation per row (inf: refused; None: nothing to report) and the worst."""
     off, worst = None, 0.0
     with np.errstate(all="ignore"):
-        for place, block in arrays.cut(inputs, 4):
+        for place, block in arrays.cut(inputs):
             grades, right, furthest = _repaired(notation.representation.batch, block, normalize=normalize)
             worst = max(worst, furthest)
             results = notation.to_quaternion(right, arrays, degrees=degrees)

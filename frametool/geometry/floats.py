@@ -8,8 +8,7 @@ come from interpolation at Chebyshev nodes with 60 digits; the tests compare the
 
 from __future__ import annotations
 
-from functools import cache
-from math import copysign, fmod, frexp, isfinite, ldexp, nan, pi, sqrt
+from math import atan2, copysign, cos, fmod, frexp, isfinite, ldexp, nan, pi, sin, sqrt
 
 __all__ = [
     "canonical_sign", "copysign", "doubled_arctan", "doubled_sincos", "first_nonzero", "fmod", "frexp", "furthest",
@@ -49,7 +48,7 @@ def half_sincos(angle: N, xp: Functions[N]) -> Two[N]:
 
     Source: sin 2y = 2 sin y cos y and cos 2y = 1 - 2 sin^2 y of the quarter y, well-conditioned because
     |sin y| <= sqrt(1/2); near a right angle the cosine is the distance to it.  Quarters beyond pi/4 are reduced as in
-    Cody & Waite 1980, and exactly beyond 2^20.
+    Cody & Waite 1980, and by `reduced_exactly` beyond 2^20.
     """
     quarter = 0.25 * angle
     bound = xp.furthest(quarter)
@@ -140,36 +139,14 @@ def horner(value: N, x: N, coefficients: tuple[float, ...]) -> N:
     return value
 
 
-SPARE = 128  # bits after the point: 64 for the result, 64 for how close a double may be to a multiple of a quarter turn
-
-
 def reduced_exactly(x: float) -> tuple[float, float]:
-    """Return an angle minus the nearest multiple of a quarter turn, rounded once, and the parity of the multiple."""
+    """Return an angle up to 4e307 minus the nearest multiple of a quarter turn, and the parity of the multiple.
+
+    The C library's sine and cosine reduce the angle by as many digits of pi as it takes.
+    """
     if not isfinite(x):
         return nan, 0.0
-    above, below = x.as_integer_ratio()
-    bits = SPARE + -(-above.bit_length() // 64) * 64
-    quarter_turn = _pi(bits) >> 1
-    turns, rest = divmod((above << bits) // below + quarter_turn // 2, quarter_turn)
-    return (rest - quarter_turn // 2) / (1 << bits), float(turns & 1)
-
-
-@cache
-def _pi(bits: int) -> int:
-    """Return pi times 2^bits, by Machin's 16 arccot 5 - 4 arccot 239 (1706)."""
-    one = 1 << (bits + 32)
-    return (16 * _arccot(5, one) - 4 * _arccot(239, one)) >> 32
-
-
-def _arccot(x: int, one: int) -> int:
-    """Return arccot x times one, by the series of the arc tangent of 1/x."""
-    power = total = one // x
-    divisor = 1
-    while power:
-        power //= -x * x
-        divisor += 2
-        total += power // divisor
-    return total
+    return 0.25 * atan2(sin(4.0 * x), cos(4.0 * x)), float(cos(2.0 * x) < 0.0)
 
 
 S1, S2, S3, S4, S5, S6 = SINE

@@ -5,7 +5,7 @@ Six numbers are its first two columns, which determine the third (Zhou et al. 20
 
 from __future__ import annotations
 
-from math import frexp, inf, isfinite, ldexp, sqrt
+from math import frexp, inf, ldexp, sqrt
 
 from frametool.errors import ValueInvalid, warn
 from frametool.geometry import floats, quaternion
@@ -155,7 +155,7 @@ def check(*values: float, normalize: bool = False) -> Nine[float]:
     Orthonormal to 1e-6 silently, to 1e-3 with a warning; with `normalize` any with singular values in 0.9 .. 1.1.
 
     Raises:
-        ValueInvalid: not finite, mirrored, singular, a scaled rotation, or not orthonormal.
+        ValueInvalid: mirrored, singular, a scaled rotation, or not orthonormal.
     """
     entries = nine(values)
     problem = complaint(*entries, normalize=normalize)
@@ -171,8 +171,6 @@ def check(*values: float, normalize: bool = False) -> Nine[float]:
 
 def complaint(*entries: float, normalize: bool) -> ValueInvalid | None:
     """Return the error for a matrix that is refused; None if it is accepted."""
-    if not all(map(isfinite, entries)):
-        return ValueInvalid(f"matrix {_shown(entries)} is not finite; give nine finite numbers", rule="not-finite")
     matrix = nine(entries)
     exponent = frexp(max(map(abs, matrix)))[1]
     scaled = nine(ldexp(part, -exponent) for part in matrix)  # by a power of two: no square leaves the range
@@ -247,12 +245,10 @@ def check_six_d(*columns: float, normalize: bool = False) -> Components:  # noqa
     """Check one pair of columns and return it.
 
     Raises:
-        ValueInvalid: not finite, zero or parallel.
+        ValueInvalid: zero or parallel.
     """
     ax, ay, az, bx, by, bz = columns
     shown = f"columns {ax:g} {ay:g} {az:g} and {bx:g} {by:g} {bz:g}"
-    if not all(map(isfinite, columns)):
-        raise ValueInvalid(f"{shown} are not finite; give six finite numbers", rule="not-finite")
     if not (ax or ay or az) or not (bx or by or bz):
         raise ValueInvalid(f"{shown} span no plane: one is zero", rule="denormalized")
     if six_d_deviation(ax, ay, az, bx, by, bz, floats):

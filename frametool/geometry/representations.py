@@ -130,12 +130,11 @@ class Representation(NamedTuple):
         if len(components) != len(self.columns):
             expected = f"{len(self.columns)} numbers ({' '.join(self.columns)})"
             raise ValueInvalid(f"{self.name} takes {expected}, found {len(components)}")
-        if self.check is not None:
-            return self.check(*components, normalize=normalize)
         if not all(map(isfinite, components)):
-            shown = " ".join(f"{value:g}" for value in components)
-            raise ValueInvalid(f"{self.name} {shown} is not finite; give finite numbers", rule="not-finite")
-        return tuple(components)
+            numbers = " ".join(f"{value:g}" for value in components)
+            what = self.label or self.name
+            raise ValueInvalid(f"{what} {numbers} is not finite; give finite numbers", rule="not-finite")
+        return tuple(components) if self.check is None else self.check(*components, normalize=normalize)
 
 
 def _arithmetic(kernel: Callable[..., Components]) -> Callable[..., Components]:

@@ -45,14 +45,9 @@ def columns(value: Any, width: int, name: str) -> Components:
     array = as_numbers(value, name)
     if array.ndim == 0 or array.shape[-1] != width:
         raise ValueInvalid(f"{name}: expected shape (..., {width}), got {array.shape}")
-    return parts(array, name)
-
-
-def parts(array: Array, name: str) -> Components:
-    """Split the last axis of an array."""
     if array.ndim == 1:
         return finite(tuple(map(float, array.tolist())), name)
-    return tuple(array[..., index] for index in range(array.shape[-1]))
+    return tuple(array[..., index] for index in range(width))
 
 
 def matrices(value: Numbers, size: int, name: str) -> Components:
@@ -64,7 +59,7 @@ def matrices(value: Numbers, size: int, name: str) -> Components:
     array = as_numbers(value, name)
     if array.shape[-2:] != (size, size):
         raise ValueInvalid(f"{name}: expected shape (..., {size}, {size}), got {array.shape}")
-    return parts(array.reshape(*array.shape[:-2], size * size), name)
+    return columns(array.reshape(*array.shape[:-2], size * size), size * size, name)
 
 
 def scalars(value: Any, name: str) -> Any:
@@ -298,7 +293,7 @@ def second_moment(components: Components, mass: Array) -> list[list[float]]:
     from frametool.geometry import arrays
 
     upper = {(i, j): 0.0 for i in range(4) for j in range(i, 4)}
-    for _, (weight, *parts) in arrays.cut((mass, *components), 0):
+    for _, (weight, *parts) in arrays.cut((mass, *components)):
         heavy = [weight * part for part in parts]
         for i, j in upper:
             upper[i, j] += total(heavy[i] * parts[j])

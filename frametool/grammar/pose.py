@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from frametool.errors import ValueInvalid, did_you_mean, first_of, shown
+from frametool.errors import ValueInvalid, did_you_mean, shown
 from frametool.geometry.representations import REPRESENTATIONS, ROTATIONS, notation
 from frametool.grammar.readers import (
     INDICES,
@@ -59,8 +59,9 @@ VELOCITY = ("linear_x", "linear_y", "linear_z", "angular_x", "angular_y", "angul
 DESCRIPTIVE = frozenset(("frame", "gimbal_lock", *TIMES, "distance", "angle", "angle_deg", *SPREAD, *VELOCITY))
 NAMES = frozenset((*NAME_KEYS, *PARENT_NAMES))
 OTHER_NAMES = NAMES.difference(("name", "parent"))
-MOST_NAMED = 3  # unknown keys in one message
+MOST_NAMED = 5  # unknown keys in one message, if they fit
 MOST_CHOICES = 10  # representations listed in an error; `help rotations` has all
+MOST_CHARACTERS = 80
 SCALE = "scale"
 COVARIANCE_KEYS = frozenset(("sigma", "covariance"))
 LEFT_OUT = "covariances left out: {} has none"  # completed with the name of a command
@@ -280,9 +281,16 @@ def _agreeing_position(first: Vector | None, second: Vector) -> Vector:
 
 
 def unknown_keys(hints: Sequence[tuple[str, str]], count: int) -> str:
-    """Return the first unknown keys, each with its hint, and the number of the others."""
-    named = [f"unknown key {shown(key)}{hint.replace('; ', ', ')}" for key, hint in hints]
-    return first_of(named, MOST_NAMED, gap="; ", count=count)
+    """Return unknown keys, each with its hint, as long as they fit; and the number of the others."""
+    named: list[str] = []
+    for key, hint in hints:
+        text = f"unknown key {shown(key)}{hint.replace('; ', ', ')}"
+        if named and len("; ".join([*named, text])) > MOST_CHARACTERS:
+            break
+        named.append(text)
+    left = count - len(named)
+    last = [f"and {shown(hints[-1][0]) if left == 1 else f'{left} more'}"] if left else []
+    return "; ".join([*named, *last])
 
 
 def _refuse_unknown_keys(mapping: dict[str, Any], also: Collection[str]) -> None:

@@ -51,7 +51,7 @@ def _entry(each: CacheEntry) -> str:
     return (
         f"{each.child}: \n"
         f"  parent: '{each.parent}'\n"
-        f"  broadcaster: '{each.authority}'\n"
+        "  broadcaster: 'default_authority'\n"
         f"  rate: {each.rate:.3f}\n"
         f"  most_recent_transform: {each.newest:.3f}\n"
         f"  oldest_transform: {each.oldest:.3f}\n"

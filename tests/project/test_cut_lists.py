@@ -69,10 +69,11 @@ def test_the_nearest_topic_is_shown_of_many(run: Run) -> None:
 
 
 def test_unknown_keys_name_a_last_one() -> None:
-    hints = [(key, "") for key in "abcdef"]
-    named = "unknown key 'a'; unknown key 'b'; unknown key 'c'"
-    assert unknown_keys(hints[:4], 4) == f"{named}; unknown key 'd'"
-    assert unknown_keys(hints[:4], 5) == f"{named} and 2 more"
+    long = [f"quite_a_long_unknown_key_{at}_of_some_more_characters" for at in range(4)]
+    hints = [(key, "") for key in long]
+    first = f"unknown key '{long[0]}'"
+    assert unknown_keys(hints[:2], 2) == f"{first}; and '{long[1]}'"
+    assert unknown_keys(hints[:3], 3) == f"{first}; and 2 more"
 
 
 @pytest.mark.parametrize("name", ["conver", "lokup", "mnitor"])

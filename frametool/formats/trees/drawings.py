@@ -112,7 +112,7 @@ def _view_frames(tree: Frames) -> str:
 
 def _edge(each: CacheEntry) -> str:
     facts = {
-        "Broadcaster": graphviz(each.authority),
+        "Broadcaster": "default_authority",
         "Average rate": round(each.rate, 3),
         "Buffer length": round(each.length, 3),
         "Most recent transform": round(each.newest, 3),
