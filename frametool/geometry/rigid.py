@@ -1,7 +1,7 @@
 """Kernels of rigid transforms: translation tx, ty, tz in metres, then the unit quaternion x, y, z, w.
 
 Products and inverses; interpolation of two poses, prepared once for many fractions, with exactly the rotation of
-`quaternion.slerp`; chains of joints, whose constant zeros cost nothing; and twists and wrenches in another frame
+`quaternion.slerp`; motions of joints; and twists and wrenches in another frame
 (linear part first), by the adjoint.
 Knows numbers only; components are floats or arrays of one shape, and both take the same steps.
 """
@@ -13,26 +13,12 @@ from math import isfinite
 from frametool.errors import ValueInvalid
 from frametool.geometry import quaternion
 from frametool.geometry.floats import half_sincos, half_sincos_deg, incline, polynomial
-from frametool.geometry.quaternion import cross, either, length, settled
+from frametool.geometry.quaternion import cross, either, length
 
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from frametool.geometry.types import (
-        Components,
-        Eight,
-        Functions,
-        N,
-        Number,
-        Quaternion,
-        Rigid,
-        Seven,
-        Six,
-        Three,
-        Twelve,
-        Two,
-        Vector,
-    )
+    from frametool.geometry.types import Components, Eight, Functions, N, Number, Rigid, Seven, Six, Three, Twelve, Two
 
 EXACT, SCALED, UNCERTAIN = 7, 8, 43  # components of a pose: alone, with a scale, with a covariance
 IDENTITY: Rigid = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -220,65 +206,6 @@ def slid(ax: float, ay: float, az: float, distance: N) -> Rigid:
 def _times(part: float, values: Number) -> Number:
     """Multiply by a component of an axis, mostly 0: then the product is the plain float 0 and costs nothing."""
     return part * values if part else 0.0
-
-
-def go_on(pose: Rigid, piece: Rigid) -> Rigid:
-    """Return the pose at the end of a segment: the same bits as `compose`, but plain zeros cost nothing.
-
-    Most components of robot models are such zeros, while joint values are arrays.
-    """
-    tx, ty, tz, x, y, z, w = pose
-    px, py, pz, bx, by, bz, bw = piece
-    if not all(map(_is_zero, (px, py, pz))):
-        dx, dy, dz = _rotated(pose[3:], (px, py, pz))
-        tx, ty, tz = tx + dx, ty + dy, tz + dz
-    ix, iy, iz = (each if _is_zero(each) else -each for each in (x, y, z))
-    return (
-        tx,
-        ty,
-        tz,
-        *settled(
-            _sum((w, bx), (x, bw), (y, bz), (iz, by)),
-            _sum((w, by), (ix, bz), (y, bw), (z, bx)),
-            _sum((w, bz), (x, by), (iy, bx), (z, bw)),
-            _sum((w, bw), (ix, bx), (iy, by), (iz, bz)),
-        ),
-    )
-
-
-def _rotated(rotation: Quaternion, vector: Vector) -> Vector:
-    """Rotate a vector by only those columns of the matrix that it needs, as `quaternion.rotate` does."""
-    x, y, z, w = rotation
-    vx, vy, vz = vector
-    scale = 2.0 / (x * x + y * y + z * z + w * w)
-    xs, ys, zs = x * scale, y * scale, z * scale
-    columns = []
-    if not _is_zero(vx):
-        columns.append((vx, 1.0 - (y * ys + z * zs), x * ys + w * zs, x * zs - w * ys))
-    if not _is_zero(vy):
-        columns.append((vy, x * ys - w * zs, 1.0 - (x * xs + z * zs), y * zs + w * xs))
-    if not _is_zero(vz):
-        columns.append((vz, x * zs + w * ys, y * zs - w * xs, 1.0 - (x * xs + y * ys)))
-    first, second, third = (_sum(*((column[0], column[row]) for column in columns)) for row in (1, 2, 3))
-    return first, second, third
-
-
-def _is_zero(number: Number) -> bool:
-    return type(number) is float and number == 0.0
-
-
-def _sum(*terms: tuple[Number, Number]) -> Number:
-    """Add products, omitting those that are a plain 0."""
-    total = None
-    for one, other in terms:
-        if _is_zero(one) or _is_zero(other):
-            continue
-        if type(one) is float and one == 1.0:
-            part = other
-        else:
-            part = one if type(other) is float and other == 1.0 else one * other
-        total = part if total is None else total + part
-    return 0.0 if total is None else total
 
 
 def move_wrench(
