@@ -193,7 +193,7 @@ def solve_points(
     a, b = _points(target, "target"), _points(source, "source")
     if len(a) != len(b):
         raise ValueInvalid(f"target has {len(a)} points, source {len(b)}")
-    mass = np.ones(len(a)) if weights is None or not len(a) else validation.weights(weights, a.shape[:1])
+    mass = np.ones(len(a)) if weights is None or not len(a) else validation.masses(weights, a.shape[:1])
     if (count := int((mass > 0.0).sum())) < FEWEST:
         raise ValueInvalid(f"{count} matched point{'s'[: count != 1]}; {FEWEST} are needed, not on a line")
     pairs = _Pairs(a[mass > 0.0], b[mass > 0.0], mass[mass > 0.0])

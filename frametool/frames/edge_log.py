@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import UnknownFrame
-from frametool.frames.refusals import seconds
+from frametool.frames.path import seconds
 from frametool.frames.stamps import BILLION
 from frametool.frames.topology import edges_between
 from frametool.geometry import floats, rigid

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from frametool.errors import BadTopology, NoDataAt, NotConnected, UnknownFrame, ValueInvalid, bare, listing, warn
 from frametool.frames import topology
-from frametool.frames.path import Query
-from frametool.frames.refusals import left_out, no_data
+from frametool.frames.path import Query, left_out, no_data
 from frametool.frames.stamps import BILLION, FURTHEST_NS, whole_stamp
 from frametool.frames.topology import Groups, edges_between, to_root
 from frametool.frames.track import StaticTransform
@@ -342,11 +341,11 @@ class Frames:
         return sorted(stamps)
 
     def query(self, target: str, source: str, at_ns: int | None) -> Query:
-        """Return the path between two frames at a time, or by the newest parents; cached if no parent on it changes."""
+        """Return the path between two frames at a time, or by the newest parents; cached if no parent changes."""
         if kept := self._queries.get((target, source)):
             return kept
         query = self.query_of(*self.between(target, source, at_ns))
-        if not self._varies or not (self._changes_above(target) or self._changes_above(source)):
+        if not self._varies:
             if len(self._queries) >= MOST_KEPT:
                 self._queries.clear()
             self._queries[target, source] = query
@@ -356,12 +355,6 @@ class Frames:
         """Prepare a path returned by `between`."""
         tracks = self._tracks
         return Query([tracks[child] for child in down], [tracks[child] for child in reversed(up)])
-
-    def _changes_above(self, frame: str) -> bool:
-        """Return True if a frame or an ancestor of it ever changes its parent."""
-        if self._loops:
-            return True
-        return any(frame in self._tracks and self._tracks[frame].varies for frame in to_root(frame, self.parent))
 
     def way_at(self, target: str, source: str, at_ns: int) -> tuple[list[str], list[str]] | None:
         """Return the edges as `between` does; None if a changing parent leaves no path."""

@@ -261,8 +261,7 @@ class Rotation(Batched):
     def apply(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Rotate vectors of shape (..., 3); rotations and vectors broadcast over the leading axes."""
         inputs = validation.columns(vectors, 3, "vectors")
-        parts = self._components
-        return validation.moved(quaternion.rotate, parts, inputs, "vectors", flatten=quaternion.to_matrix, out=out)
+        return validation.moved(quaternion.rotate, self._components, inputs, "vectors", out=out)
 
     def angle(self) -> Any:
         """Return the angle of rotation in [0, pi] radians."""

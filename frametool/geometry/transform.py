@@ -156,7 +156,7 @@ class Transform(Batched):
     def apply(self, points: Numbers, *, out: Array | None = None) -> Array:
         """Transform points of shape (..., 3); transforms and points broadcast over the leading axes."""
         inputs = validation.columns(points, 3, "points")
-        return validation.moved(rigid.apply, self._components, inputs, "points", flatten=rigid.to_matrix, out=out)
+        return validation.moved(rigid.apply, self._components, inputs, "points", out=out)
 
     def apply_vector(self, vectors: Numbers, *, out: Array | None = None) -> Array:
         """Rotate vectors of shape (..., 3): directions and velocities, which are not translated."""

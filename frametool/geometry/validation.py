@@ -156,19 +156,6 @@ def check_last_row(entries: Components, name: str) -> None:
         raise ValueInvalid(f"{at_first(name, bad)}: last row {shown_row(entries[12:], bad)}; expected 0 0 0 1")
 
 
-def weights(value: Numbers, shape: tuple[int, ...]) -> Array:
-    """Check weights: of the batch's shape, finite, not negative, not all 0."""
-    import numpy as np
-
-    array = as_numbers(value, "weights").astype(np.float64)
-    if array.shape != shape:
-        raise ValueInvalid(f"weights: expected shape {shape}, got {array.shape}")
-    all_finite((array,), "weights")
-    if (array < 0.0).any() or not array.any():
-        raise ValueInvalid("weights: expected none negative and not all 0")
-    return array
-
-
 def checked(kernel: Kernel, count: int, inputs: Components, name: str, check: Callable[..., object]) -> Components:
     """Run a kernel that not every finite input suits; `check` validates one item, and the first row that fails."""
     if single(inputs):
@@ -227,21 +214,17 @@ def rows(
 
 
 def moved(
-    kernel: Kernel, mover: Components, inputs: Components, name: str, *,
-    flatten: Kernel | None = None, out: Array | None = None,
-) -> Array:  # fmt: skip
-    """Transform vectors, each by its own mover or all by one; `flatten` makes the matrix of one, which is faster.
+    kernel: Kernel, mover: Components, inputs: Components, name: str, *, out: Array | None = None
+) -> Array:
+    """Transform vectors, each by its own mover or all by one.
 
     If a vector is not finite, vectors that would be overwritten are unchanged.
     """
-    inner = (len(inputs),)
-    if single(inputs) and single(mover):
-        return _one_row(kernel(*mover, *inputs), inner, out)
+    parts, inner = (*mover, *inputs), (len(inputs),)
+    if single(parts):
+        return _one_row(kernel(*parts), inner, out)
     from frametool.geometry import arrays
 
-    parts = (*mover, *inputs)
-    if flatten and single(mover):
-        kernel, parts = _matrix_kernel(flatten(*mover)), inputs
     return arrays.rows(arrays.guarded(kernel, lambda: all_finite(inputs, name)), inner, parts, out=out)
 
 
@@ -255,25 +238,6 @@ def _one_row(components: Components, inner: tuple[int, ...], out: Array | None) 
     arrays.require_fitting(out, inner)
     out[...] = row
     return out
-
-
-def _matrix_kernel(entries: Components) -> Kernel:
-    """Return the kernel of one matrix, three rows of three or of four; sums in place save a tenth of the time."""
-    width = len(entries) // 3
-    matrix = [entries[start : start + width] for start in range(0, len(entries), width)]
-
-    def kernel(x: Array, y: Array, z: Array) -> Components:
-        moved = []
-        for a, b, c, *shift in matrix:
-            row = a * x
-            row += b * y
-            row += c * z
-            for distance in shift:
-                row += distance
-            moved.append(row)
-        return tuple(moved)
-
-    return kernel
 
 
 def stacked(components: Components) -> Array:
@@ -310,14 +274,22 @@ def total(values: Array) -> float:
     return float(sums[0])
 
 
-def masses(heavy: Numbers | None, shape: tuple[int, ...]) -> Array:
+def masses(value: Numbers | None, shape: tuple[int, ...]) -> Array:
     """Return weights of a batch's shape, 1 each if none are passed.
 
     Raises:
-        ValueInvalid: the batch is empty, or the weights are invalid.
+        ValueInvalid: the batch is empty, or the weights are not of its shape, finite, not negative and not all 0.
     """
     import numpy as np
 
     if 0 in shape:
         raise ValueInvalid("mean of no rotations; give at least one")
-    return np.ones(shape) if heavy is None else weights(heavy, shape)
+    if value is None:
+        return np.ones(shape)
+    array = as_numbers(value, "weights").astype(np.float64)
+    if array.shape != shape:
+        raise ValueInvalid(f"weights: expected shape {shape}, got {array.shape}")
+    all_finite((array,), "weights")
+    if (array < 0.0).any() or not array.any():
+        raise ValueInvalid("weights: expected none negative and not all 0")
+    return array

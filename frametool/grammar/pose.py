@@ -171,7 +171,8 @@ def read_pose(mapping: dict[str, Any], reading: Reading, also: Collection[str] =
     if not (name and parent and type(name) is type(parent) is str) or not OTHER_NAMES.isdisjoint(mapping):
         name, parent = _agreeing_name(mapping, NAME_KEYS), _agreeing_name(mapping, PARENT_NAMES)
     pose = Pose(position, rotation, name, parent, None, uncertain)
-    return inverted(pose) if "inverse" in mapping and _read_flag(mapping["inverse"]) else pose
+    is_inverse = "inverse" in mapping and _read_choice("inverse", mapping["inverse"], "true", "false")
+    return inverted(pose) if is_inverse else pose
 
 
 def inverted(pose: Pose) -> Pose:
@@ -209,17 +210,13 @@ def _agreeing_name(mapping: dict[str, Any], keys: Sequence[str]) -> str | None:
 
 def read_angle_unit(value: Any) -> bool:
     """Read `angles: deg` or `angles: rad`; True for degrees."""
-    if value not in ("deg", "rad"):
-        found = kind(value)
-        raise Misfit(f"angles must be deg or rad, found {found}", ("angles",))
-    return bool(value == "deg")
+    return _read_choice("angles", value, "deg", "rad")
 
 
-def _read_flag(value: Any) -> bool:
-    if value not in ("true", "false"):
-        found = kind(value)
-        raise Misfit(f"inverse must be true or false, found {found}", ("inverse",))
-    return bool(value == "true")
+def _read_choice(key: str, value: Any, yes: str, no: str) -> bool:
+    if value not in (yes, no):
+        raise Misfit(f"{key} must be {yes} or {no}, found {kind(value)}", (key,))
+    return bool(value == yes)
 
 
 def read_scale(value: Any) -> float:

@@ -9,7 +9,6 @@ from frametool.errors import ValueInvalid, bare, overheard, shown
 from frametool.geometry import floats, quaternion
 from frametool.geometry.representations import (
     LIST,
-    MAP,
     NAMED,
     NAMED_AXES,
     OF_WORLD,
@@ -138,7 +137,9 @@ def shape_of(key: str, value: Any) -> Spelled:
     shape = notation.representation.shape
     if shape == NAMED and type(value) is list:
         raise _without_order(key, notation, value)
-    return _take_parts(notation, value, dict(shape)) if isinstance(shape, tuple) else SHAPES[shape](notation, value)
+    if isinstance(shape, tuple):
+        return _take_parts(notation, value, dict(shape))
+    return _take_rows(notation, value) if shape == ROWS else _list_or_map(notation, value)
 
 
 def _read_axes(value: Any) -> Quaternion:
@@ -282,15 +283,10 @@ def _list_or_map(notation: Notation, value: Any) -> Spelled:
     row = notation.representation
     is_whole = row.whole is not None and type(value) is list and len(value) == len(row.whole.columns)
     columns = row.whole.columns if row.whole and is_whole else row.columns
-    if type(value) is dict and value.keys() == {*row.names}:
+    if row.shape == NAMED or (type(value) is dict and value.keys() == {*row.names}):
         columns = row.names
     texts = read_texts(value, columns, partial=bool(row.angles))
     return notation, texts, places_in(value) if type(value) is list else [(name,) for name in columns]
-
-
-def _take_named(notation: Notation, value: Any) -> Spelled:
-    """Read a mapping by short names."""
-    return notation, read_texts(value, notation.names), [(name,) for name in notation.names]
 
 
 def _without_order(key: str, notation: Notation, value: list[Any]) -> Misfit:
@@ -355,9 +351,6 @@ def _take_rows(notation: Notation, value: Any) -> Spelled:
         raise Misfit(f"expected {expected}, found {size} rows of lengths {bare(lengths)}")
     places = [(at, column) for at in range(size) for column in range(size)]
     return notation, [text for each in value for text in each], places
-
-
-SHAPES = {LIST: _list_or_map, MAP: _list_or_map, NAMED: _take_named, ROWS: _take_rows}
 
 
 def spelled(notation: Notation, numbers: Sequence[float]) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from frametool.errors import FormatError
 from frametool.formats.load import refuse_unknown_joints
 from frametool.frames.edge_log import EdgeLog, chain
-from frametool.frames.refusals import frames_on
+from frametool.frames.path import frames_on
 from frametool.frames.stamps import BILLION
 from frametool.grammar.edges import stop
 

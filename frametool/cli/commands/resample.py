@@ -12,7 +12,7 @@ from frametool.cli.output import Output
 from frametool.cli.stderr import say
 from frametool.errors import FormatError, warn
 from frametool.formats.table import by_name, writers
-from frametool.frames.refusals import seconds
+from frametool.frames.path import seconds
 from frametool.grammar.edges import stop
 from frametool.stream.faults import ROWS_SKIPPED
 from frametool.text.numbers import parse_number
